@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.export.fixed_step import InputKind, Stepping, run_fixed_step, sample_signals
+from drivetwin.export.fixed_step import Stepping, run_fixed_step, sample_signals
+from drivetwin.export.input_kind import InputKind
 from drivetwin.simulation.dual_clutch import Signal, simulate
 from tests.export.cases import CASES
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.fixed_step import run_fixed_step
+from drivetwin.export.input_kind import InputKind
 from drivetwin.export.subject import build_subject, compute_steady_start
 from drivetwin.simulation.dual_clutch import RoadLoad
 from tests.export.cases import paper_model

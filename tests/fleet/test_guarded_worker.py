@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin._util.version import program_version
+from drivetwin._util.version import get_program_version
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.guarded_worker import GuardedWorker
 from drivetwin.fleet.task import (
@@ -37,7 +37,7 @@ def cell() -> Iterator[GuardedWorker]:
 def _task(folder: Path, text: str) -> Task:
     path = folder / "log.csv"
     path.write_text(text)
-    recipe = TaskSpec("card", None, Method.PAPER, (("vehicle", "00"),), program_version())
+    recipe = TaskSpec("card", None, Method.PAPER, (("vehicle", "00"),), get_program_version())
     return Task("0123", str(path), "content", recipe, str(folder / "part.parquet"))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin._util.version import program_version
+from drivetwin._util.version import get_program_version
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
@@ -35,7 +35,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _task(log: Path, *means: tuple[str, str]) -> Task:
     card = str(log.with_suffix(".card.toml"))
     inputs = compute_input_hashes(card, None)
-    recipe = TaskSpec(card, None, Method.PAPER, inputs, program_version(), means)
+    recipe = TaskSpec(card, None, Method.PAPER, inputs, get_program_version(), means)
     content = hashlib.sha256(log.read_bytes()).hexdigest()
     return Task("0123", str(log), content, recipe, str(log.with_suffix(".parquet")))
 

@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 
 
-def finite_or_none(value: object) -> object:
+def convert_nonfinite(value: object) -> object:
     """Turn NaN and infinities into None: neither exists in JSON."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def plain(value: Any) -> Any:
+def to_plain_values(value: Any) -> Any:
     """Reduce settings to what JSON and TOML know: enums to values, arrays to lists, NaN to None."""
     if isinstance(value, Enum):
-        return plain(value.value)
+        return to_plain_values(value.value)
     if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+        return to_plain_values(value.tolist())
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): to_plain_values(item) for key, item in value.items()}
     if isinstance(value, list | tuple | set | frozenset):
-        return [plain(item) for item in value]
+        return [to_plain_values(item) for item in value]
     if isinstance(value, bool | int | str | None):
         return value
-    return finite_or_none(value) if isinstance(value, float) else str(value)
+    return convert_nonfinite(value) if isinstance(value, float) else str(value)

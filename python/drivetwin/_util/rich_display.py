@@ -14,10 +14,10 @@ from typing import Any, Protocol
 class Presenter(Protocol):
     """Figures and summaries of results, by type of the result."""
 
-    def figure_of(self, shown: Any, /) -> Any:
+    def draw_figure(self, shown: Any, /) -> Any:
         """Return the Plotly figure of a result."""
 
-    def summary_of(self, shown: Any, /) -> Any:
+    def summarise(self, shown: Any, /) -> Any:
         """Return the summary of a result, as text and HTML."""
 
 
@@ -39,11 +39,11 @@ class DisplayMixin:
 
     def plot(self) -> Any:
         """Return the Plotly figure of the report."""
-        return _load_presenter().figure_of(self)
+        return _load_presenter().draw_figure(self)
 
     def summary(self) -> Any:
         """Return a summary in a few lines: text for `print`, a table in a notebook."""
-        return _load_presenter().summary_of(self)
+        return _load_presenter().summarise(self)
 
     def _repr_html_(self) -> str:
         """Return the HTML representation for notebooks."""

@@ -8,7 +8,7 @@ from importlib import metadata
 
 
 @cache
-def program_version() -> str:
+def get_program_version() -> str:
     """Version of the installed distribution; `unknown` when run from a source tree."""
     try:
         return metadata.version("drivetwin")

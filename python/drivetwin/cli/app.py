@@ -61,9 +61,9 @@ for entry in (*app.registered_commands, *fleet.registered_commands):
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from drivetwin._util.version import program_version
+        from drivetwin._util.version import get_program_version
 
-        typer.echo(f"drivetwin {program_version()}")
+        typer.echo(f"drivetwin {get_program_version()}")
         raise typer.Exit
 
 

@@ -80,9 +80,9 @@ def make_table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
 
 def print_json(value: Mapping[str, Any]) -> None:
     """Print one strict JSON document on stdout; NaN and infinities become null."""
-    from drivetwin._util.plain_values import plain
+    from drivetwin._util.plain_values import to_plain_values
 
-    text = json.dumps(plain(dict(value)), allow_nan=False, ensure_ascii=False, indent=2)
+    text = json.dumps(to_plain_values(dict(value)), allow_nan=False, ensure_ascii=False, indent=2)
     sys.stdout.write(text + "\n")
 
 

@@ -18,7 +18,7 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
-from drivetwin.export.fixed_step import DEFAULT_STEP, InputKind
+from drivetwin.export.input_kind import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
     from drivetwin.estimation.result.validation import Validation

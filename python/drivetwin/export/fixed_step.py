@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.validation import Validation
+from drivetwin.export.input_kind import InputKind
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     DualClutch,
@@ -23,16 +23,6 @@ from drivetwin.simulation.dual_clutch import (
 )
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import replace_run
-
-DEFAULT_STEP = 1e-3
-"""Default communication step [s]: the sampling interval of pressure signals."""
-
-
-class InputKind(StrEnum):
-    """Interpolation of inputs between two communication points."""
-
-    LINEAR = "linear"
-    HOLD = "hold"
 
 
 @dataclass(frozen=True)

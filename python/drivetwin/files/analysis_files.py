@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from drivetwin._util.plain_values import plain
+from drivetwin._util.plain_values import to_plain_values
 from drivetwin.estimation.analysis.bootstrap import Bootstrap
 from drivetwin.estimation.analysis.friction_dependence import UNITS, Departure
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
@@ -84,4 +84,6 @@ def format_departures(found: tuple[Departure, ...]) -> str:
 
 
 def _format_json(content: dict[str, Any]) -> str:
-    return json.dumps(plain(content), allow_nan=False, ensure_ascii=False, indent=2) + "\n"
+    return (
+        json.dumps(to_plain_values(content), allow_nan=False, ensure_ascii=False, indent=2) + "\n"
+    )

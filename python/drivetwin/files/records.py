@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 
-from drivetwin._util.plain_values import finite_or_none
+from drivetwin._util.plain_values import convert_nonfinite
 from drivetwin.estimation.result.estimate import (
     OF_RATIO,
     Estimate,
@@ -22,7 +22,7 @@ from drivetwin.estimation.result.suggestion import Experiment, ExperimentRanking
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
 
-OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(finite_or_none)]
+OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(convert_nonfinite)]
 Interval = tuple[FiniteFloat, FiniteFloat]
 
 

@@ -10,8 +10,8 @@ from typing import Any, Literal
 from pydantic import Field, FiniteFloat, model_validator
 
 from drivetwin._util.atomic import write_text
-from drivetwin._util.plain_values import plain
-from drivetwin._util.version import program_version
+from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.multi_log_records import HeldOutRecord, SeveralRecord
@@ -88,9 +88,9 @@ class ResultFile(Record):
         evidence = source.evidence
         return {name: getattr(source, name) for name in _SAME_NAME} | {
             "schema": RESULT_SCHEMA,
-            "version": program_version(),
+            "version": get_program_version(),
             "parameters": source.estimates,
-            "settings": plain(source.settings),
+            "settings": to_plain_values(source.settings),
             "correlation": _build_correlation(source),
             "several": evidence.several,
             "held_out": evidence.held_out,

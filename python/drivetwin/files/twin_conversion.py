@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin._util.plain_values import plain
+from drivetwin._util.plain_values import to_plain_values
 from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.files.twin_file import TWIN_SCHEMA, TwinFile, read_twin_file, write_twin_file
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
@@ -30,17 +30,17 @@ _NAMES = {key: name for name, key in _KEYS.items()}
 
 def load_twin(path: Path | str) -> Twin:
     """Read `twin.toml`. Raises ResultFileError where it is damaged or of a newer schema."""
-    return twin_from_file(read_twin_file(path))
+    return restore_twin(read_twin_file(path))
 
 
 def save_twin(path: Path | str, twin: Twin) -> None:
     """Write `twin.toml` atomically."""
-    write_twin_file(path, file_of(twin))
+    write_twin_file(path, build_twin_file(twin))
 
 
-def file_of(twin: Twin) -> TwinFile:
+def build_twin_file(twin: Twin) -> TwinFile:
     """Records of a twin, ready to be written."""
-    covariance = {"ids": twin.covariance_ids, "matrix": plain(twin.covariance)}
+    covariance = {"ids": twin.covariance_ids, "matrix": to_plain_values(twin.covariance)}
     return TwinFile.from_result(
         {name: getattr(twin, name) for name in _TWIN_FIELDS}
         | {
@@ -51,7 +51,7 @@ def file_of(twin: Twin) -> TwinFile:
             },
             "load": twin.load_law,
             "covariance": None if twin.covariance is None else covariance,
-            "settings": plain(dict(twin.settings)),
+            "settings": to_plain_values(dict(twin.settings)),
         }
     )
 
@@ -60,7 +60,7 @@ def _add_units(fields: dict[str, Any]) -> dict[str, Any]:
     return {_KEYS.get(name, name): value for name, value in fields.items()}
 
 
-def twin_from_file(content: TwinFile) -> Twin:
+def restore_twin(content: TwinFile) -> Twin:
     """Build a twin from its records; `version` is that of the program that identified it."""
     gearbox, covariance = content.transmission, content.covariance
     same = {name: getattr(content, name) for name in _TWIN_FIELDS}

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from drivetwin._util.version import program_version
+from drivetwin._util.version import get_program_version
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import DrivetwinError, FileFormatError, Where
 from drivetwin.estimation.result.method import Method
@@ -115,7 +115,7 @@ class Scan:
             channels=channels,
             method=self._method,
             inputs=compute_input_hashes(vehicle, channels),
-            version=program_version(),
+            version=get_program_version(),
             means=self._rules.list_channel_means(),
             mu_slip=self._rules.mu_slip_rad_s,
         )

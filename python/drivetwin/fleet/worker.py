@@ -19,7 +19,7 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Any
 
-from drivetwin._util.version import program_version
+from drivetwin._util.version import get_program_version
 from drivetwin.errors import DrivetwinError, StoreError
 from drivetwin.fleet.parts import convert_write_errors, write_part
 from drivetwin.fleet.rows import Found
@@ -35,8 +35,8 @@ for what grows too fast to be seen there."""
 def run_task(work: Work, task: Task, memory: int) -> dict[str, Any]:
     """Run a task, write its part, and return its outcome; see `GuardedWorker` for the keys."""
     started = perf_counter()
-    if task.recipe.version != program_version():
-        versions = f"{program_version()} where the worker is, {task.recipe.version} here"
+    if task.recipe.version != get_program_version():
+        versions = f"{get_program_version()} where the worker is, {task.recipe.version} here"
         return {"stop": f"drivetwin has version {versions}", "remedy": "install the same version"}
     try:
         found = work(task)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.progress import notify_progress
-from drivetwin._util.version import program_version
+from drivetwin._util.version import get_program_version
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.validation import Validation
@@ -44,7 +44,7 @@ def render_comparison(candidates: Sequence[Candidate], trials: Sequence[Trial]) 
     names = ", ".join(one.name for one in candidates)
     return render_page(
         title=f"Comparison of {names}" if several else f"{names} over {len(trials)} shifts",
-        subtitle=f"made with drivetwin {program_version()}",
+        subtitle=f"made with drivetwin {get_program_version()}",
         sections=[section for section in sections if section.blocks],
     )
 

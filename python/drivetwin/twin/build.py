@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drivetwin._util.plain_values import plain
-from drivetwin._util.version import program_version
+from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.verdict import KNOWN, from_prior
@@ -26,9 +26,9 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
     if "J_out" not in parameters and card.J_out is not None:
         parameters["J_out"] = from_prior("J_out", card.J_out.value, card.J_out.std, KNOWN)
         assumptions.append("Jo′ is the vehicle card's value")
-    assumptions += borrowed_friction(found)
-    friction, load = _absolute(found)
-    ids, covariance = _covariance(found)
+    assumptions += list_borrowed_friction(found)
+    friction, load = _scale_absolute(found)
+    ids, covariance = _build_covariance(found)
     loss_law: LossLaw = "dissipative" if found.loss_law == "dissipative" else "paper"
     return Twin(
         name=card.name,
@@ -40,16 +40,16 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
             gear.name: TwinGear(card.compute_ratio(gear.name), card.get_gear_element(gear.name))
             for gear in card.gears
         },
-        elements={name: _element(card, name) for name in card.elements},
+        elements={name: _build_element(card, name) for name in card.elements},
         J_prime_range=card.J_prime_range,
         J_vehicle_range=card.J_vehicle_range,
         parameters=parameters,
         friction=friction,
         validity=found.validity,
         inputs=found.inputs,
-        settings=plain(found.settings),
+        settings=to_plain_values(found.settings),
         assumptions=tuple(assumptions),
-        version=program_version(),
+        version=get_program_version(),
         covariance_ids=ids,
         covariance=covariance,
         channels=card.channels,
@@ -58,7 +58,7 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
     )
 
 
-def _element(card: VehicleCard, name: str) -> TwinElement:
+def _build_element(card: VehicleCard, name: str) -> TwinElement:
     """Design data of an element."""
     spec = card.elements[name]
     i_c, i_out = card.get_clutch_ratios(name)
@@ -66,7 +66,7 @@ def _element(card: VehicleCard, name: str) -> TwinElement:
     return TwinElement(spec.kind, i_c, i_out, spec.gain, P0, spec.peak, drum)
 
 
-def _absolute(found: Identification) -> tuple[dict[str, FrictionCurve], LoadLaw | None]:
+def _scale_absolute(found: Identification) -> tuple[dict[str, FrictionCurve], LoadLaw | None]:
     """Friction and load law; what is over η times η where that is known, as the parameters are."""
     eta, load = found.estimates.get("eta"), found.load
     if eta is None or eta.value is None:
@@ -78,7 +78,7 @@ def _absolute(found: Identification) -> tuple[dict[str, FrictionCurve], LoadLaw 
     return friction, load.scale_by_eta(*by) if load is not None and load.over_eta else load
 
 
-def borrowed_friction(found: Identification) -> list[str]:
+def list_borrowed_friction(found: Identification) -> list[str]:
     """Say which elements run on their partner's curve because they never slipped under load."""
     pairs = {
         (a, b)
@@ -89,7 +89,7 @@ def borrowed_friction(found: Identification) -> list[str]:
     return [f"friction of {a} is taken to be that of {b}" for a, b in sorted(pairs)]
 
 
-def _covariance(found: Identification) -> tuple[tuple[str, ...], FloatArray | None]:
+def _build_covariance(found: Identification) -> tuple[tuple[str, ...], FloatArray | None]:
     """Covariance from the correlation and the total standard deviations, where all are known."""
     if found.correlation is None:
         return (), None

@@ -66,14 +66,14 @@ class TwinElement:
     drum: float
 
     def to_spec(self, name: str) -> ElementSpec:
-        """The same as on a vehicle card, all of it taken as known."""
+        """Return the element as on a vehicle card, with all values known."""
         P0, drum = PriorValue(self.P0), PriorValue(self.drum)
         return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
 
 
 @dataclass(frozen=True, eq=False)
 class Twin(DisplayMixin):
-    """What is known of one driveline after an identification; immutable, SI.
+    """Identified model of one driveline; immutable, SI.
 
     `parameters` by id (see parameters.py), also those that could not be told; `friction` by
     element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
@@ -203,7 +203,7 @@ class Twin(DisplayMixin):
 
     @property
     def over_eta(self) -> bool:
-        """Whether torque-like quantities are known over η only: no output torque was measured."""
+        """True if torque-like quantities are known over η only (no measured output torque)."""
         return (
             self._is_known("J_vehicle") is None
             and self._is_known("J_vehicle" + OVER_ETA) is not None

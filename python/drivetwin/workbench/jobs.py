@@ -97,7 +97,7 @@ class Job:
             try:
                 message = self.pipe.recv()
             except (EOFError, OSError):
-                self._raise_if_dead()
+                self._record_death()
                 break
             match message:
                 case Progress(share, text):
@@ -133,7 +133,7 @@ class Job:
             self.process.terminate()
             self._end()
 
-    def _raise_if_dead(self) -> None:
+    def _record_death(self) -> None:
         self.process.join(_PATIENCE)
         self.fault = Fault(
             f"the process that did this stopped (exit code {self.process.exitcode})",

@@ -13,13 +13,13 @@ from pydantic import Field, ValidationError, field_validator
 
 from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin._util.toml import StrictModel, format_key_path
-from drivetwin._util.version import program_version
+from drivetwin._util.version import get_program_version
 from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
 from drivetwin.errors import RefusedError, Where
 from drivetwin.estimation.result.method import Method
-from drivetwin.files.twin_conversion import file_of, twin_from_file
+from drivetwin.files.twin_conversion import build_twin_file, restore_twin
 from drivetwin.files.twin_file import TwinFile
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.locks import Lock, LockKind
@@ -96,7 +96,7 @@ def save_workspace(work: SessionState, path: Path, folder: Folder) -> None:
         )  # fmt: skip
     log, card = (_make_file_entry(one, path.parent, folder) for one in (work.log, work.card))
     content = WorkspaceFile(
-        program=program_version(),
+        program=get_program_version(),
         log=log,
         card=card,
         channels={role: _make_channel_table(spec) for role, spec in work.channels.items()},
@@ -105,7 +105,7 @@ def save_workspace(work: SessionState, path: Path, folder: Folder) -> None:
             name: LockEntry(kind=one.kind, value=one.value, std=one.std)
             for name, one in work.locks.items()
         },
-        twins={method: file_of(one.twin) for method, one in work.results.items()},
+        twins={method: build_twin_file(one.twin) for method, one in work.results.items()},
         method=work.method,
         shift=work.shift,
         sliders=dict(work.changes),
@@ -148,7 +148,7 @@ def restore_workspace(content: WorkspaceFile, work: SessionState) -> SessionStat
     for name, lock in content.to_locks().items():
         work = work.set_lock(name, lock)
     results = {
-        method: Outcome(method, twin_from_file(twin)) for method, twin in content.twins.items()
+        method: Outcome(method, restore_twin(twin)) for method, twin in content.twins.items()
     }
     work = replace(work, results=results)
     if content.method in results and content.shift < len(work.shifts):

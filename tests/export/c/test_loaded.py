@@ -17,7 +17,8 @@ from drivetwin.errors import InputError
 from drivetwin.export.c.layout import Precision
 from drivetwin.export.c.loaded import STATUS, CModel, CObserver, CRun
 from drivetwin.export.entries import get_lock_index, list_entries, start_entries
-from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.fixed_step import run_fixed_step
+from drivetwin.export.input_kind import InputKind
 from drivetwin.export.subject import compute_steady_start
 from drivetwin.simulation.dual_clutch import (
     DualClutch,

@@ -21,12 +21,13 @@ from fmpy.validation import validate_fmu
 from drivetwin.errors import InputError
 from drivetwin.export.compiler import compile_library, detect_platform
 from drivetwin.export.entries import list_entries, start_entries
-from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.build import BuildOptions, build_fmu, make_identifier
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.fmu.variables import INPUTS as FIRST_INPUT
 from drivetwin.export.fmu.variables import LOCKED, MODES, OUTPUTS, PARAMETERS, START
 from drivetwin.export.fmu.version import FmiVersion
+from drivetwin.export.input_kind import InputKind
 from drivetwin.export.parameters.files import read_parameters
 from drivetwin.export.platforms import Platform
 from drivetwin.simulation.dual_clutch import FloatArray

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from drivetwin.export.compiler import detect_platform
-from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.build import build_fmu
+from drivetwin.export.input_kind import InputKind
 from tests.export.cases import CASES, STEP
 
 pytestmark = pytest.mark.skipif(

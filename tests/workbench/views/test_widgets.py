@@ -30,14 +30,14 @@ def test_faults_of_a_callback_become_a_message(
     def failing() -> None:
         raise fault
 
-    assert widgets.shows_message(failing)() is no_update
-    widgets.shows_message(failing, None)()
+    assert widgets.show_errors(failing)() is no_update
+    widgets.show_errors(failing, None)()
     assert len(messages) == 2
     assert all(says in text for text in messages)
 
 
 def test_what_works_is_handed_on() -> None:
-    assert widgets.shows_message(lambda: 3)() == 3
+    assert widgets.show_errors(lambda: 3)() == 3
 
 
 @pytest.mark.parametrize(

@@ -20,11 +20,11 @@ from drivetwin.errors import InputError
 from drivetwin.export.c.write import generate_twin_source, read_model_sources
 from drivetwin.export.compiler import compile_library, detect_platform
 from drivetwin.export.entries import list_entries
-from drivetwin.export.fixed_step import DEFAULT_STEP
 from drivetwin.export.fmu.describe import Header, build_description
 from drivetwin.export.fmu.experiment import Experiment, build_reference_files
 from drivetwin.export.fmu.variables import list_variables
 from drivetwin.export.fmu.version import FmiVersion
+from drivetwin.export.input_kind import DEFAULT_STEP
 from drivetwin.export.parameters.xml_text import format_document
 from drivetwin.export.platforms import Platform
 from drivetwin.export.subject import Subject

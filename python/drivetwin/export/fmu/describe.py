@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivetwin._util.version import program_version
+from drivetwin._util.version import get_program_version
 from drivetwin.export.fmu.units import build_unit_definitions, get_display_unit, to_fmi_unit
 from drivetwin.export.fmu.variables import ENUMERATIONS, Kind, Role, Variable
 from drivetwin.export.fmu.version import FmiVersion
@@ -47,7 +47,7 @@ def _build_root(version: FmiVersion, header: Header, token: str) -> ET.Element:
             "modelName": header.name,
             token: header.token,
             "description": header.note,
-            "generationTool": f"drivetwin {program_version()}",
+            "generationTool": f"drivetwin {get_program_version()}",
             "variableNamingConvention": "structured",
         },
     )

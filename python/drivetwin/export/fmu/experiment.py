@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.variables import Role, Variable, list_variables
 from drivetwin.export.fmu.version import FmiVersion
+from drivetwin.export.input_kind import InputKind
 from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.ssv import format_ssv
 from drivetwin.export.parameters.xml_text import format_document

@@ -7,8 +7,9 @@ from pathlib import PurePath
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
-from drivetwin.export.fixed_step import DEFAULT_STEP, Stepping, get_start_state, sample_inputs
+from drivetwin.export.fixed_step import Stepping, get_start_state, sample_inputs
 from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.input_kind import DEFAULT_STEP
 from drivetwin.export.subject import Subject
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin

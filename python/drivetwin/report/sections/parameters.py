@@ -102,7 +102,7 @@ def _write_answer(found: Identification) -> str:
     against = []
     if not found.fit:
         against.append("the model could not be simulated over the log")
-    elif any(_describe_missing(fits) for fits in found.fit.values()):
+    elif any(_find_missed_phase(fits) for fits in found.fit.values()):
         against.append("the simulation leaves too much of an output")
     if passed < tests:
         against.append("the residuals show an effect that the model lacks")
@@ -134,7 +134,7 @@ def _build_tiles(found: Identification) -> list[Tile]:
     for name, (label, display) in SIGNALS.items():
         fits = found.fit.get(name, {})
         if "all" in fits:
-            fit, missed = fits["all"], _describe_missing(fits)
+            fit, missed = fits["all"], _find_missed_phase(fits)
             note = f"rmse {format_significant(fit.rmse * display.factor, 3)} {display.label}"
             if missed not in ("", "all"):
                 note += f"; {PHASES[missed]}: {_format_percent(fits[missed])}"
@@ -242,7 +242,7 @@ def _format_percent(fit: SignalFit) -> str:
     return f"{fit.fit_percent:.1f} %" if math.isfinite(fit.fit_percent) else "–"
 
 
-def _describe_missing(fits: Mapping[str, SignalFit]) -> str:
+def _find_missed_phase(fits: Mapping[str, SignalFit]) -> str:
     """Phase of a signal that the simulation misses: "all", else the worst; empty for none.
 
     A phase in which the signal hardly moves has a low fit although only noise is left, of which it

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivetwin._util.display_units import BAR, NM, RAD_PER_S, RPM, Display, format_significant
-from drivetwin._util.plain_values import plain
-from drivetwin._util.version import program_version
+from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.report.sections.blocks import (
     Block,
@@ -17,7 +17,7 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     make_cells,
 )
-from drivetwin.twin.build import borrowed_friction
+from drivetwin.twin.build import list_borrowed_friction
 
 _RANGES: dict[str, tuple[str, Display]] = {
     "slip": ("slip", RAD_PER_S),
@@ -30,7 +30,7 @@ _RANGES: dict[str, tuple[str, Display]] = {
 def build_provenance_section(found: Identification) -> Section:
     """Assumptions, range of validity, settings, versions, hashes."""
     blocks: list[Block] = []
-    assumed = (*found.assumptions, *borrowed_friction(found))
+    assumed = (*found.assumptions, *list_borrowed_friction(found))
     if assumed:
         blocks.append(NotesBlock("Assumed", assumed))
     blocks.append(_build_validity_table(found))
@@ -42,12 +42,12 @@ def build_provenance_section(found: Identification) -> Section:
         )
     )
     settings = {"method": found.method.value, "loss law": found.loss_law, **found.settings}
-    rows = [make_cells(name, value) for name, value in _flatten("", plain(settings))]
+    rows = [make_cells(name, value) for name, value in _flatten("", to_plain_values(settings))]
     blocks.append(TableBlock("Settings, SI.", make_cells("setting", "value"), rows))
     return Section(
         "provenance",
         "Assumptions, settings, origin",
-        f"Made with drivetwin {program_version()}.",
+        f"Made with drivetwin {get_program_version()}.",
         blocks,
     )
 

@@ -85,8 +85,7 @@ def _build_log_table(found: Identification, several: Several) -> TableBlock:
     own = {name: split_log_number(name) for name in found.estimates}
     plain = list(dict.fromkeys(name for name, number in own.values() if number))
     units = {
-        name: get_display_unit(found.estimates[f"{_format_numbers(name, own)}"].unit)
-        for name in plain
+        name: get_display_unit(found.estimates[f"{_find_log_id(name, own)}"].unit) for name in plain
     }
     head = (
         *make_cells("log", "file", "shifts"),
@@ -110,7 +109,7 @@ def _build_log_table(found: Identification, several: Several) -> TableBlock:
     return TableBlock("The logs, what each has of its own, and the fit of the model.", head, rows)
 
 
-def _format_numbers(plain: str, own: dict[str, tuple[str, int]]) -> str:
+def _find_log_id(plain: str, own: dict[str, tuple[str, int]]) -> str:
     """Return the first log-specific id of the parameter `plain`."""
     return next(key for key, (name, number) in own.items() if name == plain and number)
 

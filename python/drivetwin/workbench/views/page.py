@@ -29,7 +29,7 @@ from drivetwin.workbench.views.widgets import (
     make_due_id,
     make_topic_id,
     notify_topic,
-    shows_message,
+    show_errors,
 )
 
 
@@ -97,7 +97,7 @@ def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
     app.index_string = _INDEX
     app.layout = _build_layout
     _register_view_switch(app)
-    _register_visible_resize(app)
+    _register_drawing(app)
     _register_entry(app, sessions, start)
     _show_status(app, sessions)
     for _, view in VIEWS.values():
@@ -155,7 +155,7 @@ def _register_view_switch(app: Dash) -> None:
     )
 
 
-def _register_visible_resize(app: Dash) -> None:
+def _register_drawing(app: Dash) -> None:
     """A view is drawn when it is looked at: all of them at once would keep the browser busy."""
     for name, topics in _TOPICS.items():
         app.clientside_callback(  # type: ignore[no-untyped-call]
@@ -171,7 +171,7 @@ def _register_entry(app: Dash, sessions: Sessions, start: Start) -> None:
     @app.callback(
         Output("session", "data"), Input("session", "modified_timestamp"), State("session", "data")
     )
-    @shows_message
+    @show_errors
     def enter(_: int, key: str | None) -> object:
         """Go on with the session of this tab, or begin one with what the command line named."""
         if key in sessions:
@@ -184,7 +184,7 @@ def _register_entry(app: Dash, sessions: Sessions, start: Start) -> None:
         return fresh
 
 
-@shows_message
+@show_errors
 def _open_first(session: Session, start: Start) -> None:
     if start.log is not None and start.card is not None:
         session.open(start.log, start.card, start.mapping)

@@ -89,7 +89,7 @@ def notify_opened_log(how: str, fault: str, shifts: int) -> None:
         notify(f"{how}, but holds no usable shift: the view Log says why", fault=True)
 
 
-def shows_message(callback: Callable[P, R], unchanged: object = no_update) -> Callable[P, R]:
+def show_errors(callback: Callable[P, R], unchanged: object = no_update) -> Callable[P, R]:
     """Return the callback with its errors as the message of the page, and `unchanged` then."""
 
     @functools.wraps(callback)
@@ -130,7 +130,7 @@ class Page:
                 State("session", "data"),
                 running=running,
                 prevent_initial_call=not initially,
-            )(shows_message(act, None if silent else no_update))
+            )(show_errors(act, None if silent else no_update))
             return callback
 
         return register
