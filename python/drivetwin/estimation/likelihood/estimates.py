@@ -9,40 +9,51 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
-from drivetwin.estimation.likelihood.diagnostics.identifiability import at_limits, null_directions
-from drivetwin.estimation.likelihood.diagnostics.misspecification import left_out
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.likelihood.diagnostics.identifiability import (
+    describe_null_directions,
+    find_at_bounds,
+)
+from drivetwin.estimation.likelihood.diagnostics.misspecification import run_score_tests
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
-    against,
-    residual_tests,
-    unweighted,
+    describe_contradiction,
+    describe_unweighted,
+    run_residual_tests,
 )
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.priors import over_eta
-from drivetwin.estimation.likelihood.selection.loss_law import other_law_in_words
-from drivetwin.estimation.likelihood.selection.per_shift_load import loads_of
+from drivetwin.estimation.likelihood.priors import divide_by_eta
+from drivetwin.estimation.likelihood.selection.loss_law import describe_other_law
+from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
-    absolute_ids,
-    of_log,
-    parameters,
-    slopes,
+    compute_jacobian,
+    compute_parameters,
+    list_absolute_ids,
+    make_log_id,
 )
-from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, curves_of
-from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import sensor_shifts
-from drivetwin.estimation.linear.load_balance import AERO, different_loads
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, build_friction_curves
+from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensor_shifts
+from drivetwin.estimation.linear.load_balance import AERO, describe_different_loads
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
-from drivetwin.estimation.result.estimate_set import Conclusions, labels_of, low_gear_notes
-from drivetwin.estimation.result.prior_conflict import contradictions, design_of, held_against
+from drivetwin.estimation.result.estimate_set import (
+    EstimateSet,
+    collect_low_gear_notes,
+    collect_shift_labels,
+)
+from drivetwin.estimation.result.prior_conflict import (
+    apply_contradictions,
+    find_contradictions,
+    get_design_value,
+)
 from drivetwin.estimation.result.verdict import (
     KNOWN,
-    correlation,
-    designed,
-    doubted,
-    judge,
-    judge_with_design,
-    refused,
+    assess,
+    assess_with_prior,
+    compute_correlation,
+    from_prior,
+    refuse_parameter,
+    reject_identified,
 )
-from drivetwin.parameters import OVER_ETA, spec_of
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
 NO_SCALE = (
@@ -57,26 +68,30 @@ WITH_PRIOR = "likelihood with design prior"
 """Method of a parameter whose own design value took part in its estimate."""
 
 
-def conclude(
+def build_estimates(
     fit: LikelihoodFit,
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     linear: Mapping[str, FrictionCurve],
     tolerances: Mapping[str, SensorTolerance],
-) -> Conclusions:
+) -> EstimateSet:
     """Judge every parameter. `linear` are the friction curves of the linear method, by element."""
-    shifts = sensor_shifts(fit, tolerances)
+    shifts = compute_sensor_shifts(fit, tolerances)
     systematic = sum(
         (np.outer(shift, shift) for shift in shifts.values()), np.zeros_like(fit.covariance)
     )
-    values = parameters(fit.problem, fit.mean, signals)
-    matrix = slopes(fit.problem, fit.mean, np.sqrt(np.diag(fit.covariance)), signals)
+    values = compute_parameters(fit.problem, fit.mean, signals)
+    matrix = compute_jacobian(fit.problem, fit.mean, np.sqrt(np.diag(fit.covariance)), signals)
     covariance = matrix @ fit.covariance @ matrix.T
-    spread = dict(zip(values, _systematic(matrix, systematic), strict=True)) if shifts else {}
-    notes = low_gear_notes(signals)
-    designs = {n: known for n in values if (known := _design(n, drivelines)) is not None}
+    spread = (
+        dict(zip(values, _compute_systematic_std(matrix, systematic), strict=True))
+        if shifts
+        else {}
+    )
+    notes = collect_low_gear_notes(signals)
+    designs = {n: known for n in values if (known := _find_prior(n, drivelines)) is not None}
     estimates = {
-        name: _estimate(
+        name: _assess(
             (name, value, float(np.sqrt(max(variance, 0.0)))),
             designs.get(name),
             spread.get(name),
@@ -85,45 +100,48 @@ def conclude(
         for name, value, variance in zip(values, values.values(), np.diag(covariance), strict=True)
     }
     ids, every = tuple(values), np.array([*values.values()])
-    contradicted = contradictions(ids, every, covariance, designs, spread)
-    estimates = held_against(estimates, contradicted, WITH_PRIOR)
+    contradicted = find_contradictions(ids, every, covariance, designs, spread)
+    estimates = apply_contradictions(estimates, contradicted, WITH_PRIOR)
     limits = {
         name: text
-        for name, text in at_limits(fit, ids, matrix).items()
+        for name, text in find_at_bounds(fit, ids, matrix).items()
         if estimates[name].verdict is not Verdict.DESIGN
     }
-    estimates |= {name: doubted(estimates[name], text) for name, text in limits.items()}
-    curves = curves_of(fit, linear, systematic)
-    effects = tuple(left_out(fit))
+    estimates |= {name: reject_identified(estimates[name], text) for name, text in limits.items()}
+    curves = build_friction_curves(fit, linear, systematic)
+    effects = tuple(run_score_tests(fit))
     for effect in effects:
         estimates = effect.held_against(estimates, ids, matrix)
         curves = {name: effect.widened(fit, name, curve) for name, curve in curves.items()}
-    for why in (against(fit), unweighted(fit, labels_of(signals))):
+    for why in (
+        describe_contradiction(fit),
+        describe_unweighted(fit, collect_shift_labels(signals)),
+    ):
         if why:
-            estimates = {name: doubted(one, why) for name, one in estimates.items()}
-    estimates |= _of_what_is_fixed(fit, signals, drivelines, estimates)
-    return Conclusions(
+            estimates = {name: reject_identified(one, why) for name, one in estimates.items()}
+    estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
+    return EstimateSet(
         estimates,
         curves,
         ids,
-        correlation(covariance),
+        compute_correlation(covariance),
         (
             *dict.fromkeys(notes.values()),
             *(one.text for one in contradicted),
             *(f"{name}: {text}" for name, text in limits.items()),
-            *_warnings(fit, signals),
+            *_collect_warnings(fit, signals),
             *(one.text for one in effects),
-            *other_law_in_words(fit, values, matrix, np.sqrt(np.diag(covariance))),
+            *describe_other_law(fit, values, matrix, np.sqrt(np.diag(covariance))),
         ),
-        _load_law(fit, systematic),
-        loads_of(fit),
+        _build_load_law(fit, systematic),
+        collect_loads(fit),
     )
 
 
-def _of_what_is_fixed(
+def _estimate_fixed(
     fit: LikelihoodFit,
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     estimates: Mapping[str, Estimate],
 ) -> dict[str, Estimate]:
     """Build the estimates of quantities that the fit holds fixed: absolute values of torque-like
@@ -131,17 +149,17 @@ def _of_what_is_fixed(
     found: dict[str, Estimate] = {}
     if not signals[0].scale_known:
         eta = drivelines[0].known.get("eta")
-        for name in absolute_ids(signals):
+        for name in list_absolute_ids(signals):
             ratio = estimates.get(name + OVER_ETA)
-            found[name] = _without_scale(name, eta, ratio, _design(name, drivelines))
+            found[name] = _estimate_without_scale(name, eta, ratio, _find_prior(name, drivelines))
     for one in (part.structure for part in fit.problem.parts):
-        if one.unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
-            name = of_log(AGE, one.log)
-            found[name] = refused(name, METHOD, NO_AGE)
+        if one.get_unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
+            name = make_log_id(AGE, one.log)
+            found[name] = refuse_parameter(name, METHOD, NO_AGE)
     return found
 
 
-def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
+def _build_load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
     """Build the load law with its growth with speed; None if the fit has a constant load."""
     if AERO not in fit.point.names:
         return None
@@ -151,17 +169,17 @@ def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
     return LoadLaw(fit.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
 
 
-def _estimate(
+def _assess(
     told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
 ) -> Estimate:
     """Assess (id, value, standard deviation from noise)."""
     if design is not None:
-        return judge_with_design(told, design, WITH_PRIOR, systematic, note)
+        return assess_with_prior(told, design, WITH_PRIOR, systematic, note)
     name, value, std = told
-    return judge(name, value, std, METHOD, systematic, note)
+    return assess(name, value, std, METHOD, systematic, note)
 
 
-def _without_scale(
+def _estimate_without_scale(
     name: str, eta: PriorValue | None, ratio: Estimate | None, design: PriorValue | None
 ) -> Estimate:
     """Estimate a torque-like parameter of a log without an output torque.
@@ -172,7 +190,7 @@ def _without_scale(
     if eta is None:
         return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
     if ratio is None:
-        return designed(name, eta.value, eta.std, KNOWN)
+        return from_prior(name, eta.value, eta.std, KNOWN)
     if ratio.value is None or ratio.std_noise is None:
         return replace(ratio, id=name)
     spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
@@ -180,34 +198,34 @@ def _without_scale(
     if ratio.verdict is Verdict.DESIGN:
         return replace(ratio, id=name, value=value, std_noise=noise, std_systematic=spread)
     if design is not None:
-        one = judge_with_design((name, value, noise), design, WITH_ETA, spread, ratio.reason)
+        one = assess_with_prior((name, value, noise), design, WITH_ETA, spread, ratio.reason)
     else:
-        one = judge(name, value, noise, WITH_ETA, spread, ratio.reason)
-    return one if ratio.verdict is Verdict.IDENTIFIED else doubted(one, "")
+        one = assess(name, value, noise, WITH_ETA, spread, ratio.reason)
+    return one if ratio.verdict is Verdict.IDENTIFIED else reject_identified(one, "")
 
 
-def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
+def _find_prior(name: str, drivelines: Sequence[KnownDriveline]) -> PriorValue | None:
     """Return the prior of a reported parameter; None if it has none."""
-    spec = spec_of(name)
+    spec = get_parameter_spec(name)
     ending = OVER_ETA if name.endswith(OVER_ETA) else ""
     known = drivelines[0].known.get(spec.stem + ending if spec.suffix == "log" else name)
     if known is not None:
         return known
-    design = design_of(name.removesuffix(OVER_ETA), drivelines[0])
-    return over_eta(design, drivelines[0]) if design is not None and ending else design
+    design = get_design_value(name.removesuffix(OVER_ETA), drivelines[0])
+    return divide_by_eta(design, drivelines[0]) if design is not None and ending else design
 
 
-def _systematic(matrix: FloatArray, systematic: FloatArray) -> list[float]:
+def _compute_systematic_std(matrix: FloatArray, systematic: FloatArray) -> list[float]:
     variance = np.einsum("qp,pr,qr->q", matrix, systematic, matrix)
     return [float(np.sqrt(max(v, 0.0))) for v in variance]
 
 
-def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
+def _collect_warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
     texts = []
-    labels = labels_of(signals)
-    for s, label, tests in zip(signals, labels, residual_tests(fit).values(), strict=True):
+    labels = collect_shift_labels(signals)
+    for s, label, tests in zip(signals, labels, run_residual_tests(fit).values(), strict=True):
         texts += list(s.shift.warnings)
         texts += [f"{label}: {text}" for test in tests for text in test.warnings]
-    if why := unweighted(fit, labels):
+    if why := describe_unweighted(fit, labels):
         texts.append(why)
-    return (*texts, *null_directions(fit), *different_loads(loads_of(fit)))
+    return (*texts, *describe_null_directions(fit), *describe_different_loads(collect_loads(fit)))
