@@ -80,7 +80,8 @@ def select_shifts(
 def _describe_rejection(left: float, steady: bool) -> str:
     if steady:
         return (
-            f"not needed: {MAX_SHIFTS} shifts of the log are fitted, of every change of gears those "
+            f"not needed: {MAX_SHIFTS} shifts of the log are fitted, of every change of "
+            f"gears those "
             "first whose load is the most constant; hold it out to see it predicted"
         )
     if not np.isfinite(left):

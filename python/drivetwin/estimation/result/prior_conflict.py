@@ -147,7 +147,8 @@ def check_efficiency_limit(
     if low <= 1.0:
         return dict(estimates), ()
     text = (
-        f"η = {format_with_unit(one.value, one.unit)}: more power would leave the gears than enters; the "
+        f"η = {format_with_unit(one.value, one.unit)}: more power would leave the gears than "
+        f"enters; the "
         "engine torque, or the map of an open converter, gives too little, or the output torque "
         "reads too much"
     )

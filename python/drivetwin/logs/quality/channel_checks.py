@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
@@ -16,7 +17,6 @@ from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, 
 from drivetwin.logs.quality.outliers import (
     BEYOND,
     Damage,
-    estimate_resolution,
     find_clipping,
     find_dropouts,
     find_glitches,
@@ -26,7 +26,6 @@ from drivetwin.logs.quality.outliers import (
     find_spikes,
     find_stale,
     find_stuck,
-    find_true_runs,
 )
 from drivetwin.logs.quality.update_raster import find_raster
 
@@ -181,7 +180,8 @@ def _describe_limit(channel: Channel) -> list[str]:
         return []
     return [
         f"channel {channel.source_name!r}: at its largest number for {100 * share:.0f} % of the "
-        f"log, {_format_value(limit, channel.quantity)}; if it is saturated there, or none was received, "
+        f"log, {_format_value(limit, channel.quantity)}; if it is saturated there, or none "
+        f"was received, "
         "results that rest on it are wrong"
     ]
 
@@ -208,7 +208,8 @@ def _describe_rounding(channel: Channel) -> list[str]:
     if channel.quantity in AUXILIARY or step <= COARSE * largest or _is_binary(channel.values):
         return []
     return [
-        f"channel {channel.source_name!r}: recorded in steps of {_format_value(step, channel.quantity)}, "
+        f"channel {channel.source_name!r}: recorded in steps of "
+        f"{_format_value(step, channel.quantity)}, "
         f"{100 * step / largest:.0f} % of its largest number; what rests on it may be as coarse"
     ]
 
@@ -422,7 +423,8 @@ def _check_wraps(channel: Channel, where: Where) -> None:
         if min(-np.sign(jump) * came, -np.sign(jump) * went) > least:
             raise DamagedChannelError(
                 f"goes on at {_format_value(float(values[index + 1]), channel.quantity)} after "
-                f"{_format_value(float(values[index]), channel.quantity)}, as a number that overflows does",
+                f"{_format_value(float(values[index]), channel.quantity)}, as a number that "
+                f"overflows does",
                 "export the channel with more bits or another scale, or cut the log there",
                 Where(where.file, where.channel, float(channel.time[index])),
             )
