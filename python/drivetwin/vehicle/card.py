@@ -68,4 +68,4 @@ def load_card(path: Path | str) -> VehicleCard:
 def _convert_tolerances(sensors: SensorsTable) -> dict[str, SensorTolerance]:
     stated = {role: table for role, table in sensors if role != "pressure" and table is not None}
     stated |= {make_pressure_role(element): table for element, table in sensors.pressure.items()}
-    return {role: table.tolerance() for role, table in stated.items()}
+    return {role: table.to_tolerance() for role, table in stated.items()}

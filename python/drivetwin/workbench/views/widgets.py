@@ -103,7 +103,7 @@ def show_errors(callback: Callable[P, R], unchanged: object = no_update) -> Call
     return guarded
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Page:
     """The application, and the sessions on which its callbacks act."""
 

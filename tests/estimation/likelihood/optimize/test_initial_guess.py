@@ -26,7 +26,7 @@ def _friction(mu_c: float, largest: float) -> Any:
 
 
 def _shift(friction: Any = None, load: Any = None, values: Any = VALUES) -> Any:
-    momentum = SimpleNamespace(value=lambda name: {"J_e": 4.0, "te_delay": 0.02}[name])
+    momentum = SimpleNamespace(get_value=lambda name: {"J_e": 4.0, "te_delay": 0.02}[name])
     load = load or SimpleNamespace(load=500.0, holds_at=None)
     return SimpleNamespace(ids=IDS, values=values, momentum=momentum, load=load, friction=friction)
 

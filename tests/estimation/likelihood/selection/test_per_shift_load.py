@@ -82,7 +82,7 @@ def _three(known: dict[str, PriorValue] | None = None) -> Any:
 def test_departures_add_up_to_zero_about_the_load_of_the_log() -> None:
     problem, point = _three()
     structures = [part.structure for part in problem.parts]
-    assert [one.load(point) for one in structures] == pytest.approx(LOADS)
+    assert [one.compute_load(point) for one in structures] == pytest.approx(LOADS)
     assert point["Tv_over_if"] == pytest.approx(np.mean(LOADS))
     for one in structures:
         names, matrix = one.slopes(point)
