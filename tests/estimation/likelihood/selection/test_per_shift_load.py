@@ -85,7 +85,7 @@ def test_departures_add_up_to_zero_about_the_load_of_the_log() -> None:
     assert [one.compute_load(point) for one in structures] == pytest.approx(LOADS)
     assert point["Tv_over_if"] == pytest.approx(np.mean(LOADS))
     for one in structures:
-        names, matrix = one.slopes(point)
+        names, matrix = one.compute_jacobian(point)
         row = matrix[names.index("load.constant")]
         for k in (point.names.index(name) for name in ("start1.load", "start2.load")):
             values = point.values.copy()
