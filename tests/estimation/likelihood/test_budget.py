@@ -64,7 +64,7 @@ def test_what_a_wider_model_found_stands_where_there_is_no_work_left(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        select_model,
+        selection_module,
         "SELECTION",
         replace(selection_module.SELECTION, max_restricted_work=2.0 * EXPANSION),
     )

@@ -90,7 +90,10 @@ def test_departures_add_up_to_zero_about_the_load_of_the_log() -> None:
         for k in (point.names.index(name) for name in ("start1.load", "start2.load")):
             values = point.values.copy()
             values[k] += 1.0
-            change = one.build_model(point.moved(values)).load.constant - one.build_model(point).load.constant
+            change = (
+                one.build_model(point.moved(values)).load.constant
+                - one.build_model(point).load.constant
+            )
             assert row[k] == pytest.approx(change, abs=1e-6)
 
 
