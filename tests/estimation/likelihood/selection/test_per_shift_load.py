@@ -91,7 +91,7 @@ def test_departures_add_up_to_zero_about_the_load_of_the_log() -> None:
             values = point.values.copy()
             values[k] += 1.0
             change = (
-                one.build_model(point.moved(values)).load.constant
+                one.build_model(point.replace_values(values)).load.constant
                 - one.build_model(point).load.constant
             )
             assert row[k] == pytest.approx(change, abs=1e-6)
