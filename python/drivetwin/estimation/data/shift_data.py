@@ -11,10 +11,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.channels.shiftlog import pauses
+from drivetwin.parameters import OVER_ETA, spec_of
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
+PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
+"""Efficiency of a gearbox if no output torque shows it."""
 NO_DRUM = PriorValue(0.0)
 """Inertia of the drum of an element that has none."""
 
@@ -114,6 +117,28 @@ class Driveline:
     def i_after(self) -> float:
         """Overall ratio of the gear that is entered."""
         return self.oncoming.ratio
+
+    def find_prior(self, name: str) -> PriorValue | None:
+        """Return the prior of a reported parameter by id; None if the card has none."""
+        spec = spec_of(name)
+        ending = OVER_ETA if name.endswith(OVER_ETA) else ""
+        known = self.known.get(spec.stem + ending if spec.suffix == "log" else name)
+        if known is not None:
+            return known
+        stem, _, element = name.removesuffix(OVER_ETA).partition(".")
+        coupling = self.couplings.get(element)
+        if stem == "J_out":
+            known = self.J_out
+        elif coupling is not None:
+            known = {"P0": coupling.P0, "drum": coupling.drum}.get(stem)
+        return self.divide_by_eta(known) if known is not None and ending else known
+
+    def divide_by_eta(self, quantity: PriorValue) -> PriorValue:
+        """Divide a torque-like design value by the efficiency, known from design or typical."""
+        eta = self.known.get("eta", PLAUSIBLE_ETA)
+        value = quantity.value / eta.value
+        spread = value * eta.std / eta.value
+        return PriorValue(value, float(np.hypot(quantity.std / eta.value, spread)))
 
     @property
     def drums(self) -> tuple[Coupling, ...]:

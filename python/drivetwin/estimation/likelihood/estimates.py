@@ -18,7 +18,6 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     unweighted,
 )
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.priors import over_eta
 from drivetwin.estimation.likelihood.selection.loss_law import other_law_in_words
 from drivetwin.estimation.likelihood.selection.per_shift_load import loads_of
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
@@ -30,9 +29,9 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, curves_of
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import sensor_shifts
 from drivetwin.estimation.linear.load_balance import AERO, different_loads
+from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import Conclusions, labels_of, low_gear_notes
-from drivetwin.estimation.result.prior_conflict import contradictions, design_of, held_against
 from drivetwin.estimation.result.verdict import (
     KNOWN,
     correlation,
@@ -42,7 +41,7 @@ from drivetwin.estimation.result.verdict import (
     judge_with_design,
     refused,
 )
-from drivetwin.parameters import OVER_ETA, spec_of
+from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
 NO_SCALE = (
@@ -73,20 +72,18 @@ def conclude(
     matrix = slopes(fit.problem, fit.mean, np.sqrt(np.diag(fit.covariance)), signals)
     covariance = matrix @ fit.covariance @ matrix.T
     spread = dict(zip(values, _systematic(matrix, systematic), strict=True)) if shifts else {}
-    notes = low_gear_notes(signals)
-    designs = {n: known for n in values if (known := _design(n, drivelines)) is not None}
-    estimates = {
-        name: _estimate(
-            (name, value, float(np.sqrt(max(variance, 0.0)))),
-            designs.get(name),
-            spread.get(name),
-            notes.get(name, ""),
-        )
-        for name, value, variance in zip(values, values.values(), np.diag(covariance), strict=True)
-    }
-    ids, every = tuple(values), np.array([*values.values()])
-    contradicted = contradictions(ids, every, covariance, designs, spread)
-    estimates = held_against(estimates, contradicted, WITH_PRIOR)
+    fitted = FittedParameters(
+        ids=tuple(values),
+        values=np.array([*values.values()]),
+        covariance=covariance,
+        std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
+        driveline=drivelines[0],
+        systematic=spread,
+        notes=low_gear_notes(signals),
+        method=METHOD,
+        prior_method=WITH_PRIOR,
+    )
+    ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
     limits = {
         name: text
         for name, text in at_limits(fit, ids, matrix).items()
@@ -108,8 +105,8 @@ def conclude(
         ids,
         correlation(covariance),
         (
-            *dict.fromkeys(notes.values()),
-            *(one.text for one in contradicted),
+            *dict.fromkeys(fitted.notes.values()),
+            *(one.text for one in fitted.conflicts),
             *(f"{name}: {text}" for name, text in limits.items()),
             *_warnings(fit, signals),
             *(one.text for one in effects),
@@ -133,7 +130,7 @@ def _of_what_is_fixed(
         eta = drivelines[0].known.get("eta")
         for name in absolute_ids(signals):
             ratio = estimates.get(name + OVER_ETA)
-            found[name] = _without_scale(name, eta, ratio, _design(name, drivelines))
+            found[name] = _without_scale(name, eta, ratio, drivelines[0].find_prior(name))
     for one in (part.structure for part in fit.problem.parts):
         if one.unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
             name = of_log(AGE, one.log)
@@ -151,16 +148,6 @@ def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
     return LoadLaw(fit.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
 
 
-def _estimate(
-    told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
-) -> Estimate:
-    """Assess (id, value, standard deviation from noise)."""
-    if design is not None:
-        return judge_with_design(told, design, WITH_PRIOR, systematic, note)
-    name, value, std = told
-    return judge(name, value, std, METHOD, systematic, note)
-
-
 def _without_scale(
     name: str, eta: PriorValue | None, ratio: Estimate | None, design: PriorValue | None
 ) -> Estimate:
@@ -172,7 +159,7 @@ def _without_scale(
     if eta is None:
         return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
     if ratio is None:
-        return designed(name, eta.value, eta.std, KNOWN)
+        return designed(name, eta, KNOWN)
     if ratio.value is None or ratio.std_noise is None:
         return replace(ratio, id=name)
     spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
@@ -184,17 +171,6 @@ def _without_scale(
     else:
         one = judge(name, value, noise, WITH_ETA, spread, ratio.reason)
     return one if ratio.verdict is Verdict.IDENTIFIED else doubted(one, "")
-
-
-def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
-    """Return the prior of a reported parameter; None if it has none."""
-    spec = spec_of(name)
-    ending = OVER_ETA if name.endswith(OVER_ETA) else ""
-    known = drivelines[0].known.get(spec.stem + ending if spec.suffix == "log" else name)
-    if known is not None:
-        return known
-    design = design_of(name.removesuffix(OVER_ETA), drivelines[0])
-    return over_eta(design, drivelines[0]) if design is not None and ending else design
 
 
 def _systematic(matrix: FloatArray, systematic: FloatArray) -> list[float]:

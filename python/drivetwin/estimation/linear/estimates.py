@@ -13,6 +13,10 @@ from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
 from drivetwin.estimation.linear.combine_shifts import combine, loads_of
 from drivetwin.estimation.linear.load_balance import AERO, LoadFit, different_loads
 from drivetwin.estimation.linear.pipeline import IntegralShift
+from drivetwin.estimation.result.assessment import (
+    FittedParameters,
+    fill_from_card,
+)
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.estimate_set import (
     Conclusions,
@@ -20,7 +24,6 @@ from drivetwin.estimation.result.estimate_set import (
     labels_of,
     low_gear_notes,
 )
-from drivetwin.estimation.result.prior_conflict import contradictions, design_of, held_against
 from drivetwin.estimation.result.prior_update import with_known
 from drivetwin.estimation.result.verdict import (
     KNOWN,
@@ -28,12 +31,9 @@ from drivetwin.estimation.result.verdict import (
     correlation,
     designed,
     doubted,
-    judge,
-    judge_with_design,
     refused,
 )
 from drivetwin.parameters import spec_of
-from drivetwin.vehicle.spec import PriorValue
 
 METHOD = "integral"
 CHI2_WARN = 1.6
@@ -74,19 +74,22 @@ def conclude(
         values[kept],
         covariance[np.ix_(kept, kept)],
     )
-    std = np.sqrt(np.diag(covariance))
-    notes = low_gear_notes(signals)
-    designs = {name: one for name in ids if (one := _design(name, drivelines)) is not None}
-    estimates = {
-        told[0]: _estimate(
-            told, designs.get(told[0]), systematic.get(told[0]), notes.get(told[0], "")
-        )
-        for told in zip(ids, values.tolist(), std.tolist(), strict=True)
-    }
-    against = contradictions(ids, values, covariance, designs, systematic)
+    fit = FittedParameters(
+        ids=ids,
+        values=values,
+        covariance=covariance,
+        std=np.sqrt(np.diag(covariance)),
+        driveline=drivelines[0],
+        systematic=systematic,
+        notes=low_gear_notes(signals),
+        method=METHOD,
+        prior_method=METHOD,
+    )
+    estimates = fit.assess()
+    estimates |= _replace_impossible(fit)
+    estimates |= _better_by_design(estimates, fit)
+    estimates = fit.downgrade_conflicts(estimates)
     loads = loads_of(shifts)
-    estimates |= _better_by_design(estimates, designs, {one.id for one in against})
-    estimates = held_against(estimates, against, METHOD)
     for name, why in _misfits(shifts, signals, ids).items():
         estimates[name] = doubted(estimates[name], why)
     estimates |= _card_values(estimates, drivelines)
@@ -98,8 +101,8 @@ def conclude(
         correlation(covariance),
         (
             *doubts,
-            *(one.text for one in against),
-            *_warnings(shifts, signals, notes),
+            *(one.text for one in fit.conflicts),
+            *_warnings(shifts, signals, fit.notes),
             *(() if law is None else (growth_told(law.aero, law.std, law.mean_speed),)),
             *different_loads(loads),
         ),
@@ -124,70 +127,51 @@ def _load_law(
     return LoadLaw(float(values[k]), std, mean_speed)
 
 
-def _estimate(
-    told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
-) -> Estimate:
-    """Verdict on (id, value, standard deviation from noise)."""
-    name, value, std = told
-    if (instead := _impossible(name, value, design)) is not None:
-        return instead
-    if design is not None:
-        return judge_with_design(told, design, METHOD, systematic, note)
-    return judge(name, value, std, METHOD, systematic, note)
-
-
 def _better_by_design(
-    estimates: Mapping[str, Estimate],
-    designs: Mapping[str, PriorValue],
-    contradicted: Collection[str],
+    estimates: Mapping[str, Estimate], fit: FittedParameters
 ) -> dict[str, Estimate]:
-    """The card's own values where the log, as wrong as its sensors may be, knows them less well.
+    """Return the card's own values where they are more certain than the log with its sensors.
 
-    The fit weighs log and card by noise alone. What the log contradicts is not the card's.
+    The fit weighs log and card by noise alone. Values that the log contradicts are left out.
     """
+    contradicted = {one.id for one in fit.conflicts}
     return {
-        name: designed(name, prior.value, prior.std, SENSORS_TELL_LESS)
-        for name, prior in designs.items()
+        name: designed(name, prior, SENSORS_TELL_LESS)
+        for name, prior in fit.priors.items()
         if name not in contradicted and (estimates[name].std_total or 0.0) > prior.std > 0.0
     }
 
 
-def _impossible(name: str, value: float, prior: PriorValue | None) -> Estimate | None:
-    """Replace a value that physics excludes by the card's value or by none; None for other values.
+def _replace_impossible(fit: FittedParameters) -> dict[str, Estimate]:
+    """Replace values that physics excludes by the card's value or by none.
 
-    Unbounded least squares may return such a value where the model does not hold.
+    Unbounded least squares may return such values where the model does not hold.
     """
-    spec = spec_of(name)
-    if spec.lower <= value <= spec.upper:
-        return None
-    text = f"the linear fit gives {in_units(value, spec.unit, digits=3)}, which is impossible"
-    if prior is None:
-        return refused(name, METHOD, text)
-    return designed(name, prior.value, prior.std, f"design value of the card: {text}")
-
-
-def _design(name: str, drivelines: Sequence[Driveline]) -> PriorValue | None:
-    """Prior of the parameter itself; None if the card has none."""
-    known = drivelines[0].known.get(name)
-    return design_of(name, drivelines[0]) if known is None else known
+    found: dict[str, Estimate] = {}
+    for name, value in zip(fit.ids, fit.values.tolist(), strict=True):
+        spec, prior = spec_of(name), fit.priors.get(name)
+        if spec.lower <= value <= spec.upper:
+            continue
+        text = f"the linear fit gives {in_units(value, spec.unit, digits=3)}, which is impossible"
+        if prior is None:
+            found[name] = refused(name, METHOD, text)
+        else:
+            found[name] = designed(name, prior, f"design value of the card: {text}")
+    return found
 
 
 def _card_values(
-    known: dict[str, Estimate], drivelines: Sequence[Driveline]
+    known: Mapping[str, Estimate], drivelines: Sequence[Driveline]
 ) -> dict[str, Estimate]:
-    """Design values of what no shift could tell: P0 of elements that never came on."""
+    """Return design values of parameters that no shift shows: P0 of elements that never engage."""
     found = {
-        name: designed(name, prior.value, prior.std, KNOWN)
+        name: designed(name, prior, KNOWN)
         for name, prior in drivelines[0].known.items()
         if name not in known
     }
-    for driveline in drivelines:
-        for element in (driveline.offgoing, driveline.oncoming):
-            name = f"P0.{element.name}"
-            if name not in known:
-                note = "design value of the card; the log does not show this element filling"
-                found[name] = designed(name, element.P0.value, element.P0.std, note)
-    return found
+    note = "design value of the card; the log does not show this element filling"
+    elements = fill_from_card(drivelines, note)
+    return found | {name: one for name, one in elements.items() if name not in known}
 
 
 def _refusals(
@@ -250,7 +234,7 @@ def _width(curve: FrictionCurve) -> float:
 
 
 def _warnings(
-    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: dict[str, str]
+    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: Mapping[str, str]
 ) -> tuple[str, ...]:
     """Collect the warnings: general ones first, then those of each shift, then shared ones."""
     labels = labels_of(signals)

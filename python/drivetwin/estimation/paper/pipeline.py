@@ -16,6 +16,7 @@ from drivetwin.estimation.paper.inertia import PaperInertiaSettings, paper_inert
 from drivetwin.estimation.paper.load import PaperLoadSettings, paper_load
 from drivetwin.estimation.paper.ringdown import paper_ringdown
 from drivetwin.estimation.paper.wlse import GridFit, Weighting
+from drivetwin.estimation.result.assessment import fill_from_card
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.estimate_set import Conclusions
 from drivetwin.estimation.result.prior_conflict import outside
@@ -151,11 +152,8 @@ def paper_conclusions(
                 estimates[name] = refused(name, METHOD, shift.refusals["shaft"])
     for driveline in drivelines:
         if driveline.J_out is not None:
-            prior = driveline.J_out
-            estimates["J_out"] = designed("J_out", prior.value, prior.std, _TAKEN)
-        for element in (driveline.offgoing, driveline.oncoming):
-            name = f"P0.{element.name}"
-            estimates[name] = designed(name, element.P0.value, element.P0.std, _TAKEN)
+            estimates["J_out"] = designed("J_out", driveline.J_out, _TAKEN)
+    estimates |= fill_from_card(drivelines, _TAKEN)
     friction = {s.friction.element: s.friction.curve for s in shifts if s.friction is not None}
     doubts = dict.fromkeys(text for shift in shifts for text in shift.doubts.values())
     warnings = (

@@ -15,22 +15,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import in_units
-from drivetwin.estimation.data.shift_data import DesignData, Driveline
+from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.prior_update import CONTRADICTS, without_prior
 from drivetwin.estimation.result.verdict import doubted
 from drivetwin.parameters import OVER_ETA, spec_of
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
-
-
-def design_of(name: str, driveline: Driveline) -> PriorValue | None:
-    """The card's Jo′, or P0 or drum of an element in the shift, by id; None for others."""
-    if name == "J_out":
-        return driveline.J_out
-    stem, _, element = name.partition(".")
-    coupling = driveline.couplings.get(element)
-    return None if coupling is None else {"P0": coupling.P0, "drum": coupling.drum}.get(stem)
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,8 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.segments import MomentumSettings
-from drivetwin.estimation.data.shift_data import DesignData, Driveline, ShiftSignals
+from drivetwin.estimation.data.shift_data import PLAUSIBLE_ETA, DesignData, Driveline, ShiftSignals
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW, TYPICAL_MODE
-from drivetwin.estimation.likelihood.priors import PLAUSIBLE_ETA
 from drivetwin.estimation.linear.ringdown import pencil_start
 from drivetwin.estimation.paper.wlse import whole
 from drivetwin.simulation.dual_clutch import in_series
