@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin.export.c.write import write_c
-from drivetwin.export.compiler import native_compiler
+from drivetwin.export.compiler import find_native_compiler
 from drivetwin.simulation.dual_clutch import Accuracy, Signal, simulate
 from tests.export.cases import CASES, Case
 
@@ -77,7 +77,7 @@ def build_program(folder: Path, case: Case, step: int, compiler: tuple[str, ...]
 def measure_here(case: Case, step: int, defines: tuple[str, ...]) -> dict[str, Cost]:
     """Return the smallest means of several runs [ns]."""
     with tempfile.TemporaryDirectory() as folder:
-        path = build_program(Path(folder), case, step, (*native_compiler(), *defines))
+        path = build_program(Path(folder), case, step, (*find_native_compiler(), *defines))
         runs = [
             read_costs(subprocess.run([path], capture_output=True, text=True, check=True).stdout)
             for _ in range(REPEATS)

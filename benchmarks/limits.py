@@ -70,7 +70,7 @@ def measure_identify(_argument: str) -> Iterator[Figure]:
     from drivetwin.estimation.result.method import Method
     from drivetwin.logs.read import read_log
     from drivetwin.pipeline import identify
-    from drivetwin.shifts.detect import find_shifts
+    from drivetwin.shifts.detect import detect_shifts
     from drivetwin.vehicle.card import load_card
 
     with tempfile.TemporaryDirectory() as folder:
@@ -79,7 +79,7 @@ def measure_identify(_argument: str) -> Iterator[Figure]:
         )
         vehicle = load_card(card)
         recording = read_log(log, vehicle)
-    found = find_shifts(recording, vehicle)
+    found = detect_shifts(recording, vehicle)
     for method, limit in ((Method.LIKELIHOOD, 2.0), (Method.PAPER, 0.05)):
         times = []
         for _ in range(3):
@@ -104,18 +104,18 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         log, card, _ = write_run(folder / "bench.csv", run(load_scenario("paper_steps"), seed=1))
-        sessions = Sessions(Folder.at(folder))
-        session = sessions.get(sessions.new())
-        session.open(session.in_folder(log.name), session.in_folder(card.name))
+        sessions = Sessions(Folder.from_path(folder))
+        session = sessions.get(sessions.create())
+        session.open(session.get_folder_source(log.name), session.get_folder_source(card.name))
         session.identify([Method.PAPER, Method.INTEGRAL])
         while session.job is not None:
-            session.poll()
+            session.collect_job_results()
             time.sleep(0.05)
         stiffness = iter(range(140_000, 200_000, 1000))
 
         def slide_once() -> None:
             patch = Patch()
-            for place, change in session.slide({"k_o": float(next(stiffness))}).items():
+            for place, change in session.apply_sliders({"k_o": float(next(stiffness))}).items():
                 patch["data"][place]["x"], patch["data"][place]["y"] = change["x"], change["y"]
             to_json_plotly(patch)
 

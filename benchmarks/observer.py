@@ -23,8 +23,8 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.observer.kind import Observer
-from drivetwin.observer.observe import observed
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.observer.observe import estimate_torques
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
 
 ROUNDS = 12
@@ -46,9 +46,9 @@ def _measure(folder: Path, seed: int, found: dict[tuple[str, str, str], list[Row
     first, card_file, _ = write_run(folder / "first.csv", run(load_scenario("paper_steps"), seed))
     card = drivetwin.load_card(card_file)
     log = drivetwin.read_log(first, card)
-    identified = drivetwin.identify_shifts(log, card, find_shifts(log, card))
+    identified = drivetwin.identify(log, card, detect_shifts(log, card))
     twin = build_twin(identified, card)
-    other = run(load_scenario("paper_steps").with_torque_reduction(0.3), 1000 + seed)
+    other = run(load_scenario("paper_steps").set_torque_reduction(0.3), 1000 + seed)
     second, _, _ = write_run(folder / "second.csv", other)
     log = drivetwin.read_log(second, card)
     kept = {k: v for k, v in log.channels.items() if not k.startswith("pressure.")}
@@ -61,8 +61,8 @@ def _measure(folder: Path, seed: int, found: dict[tuple[str, str, str], list[Row
         f"torque.{name}": torque for name, torque in other.trajectory.clutch_torque.items()
     }
     for case, (seen, by) in cases.items():
-        (shift,) = find_shifts(seen, card).shifts
-        one = observed(twin, seen, shift, by)
+        (shift,) = detect_shifts(seen, card).shifts
+        one = estimate_torques(twin, seen, shift, by)
         phases = {
             "before": (one.time[0], shift.inertia_phase[0] - ONSET),
             "torque": (shift.inertia_phase[0] - ONSET, shift.inertia_phase[0]),

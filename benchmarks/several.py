@@ -27,10 +27,10 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.validation import Outcome
-from drivetwin.parameters import log_of
-from drivetwin.shifts.detect import usable_shifts
+from drivetwin.parameters import split_log_number
+from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import RoadLoad
-from drivetwin.validation.multi_log import Source, Together, identify_together
+from drivetwin.validation.multi_log import JointIdentification, Source, identify_together
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -70,7 +70,7 @@ def measure_pair(seed: int) -> Outcomes:
         ]
         card = _draw_card(drivetwin.load_card(files[0][1]), made[0], seed)
         logs = [drivetwin.read_log(file, card) for file, _, _ in files]
-    sources = [Source(log, usable_shifts(log, card)) for log in logs]
+    sources = [Source(log, require_shifts(log, card)) for log in logs]
     sources[2] = replace(sources[2], held=frozenset({1}))
     return _compare_pair(identify_together(sources, card), _find_truth(made[0]))
 
@@ -90,14 +90,14 @@ def _find_truth(made: Scenario) -> dict[str, float]:
     return {**shared, "Tv_over_if.1": load, "Tv_over_if.2": LOAD, "te_delay.1": 0.010}
 
 
-def _compare_pair(made: Together, truth: dict[str, float]) -> Outcomes:
+def _compare_pair(made: JointIdentification, truth: dict[str, float]) -> Outcomes:
     found: Identification = made.found
     several, held = found.evidence.several, found.evidence.held_out
     assert several is not None
     z, narrower = {}, {}
     for name, value in truth.items():
-        one, number = found.estimates[name], log_of(name)[1] or 1
-        alone = several.logs[number - 1].alone[log_of(name)[0]]
+        one, number = found.estimates[name], split_log_number(name)[1] or 1
+        alone = several.logs[number - 1].alone[split_log_number(name)[0]]
         assert one.value is not None
         assert one.std_noise is not None
         assert alone.std_noise is not None

@@ -17,7 +17,7 @@ import numpy as np
 
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.export.c.loaded import CModel, CObserver, Estimates
-from drivetwin.export.subject import Subject, steady_start
+from drivetwin.export.subject import Subject, compute_steady_start
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
@@ -61,7 +61,7 @@ class Plant:
 
     def __init__(self, model: DualClutch, rng: np.random.Generator) -> None:
         self.model = model
-        self.state = steady_start(model, model.elements[0].name, ENGINE_SPEED)
+        self.state = compute_steady_start(model, model.elements[0].name, ENGINE_SPEED)
         self.pressures = np.array([MAIN, 0.0])
         self.output_torque = self.model.k_o * self.state.twist
         self._rng = rng
@@ -139,7 +139,7 @@ class Controller:
 
     def _pressure(self, index: int, torque: float, slip: float, scale: float) -> float:
         element = self.twin.elements[index]
-        mu = float(element.friction.at(np.array([slip]))[0])
+        mu = float(element.friction.evaluate(np.array([slip]))[0])
         return element.P0 + torque / (scale * mu * element.gain)
 
 
@@ -155,14 +155,14 @@ def faded(model: DualClutch, scale: float) -> DualClutch:
 
 def one_shift(plant: Plant, controller: Controller, observer: CObserver) -> Shift:
     """Drive one upshift; the observer keeps its friction estimate."""
-    true_scale = plant.model.elements[1].friction.at(np.zeros(1))[0]
-    true_scale /= controller.twin.elements[1].friction.at(np.zeros(1))[0]
-    observer.resume(plant.inputs(plant.pressures), plant.speeds())
+    true_scale = plant.model.elements[1].friction.evaluate(np.zeros(1))[0]
+    true_scale /= controller.twin.elements[1].friction.evaluate(np.zeros(1))[0]
+    observer.restart_observer(plant.inputs(plant.pressures), plant.speeds())
     command, left, errors = np.array([MAIN, 0.0]), 0.0, []
     for task in range(int(LONGEST / TASK)):
         pressures = plant.run(command)
         speeds = plant.speeds()
-        known = observer.observe(plant.inputs(pressures), speeds, TASK)
+        known = observer.update_estimates(plant.inputs(pressures), speeds, TASK)
         errors.append(known.output_torque - plant.output_torque)
         time = (task + 1) * TASK
         off, on = (element.name for element in plant.model.elements)
@@ -185,7 +185,7 @@ def drive(adaptive: bool, shifts: int = SHIFTS, seed: int = 0) -> list[Shift]:
     """Shift after shift while the friction fades from 1 to `FADED`."""
     twin = load_scenario("paper").model
     rng = np.random.default_rng(seed)
-    start = steady_start(twin, twin.elements[0].name, ENGINE_SPEED)
+    start = compute_steady_start(twin, twin.elements[0].name, ENGINE_SPEED)
     exported = CModel(Subject("paper", twin, start))
     speeds = (start.engine_speed, start.output_speed)
     observer = CObserver(exported, [ENGINE_TORQUE, MAIN, 0.0], speeds)

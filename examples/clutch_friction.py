@@ -32,7 +32,7 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Signal,
     State,
-    sensitivities,
+    simulate_sensitivities,
 )
 
 FloatArray = NDArray[np.float64]
@@ -122,7 +122,7 @@ def model(coefficients: FloatArray) -> DualClutch:
 def linearised(coefficients: FloatArray, seen: Experiment) -> tuple[FloatArray, FloatArray]:
     """Misfit of both speeds (2n,) and its exact derivatives (2n, 2) by C1 and C2."""
     torque = Signal(seen.time[[0, -1]], np.full(2, TORQUE))
-    found = sensitivities(
+    found = simulate_sensitivities(
         model(coefficients),
         torque,
         {"C": seen.pressure},

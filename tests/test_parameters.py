@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.parameters import log_of, spec_of
+from drivetwin.parameters import get_parameter_spec, split_log_number
 
 
 @pytest.mark.parametrize(
@@ -21,11 +21,11 @@ from drivetwin.parameters import log_of, spec_of
     ],
 )
 def test_the_number_of_a_log_is_taken_off(name: str, plain: str, number: int) -> None:
-    assert log_of(name) == (plain, number)
-    assert spec_of(name).stem == spec_of(plain).stem
+    assert split_log_number(name) == (plain, number)
+    assert get_parameter_spec(name).stem == get_parameter_spec(plain).stem
 
 
 @pytest.mark.parametrize("name", ["eta.1", "k_o.2", "nonsense"])
 def test_what_logs_share_takes_no_number(name: str) -> None:
     with pytest.raises(InputError):
-        spec_of(name)
+        get_parameter_spec(name)

@@ -15,12 +15,12 @@ from pathlib import Path
 
 from plotly.io import to_html
 
-from drivetwin.cli.identify_run import Outcome, run
+from drivetwin.cli.identify_run import Outcome, run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.result.method import DEFAULT_METHOD
-from drivetwin.report.figures.validation import validation_figure
+from drivetwin.report.figures.validation import plot_validation
 from drivetwin.report.html import save_report
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "img"
@@ -36,13 +36,13 @@ OPTIONS = (
 def identify_demo(folder: Path) -> Outcome:
     """Write the log of the demo into `folder` and identify it."""
     log, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=0))
-    return run(log, card, None, DEFAULT_METHOD)
+    return run_identification(log, card, None, DEFAULT_METHOD)
 
 
 def write_figure(outcome: Outcome, folder: Path) -> Path:
     """Write a page with the validation figure alone."""
     (validation,) = outcome.found.evidence.validation
-    figure = validation_figure(validation)
+    figure = plot_validation(validation)
     figure.update_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white", margin={"t": 30})
     figure.layout.updatemenus = ()
     path = folder / "figure.html"

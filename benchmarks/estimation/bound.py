@@ -14,8 +14,8 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import IndexArray
-from drivetwin.estimation.likelihood.objective import Part
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import Signal
 from tests.support.bench import Bench
@@ -36,9 +36,11 @@ def compute_noise(bench: Bench, role: str) -> float:
     return float(np.hypot(sensor.noise, sensor.resolution / np.sqrt(12.0)))
 
 
-def compute_bound(bench: Bench, part: Part, truth: Point, prior: Prior) -> FloatArray:
+def compute_bound(
+    bench: Bench, part: ShiftTerm, truth: ParameterVector, prior: Prior
+) -> FloatArray:
     """Compute the least covariance (p, p) of the unknowns; `bench` and `part` have no noise."""
-    found = part.linearised(truth)
+    found = part.linearise(truth)
     assert found is not None
     slopes = found[1]
     outputs = part.record.outputs
@@ -60,11 +62,11 @@ def compute_bound(bench: Bench, part: Part, truth: Point, prior: Prior) -> Float
     return np.asarray(inverse / np.outer(scale, scale))
 
 
-def compute_response(bench: Bench, part: Part, truth: Point) -> FloatArray:
+def compute_response(bench: Bench, part: ShiftTerm, truth: ParameterVector) -> FloatArray:
     """Compute G·Q^½ (n, m): change of the outputs by one sigma of each input sample that acts."""
-    base = part.run(truth)
+    base = part.simulate(truth)
     assert base is not None
-    start = part.record.stacked(base)
+    start = part.record.sample_run(base)
     columns = []
     for name, signal in _collect_inputs(part).items():
         role = "engine_torque" if name == "engine torque" else f"pressure.{name}"
@@ -85,22 +87,22 @@ def _is_seen(change: FloatArray) -> bool:
 
 
 def _compute_change(
-    part: Part, truth: Point, start: FloatArray, name: str, samples: IndexArray
+    part: ShiftTerm, truth: ParameterVector, start: FloatArray, name: str, samples: IndexArray
 ) -> FloatArray:
     """Compute the change of the outputs (n,) from `start`, which they are at the truth, per unit of
     a common disturbance of samples of an input.
     """
     step = STEPS.get(name, PRESSURE_STEP)
-    run = _disturb(part, name, samples, step).run(truth)
+    run = _disturb(part, name, samples, step).simulate(truth)
     assert run is not None
-    return (part.record.stacked(run) - start) / step
+    return (part.record.sample_run(run) - start) / step
 
 
-def _collect_inputs(part: Part) -> dict[str, Signal]:
+def _collect_inputs(part: ShiftTerm) -> dict[str, Signal]:
     return {"engine torque": part.record.engine_torque} | dict(part.record.pressures)
 
 
-def _can_act(part: Part, name: str, stamp: float) -> bool:
+def _can_act(part: ShiftTerm, name: str, stamp: float) -> bool:
     """Return whether a sample can act: a pressure does not while its element is fully engaged."""
     time = part.record.time
     if name == "engine torque":
@@ -111,7 +113,7 @@ def _can_act(part: Part, name: str, stamp: float) -> bool:
     return bool(time[0] < stamp < time[-1]) and value > low
 
 
-def _disturb(part: Part, name: str, samples: IndexArray, step: float) -> Part:
+def _disturb(part: ShiftTerm, name: str, samples: IndexArray, step: float) -> ShiftTerm:
     record = part.record
     signal = _collect_inputs(part)[name]
     values = signal.values.copy()

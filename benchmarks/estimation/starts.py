@@ -15,7 +15,7 @@ from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.selection.select_model import choose
+from drivetwin.estimation.likelihood.selection.select_model import select_model
 from tests.support.bench import Bench, Knowledge, record_bench
 
 OFF = 0.4
@@ -72,7 +72,7 @@ def draw_start(truth: Mapping[str, float], bench: Bench, seed: int, off: float) 
 
 def _fit(bench: Bench, guess: Mapping[str, float]) -> LikelihoodFit:
     law = bench.run.scenario.model.loss_law
-    return choose([bench.signals], [bench.driveline], law, guess)[0]
+    return select_model([bench.signals], [bench.driveline], law, guess)[0]
 
 
 def _is_same(one: LikelihoodFit, other: LikelihoodFit, bench: Bench) -> bool:

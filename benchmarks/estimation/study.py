@@ -16,15 +16,18 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import Problem
-from drivetwin.estimation.likelihood.optimize.initial_guess import guess_of
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.estimation.likelihood.priors import problem_of
-from drivetwin.estimation.likelihood.selection.select_model import choose
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters, slopes
-from drivetwin.estimation.linear.friction_points import stribeck
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.selection.select_model import select_model
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
+    compute_jacobian,
+    compute_parameters,
+)
+from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
 from tests.support.bench import Bench, Knowledge, record_bench
@@ -90,14 +93,14 @@ def _fit_both(scenario: Scenario, know: Knowledge, seed: int) -> tuple[Estimates
 def fit_likelihood(bench: Bench, linear: IntegralShift) -> LikelihoodFit:
     """Fit by the likelihood method, started from the linear fit, as `identify` does."""
     law = bench.run.scenario.model.loss_law
-    guess = guess_of([linear], [bench.driveline])
-    return choose([bench.signals], [bench.driveline], law, guess)[0]
+    guess = estimate_initial_values([linear], [bench.driveline])
+    return select_model([bench.signals], [bench.driveline], law, guess)[0]
 
 
 def build_truth(bench: Bench) -> dict[str, float]:
     """Return the truth by id, with μ at the compared slips."""
     law = bench.run.truth.friction[bench.run.scenario.oncoming]
-    mu = law.at(np.array(list(SLIPS.values()))).tolist()
+    mu = law.evaluate(np.array(list(SLIPS.values()))).tolist()
     return {**bench.truth, **dict(zip(SLIPS, mu, strict=True))}
 
 
@@ -123,7 +126,7 @@ def compute_bounds(scenario: Scenario, know: Knowledge) -> dict[str, float]:
     )
     bench = replace(clean, driveline=driveline)
     law = scenario.model.loss_law
-    problem, start = problem_of([bench.signals], [driveline], law, build_guess(bench))
+    problem, start = build_problem([bench.signals], [driveline], law, build_guess(bench))
     truth = build_point(problem, start, bench)
     covariance = compute_bound(bench, problem.parts[0], truth, problem.prior)
     found = propagate(problem, truth, covariance, bench.signals)
@@ -152,7 +155,9 @@ def build_guess(bench: Bench) -> dict[str, float]:
     return values
 
 
-def build_point(problem: Problem, start: Point, bench: Bench) -> Point:
+def build_point(
+    problem: LikelihoodObjective, start: ParameterVector, bench: Bench
+) -> ParameterVector:
     """Return the point of the truth, its start state included."""
     run, time = bench.run.trajectory, problem.parts[0].record.time[0]
     k = int(np.searchsorted(run.time, time))
@@ -161,21 +166,21 @@ def build_point(problem: Problem, start: Point, bench: Bench) -> Point:
         "start0.wheel_speed": run.wheel_speed[k],
         "start0.twist": run.twist[k],
     }
-    return start.moved(
+    return start.replace_values(
         np.array([state.get(n, v) for n, v in zip(start.names, start.values, strict=True)])
     )
 
 
 def propagate(
-    problem: Problem,
-    point: Point,
+    problem: LikelihoodObjective,
+    point: ParameterVector,
     covariance: FloatArray,
     signals: ShiftSignals,
     slips: Mapping[str, float] = SLIPS,
 ) -> Estimates:
     """Return value and standard deviation of every parameter at `point`, and of μ at `slips`."""
-    values = parameters(problem, point, [signals])
-    matrix = slopes(problem, point, np.sqrt(np.diag(covariance)), [signals])
+    values = compute_parameters(problem, point, [signals])
+    matrix = compute_jacobian(problem, point, np.sqrt(np.diag(covariance)), [signals])
     variance = np.einsum("qp,pr,qr->q", matrix, covariance, matrix)
     pairs = zip(values.items(), variance, strict=True)
     found = {name: (value, float(np.sqrt(v))) for (name, value), v in pairs}
@@ -191,7 +196,7 @@ def _propagate_friction(
     law: FloatArray, covariance: FloatArray, slips: Mapping[str, float]
 ) -> Estimates:
     """Return μ and its standard deviation from a Stribeck law (4,) and its covariance (4, 4)."""
-    mu, by_law = stribeck(law, np.array(list(slips.values())))
+    mu, by_law = evaluate_stribeck(law, np.array(list(slips.values())))
     std = np.sqrt(np.einsum("pn,pq,qn->n", by_law, covariance, by_law))
     return dict(zip(slips, zip(mu.tolist(), std.tolist(), strict=True), strict=True))
 

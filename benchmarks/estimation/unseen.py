@@ -18,22 +18,22 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.errors import DrivetwinError
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
+from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, record_of
-from drivetwin.estimation.likelihood.objective import Part
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, build_record
+from drivetwin.estimation.likelihood.objective import ShiftTerm
 from drivetwin.estimation.likelihood.parametrization import LAW, TE_OFFSET
-from drivetwin.estimation.likelihood.priors import spans
+from drivetwin.estimation.likelihood.priors import split_spans
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS
 from drivetwin.estimation.linear.load_balance import AERO
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.estimation.result.verdict import DELAY_IDENTIFIED
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
 from drivetwin.vehicle.card import load_card
 from tests.support.bench import Bench
@@ -103,7 +103,7 @@ def _identify(recorded: DynoRun, card_text: str) -> Identification:
         card_file.write_text(card_text, encoding="utf-8")
         card = load_card(card_file)
         log = read_log(file, card)
-        return identify(log, card, find_shifts(log, card))
+        return identify(log, card, detect_shifts(log, card))
 
 
 def _misread(recorded: DynoRun, seed: int) -> DynoRun:
@@ -143,7 +143,7 @@ def _compute_deviates(found: Identification, recorded: DynoRun) -> dict[str, flo
         mu, low, high = (
             np.interp(slips, curve.slip, one) for one in (curve.mu, curve.mu_lo, curve.mu_hi)
         )
-        far = (mu - law.at(np.array(slips)) / scale) / ((high - low) / (2.0 * HALF))
+        far = (mu - law.evaluate(np.array(slips)) / scale) / ((high - low) / (2.0 * HALF))
         deviates |= dict(zip(names, far.tolist(), strict=True))
     return deviates
 
@@ -186,7 +186,7 @@ def find_slips(curve: FrictionCurve) -> dict[str, float]:
 
 def compute_widths(found: Identification, recorded: DynoRun) -> dict[str, tuple[float, float]]:
     """Return the stated standard deviation from noise and its bound, by parameter; 0 if known."""
-    fit, (signals,) = likelihood_of(found)
+    fit, (signals,) = get_likelihood_fit(found)
     (curve,) = found.friction.values()
     slips = find_slips(curve)
     ideal = run(recorded.scenario, recorded.seed, noise=0.0)
@@ -196,9 +196,9 @@ def compute_widths(found: Identification, recorded: DynoRun) -> dict[str, tuple[
     sensors = {sensor.role: sensor for sensor in recorded.scenario.sensors}
     means = SPEEDS if sensors["input_speed"].window > 0.0 else ()
     curved = {TORQUE} & fit.problem.kinds
-    record = record_of(exact, spans([exact])[0]).of_kinds({*means, *curved})
-    part = Part.unweighted(old.structure, record)
-    start = fit.point.moved(_build_values(fit.point, part, bench))
+    record = build_record(exact, split_spans([exact])[0]).select_modes({*means, *curved})
+    part = ShiftTerm.from_sensor_noise(old.structure, record)
+    start = fit.point.replace_values(_build_values(fit.point, part, bench))
     truth = build_point(replace(fit.problem, parts=(part,)), start, bench)
     least = compute_bound(bench, part, truth, fit.problem.prior)
     here = propagate(fit.problem, fit.mean, fit.covariance, exact, slips)
@@ -210,7 +210,7 @@ def _read_exactly(signals: ShiftSignals, ideal: DynoRun) -> ShiftSignals:
     """Return the samples as ideal sensors would have read them."""
     channels = {channel.role: channel for channel in ideal.channels}
 
-    def read(role: str, signal: Sampled) -> Sampled:
+    def read(role: str, signal: MeasuredSignal) -> MeasuredSignal:
         if signal.time.size == 0:
             return signal
         values = np.interp(signal.time, channels[role].time, channels[role].values)
@@ -228,7 +228,7 @@ def _read_exactly(signals: ShiftSignals, ideal: DynoRun) -> ShiftSignals:
     )
 
 
-def _build_values(point: Point, part: Part, bench: Bench) -> FloatArray:
+def _build_values(point: ParameterVector, part: ShiftTerm, bench: Bench) -> FloatArray:
     """Return the truth by unknown (p,), torques over η if the fit has them so; starts unchanged."""
     model = bench.run.scenario.model
     truth = {**build_guess(bench), TE_OFFSET: 0.0, AERO: model.load.aero}

@@ -15,7 +15,7 @@ import tomlkit
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import Actuator, Program, Vibration
-from drivetwin.dyno.files import card_text
+from drivetwin.dyno.files import format_card
 from drivetwin.dyno.scenario import HeldGear, Scenario
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
@@ -238,7 +238,7 @@ def _draw_card(rng: np.random.Generator, drive: Scenario) -> str:
     J_out, P0 = float(rng.choice([0.1, 0.15])), float(rng.choice([0.0, 5e3, 1e4]))
     model = drive.model
     value = model.J_out * (1.0 + J_out * float(rng.standard_normal()))
-    card = tomlkit.parse(card_text(drive)).unwrap()
+    card = tomlkit.parse(format_card(drive)).unwrap()
     card["inertia"]["J_out_kgm2"] = {"value": value, "std": J_out * value}
     for one in model.elements:
         entry = card["elements"][one.name]

@@ -16,10 +16,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
-from drivetwin.cli.fleet_view import watching
+from drivetwin.cli.fleet_view import show_progress
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.events import Event, Settled
-from drivetwin.fleet.mixed_model.estimate import joint_estimates
+from drivetwin.fleet.mixed_model.estimate import estimate_fleet
 from drivetwin.fleet.mixed_model.result import Interval, JointEstimate
 from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.run import FleetRun, run_fleet
@@ -48,7 +48,7 @@ def run_made_fleet(folder: Path, store: Path) -> dict[str, Settled]:
         Sources([str(folder)]), read_rules(folder / "rules.toml"), store, Method.INTEGRAL
     )
     started = perf_counter()
-    with watching(as_json=False) as show:
+    with show_progress(as_json=False) as show:
 
         def hear(event: Event) -> None:
             show(event)
@@ -126,7 +126,7 @@ def check(folder: Path, count: int) -> list[str]:
     faults = check_states(planned, settled)
     print(Counter((made.damage or "healthy") for made in planned))
     with Store(store) as opened:
-        found = joint_estimates(opened)
+        found = estimate_fleet(opened)
     by_name = {one.parameter: one for one in found}
     faults += compare(by_name[f"mu.{ELEMENT}"], truth.mu, planned, "mu")
     faults += compare(by_name[f"P0.{ELEMENT}"], truth.P0, planned, "P0")

@@ -129,7 +129,7 @@ def _read_clock(store: Path, logs: Sequence[str]) -> float:
     from benchmarks.fleet.stand_in import CLOCK
 
     with Store(store) as opened:
-        rows = opened.rows(RowKind.QUALITY).to_pylist()
+        rows = opened.read_rows(RowKind.QUALITY).to_pylist()
     clock = {row["log"]: float(row["value"]) for row in rows if row["name"] == CLOCK}
     return sum(clock.get(log, 0.0) for log in logs) / len(logs)
 

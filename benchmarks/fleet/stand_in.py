@@ -12,7 +12,7 @@ from time import process_time
 
 from drivetwin.fleet.identify import identify_log
 from drivetwin.fleet.rows import Found, Row, RowKind
-from drivetwin.fleet.task import Recipe, Task
+from drivetwin.fleet.task import Task, TaskSpec
 from tests.support.synthetic_fleet import make_fleet
 
 CLOCK = "processor_time"
@@ -41,7 +41,7 @@ def copy_rows(task: Task) -> Found:
 
 
 @cache
-def _identify_model(recipe: Recipe) -> Found:
+def _identify_model(recipe: TaskSpec) -> Found:
     path = Path(recipe.vehicle).with_name(_MODEL)
     content = hashlib.sha256(path.read_bytes()).hexdigest()
     return identify_log(Task("", str(path), content, recipe, ""))

@@ -11,11 +11,11 @@ import numpy as np
 from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality
 from benchmarks.speed.shift import PROGRAM
-from drivetwin.export.modelica.dual_clutch import network_of, network_start
+from drivetwin.export.modelica.dual_clutch import build_network, build_network_start
 from drivetwin.gearbox import load_gearbox
 from drivetwin.gearbox import reduce as reduce_shift
-from drivetwin.gearbox.compare import SHAFT, WHEEL, dual_clutch_form, whole_gearbox
-from drivetwin.gearbox.maneuver import plan, signals, time_grid
+from drivetwin.gearbox.compare import SHAFT, WHEEL, build_dual_clutch_form, build_whole_gearbox
+from drivetwin.gearbox.maneuver import build_signals, build_time_grid, plan
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.simulation.network import Element, Output, Start, simulate
 from reference import tables
@@ -121,12 +121,12 @@ def plan_gearbox_shifts() -> dict[str, Scenario]:
     """Return shift 2-3 of the six-speed gearbox at 1 kHz: all members, and the dual clutch."""
     reduction = reduce_shift(load_gearbox("three-set-3000"), "2", "3")
     maneuver = plan(reduction, reduction.gearbox.require_drive())
-    time = STEP * np.arange(int(time_grid(maneuver)[-1] / STEP) + 1, dtype=np.float64)
-    whole = whole_gearbox(reduction, maneuver)
+    time = STEP * np.arange(int(build_time_grid(maneuver)[-1] / STEP) + 1, dtype=np.float64)
+    whole = build_whole_gearbox(reduction, maneuver)
     gearbox = reduction.gearbox
     speeds: list[Output] = [("speed", gearbox.input), ("speed", gearbox.output), ("speed", WHEEL)]
-    form, start = dual_clutch_form(reduction, maneuver)
-    torque, pressures = signals(reduction, maneuver)
+    form, start = build_dual_clutch_form(reduction, maneuver)
+    torque, pressures = build_signals(reduction, maneuver)
     inputs = {ENGINE_TORQUE: torque, **{one.name: pressures[one.name] for one in form.elements}}
     return {
         WHOLE: Scenario(
@@ -136,7 +136,7 @@ def plan_gearbox_shifts() -> dict[str, Scenario]:
             time,
             [*speeds, ("shaft_torque", SHAFT)],
         ),
-        FORM: Scenario(network_of(form), inputs, network_start(start), time, OUTPUTS),
+        FORM: Scenario(build_network(form), inputs, build_network_start(start), time, OUTPUTS),
     }
 
 

@@ -11,8 +11,8 @@ from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     Sensitivities,
     Trajectory,
-    sensitivities,
     simulate,
+    simulate_sensitivities,
 )
 from tests.support.upshift.equations import Equations
 from tests.support.upshift.scenario import build_model, build_scenario, build_signals, build_state
@@ -55,7 +55,7 @@ def make_entries(of: Problem, given: Inputs, reference: Judge, example: Example)
         return simulate(model, torque, signals, begin, given.time)
 
     def derive_once() -> Sensitivities:
-        return sensitivities(model, torque, signals, begin, given.time, PARAMETERS)
+        return simulate_sensitivities(model, torque, signals, begin, given.time, PARAMETERS)
 
     return [
         Entry(PROGRAM, READY, lambda: example.run(path, _REPEATS, "again"), reference),

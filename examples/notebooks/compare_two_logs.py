@@ -8,32 +8,32 @@
 # %%
 import drivetwin
 from drivetwin.cli import main
-from drivetwin.report.comparison import save_comparison, trials_of
-from drivetwin.report.find_reports import Candidate, agreements
+from drivetwin.report.comparison import save_comparison, simulate_trials
+from drivetwin.report.find_reports import Candidate, compare_estimates
 
 results, twins, logs = {}, {}, {}
 for name, seed in (("monday", "1"), ("tuesday", "2")):
     main(["synth", "-o", f"{name}.csv", "--seed", seed])
     card = drivetwin.load_card(f"{name}.card.toml")
     logs[name] = drivetwin.read_log(f"{name}.csv", card)
-    found = drivetwin.find_shifts(logs[name], card)
-    results[name] = drivetwin.identify_shifts(logs[name], card, found, drivetwin.Method.INTEGRAL)
+    found = drivetwin.detect_shifts(logs[name], card)
+    results[name] = drivetwin.identify(logs[name], card, found, drivetwin.Method.INTEGRAL)
     twins[name] = drivetwin.build_twin(results[name], card)
 
 # %% Every parameter, and by how many standard deviations the two are apart.
-candidates = [Candidate.of_twin(name, twin) for name, twin in twins.items()]
-for one in agreements(candidates):
+candidates = [Candidate.from_twin(name, twin) for name, twin in twins.items()]
+for one in compare_estimates(candidates):
     if one.apart is not None:
         print(f"{one.id:12} {one.apart:4.1f} σ  {'agree' if one.agrees else 'differ'}")
 
 # %% The model of Monday on the log of Tuesday: a test on data it was not made from.
-shift = drivetwin.find_shifts(logs["tuesday"], card).shifts[0]
-crossed = drivetwin.validate_shift(twins["monday"], logs["tuesday"], shift)
+shift = drivetwin.detect_shifts(logs["tuesday"], card).shifts[0]
+crossed = drivetwin.simulate_shift(twins["monday"], logs["tuesday"], shift)
 print(crossed.summary())
 crossed.plot()
 
 # %% All of it on one page.
 save_comparison(
-    "comparison.html", candidates, trials_of(twins, logs["tuesday"], [shift], "tuesday")
+    "comparison.html", candidates, simulate_trials(twins, logs["tuesday"], [shift], "tuesday")
 )
 assert crossed.fit["output_torque"]["all"].fit_percent > 85.0

@@ -19,10 +19,10 @@ print(log.summary())
 log.plot()
 
 # %% Find the shift, identify, simulate the model over the measurement.
-found = drivetwin.find_shifts(log, card)
-result = drivetwin.identify_shifts(log, card, found)
+found = drivetwin.detect_shifts(log, card)
+result = drivetwin.identify(log, card, found)
 twin = drivetwin.build_twin(result, card)
-result = drivetwin.validated(result, twin, log)
+result = drivetwin.attach_validation(result, twin, log)
 print(result.summary())
 result.plot()
 

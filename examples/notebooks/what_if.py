@@ -15,21 +15,23 @@ from drivetwin.cli import main
 main(["synth", "-o", "shift.csv"])
 card = drivetwin.load_card("shift.card.toml")
 log = drivetwin.read_log("shift.csv", card)
-found = drivetwin.find_shifts(log, card)
-result = drivetwin.identify_shifts(log, card, found, drivetwin.Method.INTEGRAL)
+found = drivetwin.detect_shifts(log, card)
+result = drivetwin.identify(log, card, found, drivetwin.Method.INTEGRAL)
 twin = drivetwin.build_twin(result, card)
 shift = found.shifts[0]
 twin
 
 # %% The same measured engine torque and pressures, other drivelines.
-stiffness = twin.value("k_o", default=0.0)
+stiffness = twin.get_value("k_o", default=0.0)
 variants = {
     "as identified": {},
     "shaft half as stiff": {"k_o": 0.5 * stiffness},
-    "fill ends 0.2 bar later": {"P0.B3": twin.value("P0.B3", default=8e4) + 2e4},
+    "fill ends 0.2 bar later": {"P0.B3": twin.get_value("P0.B3", default=8e4) + 2e4},
 }
 runs = {
-    name: drivetwin.validate_shift(twin, log, shift, twin.dual_clutch(shift, overrides=changed))
+    name: drivetwin.simulate_shift(
+        twin, log, shift, twin.build_dual_clutch(shift, overrides=changed)
+    )
     for name, changed in variants.items()
 }
 

@@ -4,16 +4,16 @@
 The names below are the whole of what a script needs, in the order of use; each is imported when
 it is first asked for, so that `import drivetwin` costs nothing.
 
-    card = drivetwin.load_card(path)                             what is known from design
-    log = drivetwin.read_log(path, card)                         channels, SI
-    found = drivetwin.find_shifts(log, card)                     shifts and their phases
-    result = drivetwin.identify_shifts(log, card, found)         estimates with verdicts
-    twin = drivetwin.build_twin(result, card)      the model
-    run = drivetwin.validate_shift(twin, log, found.shifts[0])   simulation over measurement
-    result = drivetwin.validated(result, twin, log)              the same of all shifts, into result
-    result = drivetwin.examined(result)                          what would tell more, into result
-    drivetwin.save_result(path, result)                          result.json
-    drivetwin.save_report(path, result, log)                     report.html
+    card = drivetwin.load_card(path)                              vehicle card: design data
+    log = drivetwin.read_log(path, card)                          channels, SI
+    shifts = drivetwin.detect_shifts(log, card)                   shifts and their phases
+    result = drivetwin.identify(log, card, shifts)                estimates with verdicts
+    twin = drivetwin.build_twin(result, card)                     identified model
+    run = drivetwin.simulate_shift(twin, log, shifts.shifts[0])   simulation with measured inputs
+    result = drivetwin.attach_validation(result, twin, log)       simulation of all shifts
+    result = drivetwin.rank_experiments(result)                   recommended recordings
+    drivetwin.save_result(path, result)                           result.json
+    drivetwin.save_report(path, result, log)                      report.html
 
 `DualClutch` and `simulate` are the model without a log; all errors derive from `DrivetwinError`.
 """
@@ -27,19 +27,18 @@ from drivetwin._util.rich_display import register_presenter
 
 if TYPE_CHECKING:
     from drivetwin.errors import DrivetwinError
-    from drivetwin.estimation.analysis.experiment_design import examined
+    from drivetwin.estimation.analysis.experiment_design import rank_experiments
     from drivetwin.estimation.result.method import Method
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_conversion import load_twin, save_twin
     from drivetwin.logs.read import read_log
-    from drivetwin.pipeline import identify as identify_shifts
+    from drivetwin.pipeline import identify
     from drivetwin.report.html import save_report
-    from drivetwin.shifts.detect import find_shifts
+    from drivetwin.shifts.detect import detect_shifts
     from drivetwin.simulation.dual_clutch import DualClutch, simulate
     from drivetwin.twin.build import build_twin
     from drivetwin.twin.twin import Twin
-    from drivetwin.validation.simulate_log import validate as validate_shift
-    from drivetwin.validation.simulate_log import validated
+    from drivetwin.validation.simulate_log import attach_validation, simulate_shift
     from drivetwin.vehicle.card import load_card
 
 register_presenter(lambda: import_module("drivetwin.report.notebook"))
@@ -50,9 +49,9 @@ _HOME = {
     "Method": ("estimation.result.method", "Method"),
     "Twin": ("twin.twin", "Twin"),
     "build_twin": ("twin.build", "build_twin"),
-    "examined": ("estimation.analysis.experiment_design", "examined"),
-    "find_shifts": ("shifts.detect", "find_shifts"),
-    "identify_shifts": ("pipeline", "identify"),
+    "rank_experiments": ("estimation.analysis.experiment_design", "rank_experiments"),
+    "detect_shifts": ("shifts.detect", "detect_shifts"),
+    "identify": ("pipeline", "identify"),
     "load_card": ("vehicle.card", "load_card"),
     "load_twin": ("files.twin_conversion", "load_twin"),
     "read_log": ("logs.read", "read_log"),
@@ -60,30 +59,29 @@ _HOME = {
     "save_result": ("files.result_file", "save_result"),
     "save_twin": ("files.twin_conversion", "save_twin"),
     "simulate": ("simulation.dual_clutch", "simulate"),
-    "validate_shift": ("validation.simulate_log", "validate"),
-    "validated": ("validation.simulate_log", "validated"),
+    "simulate_shift": ("validation.simulate_log", "simulate_shift"),
+    "attach_validation": ("validation.simulate_log", "attach_validation"),
 }
-"""Module below the package, and the name there. `identify` and `validate` are modules, so the
-functions of these names are called after what they take."""
+"""Module below the package and the name in it, by public name."""
 
 __all__ = [
     "DrivetwinError",
     "DualClutch",
     "Method",
     "Twin",
+    "attach_validation",
     "build_twin",
-    "examined",
-    "find_shifts",
-    "identify_shifts",
+    "detect_shifts",
+    "identify",
     "load_card",
     "load_twin",
+    "rank_experiments",
     "read_log",
     "save_report",
     "save_result",
     "save_twin",
     "simulate",
-    "validate_shift",
-    "validated",
+    "simulate_shift",
 ]
 
 

@@ -66,13 +66,13 @@ OVER_ETA = "_over_eta"
 torque tells of it."""
 
 
-def spec_of(parameter_id: str) -> ParameterSpec:
+def get_parameter_spec(parameter_id: str) -> ParameterSpec:
     """Return the declaration behind an id: `J_prime_2`, `P0.B3`, `te_delay.1`, `k_o_over_eta`.
 
     Raises InputError for an id that no declaration covers.
     """
     if parameter_id.endswith(OVER_ETA):
-        whole = spec_of(parameter_id.removesuffix(OVER_ETA))
+        whole = get_parameter_spec(parameter_id.removesuffix(OVER_ETA))
         return replace(whole, symbol=f"{whole.symbol}/η", meaning=f"{whole.meaning}, over η")
     if parameter_id in SPECS:
         return SPECS[parameter_id]
@@ -85,13 +85,13 @@ def spec_of(parameter_id: str) -> ParameterSpec:
     )
 
 
-def log_of(parameter_id: str) -> tuple[str, int]:
+def split_log_number(parameter_id: str) -> tuple[str, int]:
     """The id without the number of its log, and that number; 0 where it has none.
 
     Raises InputError for an id that no declaration covers.
     """
     ending = OVER_ETA if parameter_id.endswith(OVER_ETA) else ""
     stem, _, number = parameter_id.removesuffix(ending).partition(".")
-    if spec_of(parameter_id).suffix != "log" or not number.isdecimal():
+    if get_parameter_spec(parameter_id).suffix != "log" or not number.isdecimal():
         return parameter_id, 0
     return stem + ending, int(number)

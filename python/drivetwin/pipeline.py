@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivetwin._util.progress import part
+from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.data.compare_logs import require_compatible
 from drivetwin.estimation.data.prepare import DetectedShifts, prepare
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
-from drivetwin.estimation.multi_log.fit import identify_several
+from drivetwin.estimation.multi_log.fit import identify_joint
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -24,7 +24,7 @@ def identify(
     Parameters
     ----------
     log, card : the channels of a recording and the design data of its vehicle
-    shifts : result of `find_shifts`
+    shifts : result of `detect_shifts`
     method : estimator of the reported values; the results of all stages are in `evidence`
 
     Raises
@@ -51,7 +51,7 @@ def identify_jointly(
     raises.
     """
     require_compatible(logs)
-    with part(0.0, 0.05, "preparing the logs"):
+    with scale_progress(0.0, 0.05, "preparing the logs"):
         prepared = [prepare(log, card, found) for log, found in zip(logs, shifts, strict=True)]
-    with part(0.05, 1.0):
-        return identify_several(prepared)
+    with scale_progress(0.05, 1.0):
+        return identify_joint(prepared)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin._util.atomic import keeping, write_text
+from drivetwin._util.atomic import protect_files, write_text
 from drivetwin.errors import InputError
 
 
@@ -38,7 +38,7 @@ def test_a_file_to_be_kept_is_not_written_over(tmp_path: Path, how: str) -> None
         other.hardlink_to(kept)
     names = {"same": kept, "around": tmp_path.parent / tmp_path.name / "log.csv"}
     path = names.get(how, other)
-    with keeping([kept, tmp_path, tmp_path / "absent", Path("\0")]):
+    with protect_files([kept, tmp_path, tmp_path / "absent", Path("\0")]):
         with pytest.raises(InputError, match="would be written over") as fault:
             write_text(path, "result")
         write_text(tmp_path / "new.csv", "result")

@@ -9,23 +9,23 @@ import pytest
 from drivetwin._util.display_units import (
     BAR,
     RPM,
-    display_of,
-    in_units,
-    significant,
-    with_uncertainty,
+    format_significant,
+    format_uncertainty,
+    format_with_unit,
+    get_display_unit,
 )
 from drivetwin.parameters import SPECS
 from drivetwin.shifts.quality import QUALITY_UNITS
 
 
 def test_si_is_converted_for_display() -> None:
-    assert RPM.of(np.array([2.0 * np.pi])) == pytest.approx([60.0])
-    assert BAR.of(np.array([1.4e6])) == pytest.approx([14.0])
+    assert RPM.to_display(np.array([2.0 * np.pi])) == pytest.approx([60.0])
+    assert BAR.to_display(np.array([1.4e6])) == pytest.approx([14.0])
 
 
 @pytest.mark.parametrize("spec", SPECS.values(), ids=lambda spec: spec.stem)
 def test_every_parameter_unit_has_a_display_without_ascii_stars(spec: object) -> None:
-    label = display_of(getattr(spec, "unit")).label  # noqa: B009
+    label = get_display_unit(getattr(spec, "unit")).label  # noqa: B009
     assert label
     assert "*" not in label
     assert "^" not in label
@@ -46,7 +46,7 @@ def test_every_parameter_unit_has_a_display_without_ascii_stars(spec: object) ->
 def test_value_and_half_width_share_their_last_digit(
     value: float, half: float | None, shown: tuple[str, str]
 ) -> None:
-    assert with_uncertainty(value, half) == shown
+    assert format_uncertainty(value, half) == shown
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_value_and_half_width_share_their_last_digit(
     [(0.0, "0"), (float("nan"), "–"), (123456.0, "123\u202f500"), (1.5e-9, "1.500e-09")],
 )
 def test_significant_digits(value: float, text: str) -> None:
-    assert significant(value) == text
+    assert format_significant(value) == text
 
 
 @pytest.mark.parametrize(
@@ -70,9 +70,9 @@ def test_significant_digits(value: float, text: str) -> None:
 def test_a_sentence_has_the_units_of_the_tables(
     value: float, unit: str, half: float | None, text: str
 ) -> None:
-    assert in_units(value, unit, half) == text
+    assert format_with_unit(value, unit, half) == text
 
 
 @pytest.mark.parametrize("unit", sorted(set(QUALITY_UNITS.values())))
 def test_no_figure_of_shift_quality_has_a_unit_in_ascii(unit: str) -> None:
-    assert not set("*^") & set(display_of(unit).label)
+    assert not set("*^") & set(get_display_unit(unit).label)

@@ -11,14 +11,14 @@ from threading import Event
 
 import pytest
 
-from drivetwin._util.optional_dependencies import foreign_parser
+from drivetwin._util.optional_dependencies import handle_parser_errors
 from drivetwin.errors import FileFormatError
 
 PATH = Path("log.mf4")
 
 
 def test_a_parser_is_not_heard_but_other_threads_are(capsys: pytest.CaptureFixture[str]) -> None:
-    with ThreadPoolExecutor(1) as pool, foreign_parser("a log", PATH):
+    with ThreadPoolExecutor(1) as pool, handle_parser_errors("a log", PATH):
         print("from the parser")
         warnings.warn("from the parser", stacklevel=1)
         pool.submit(print, "from elsewhere").result()
@@ -30,14 +30,14 @@ def test_threads_that_parse_at_once_leave_the_process_as_it_was() -> None:
     first_in, second_in, first_out = Event(), Event(), Event()
 
     def first() -> None:
-        with foreign_parser("a log", PATH):
+        with handle_parser_errors("a log", PATH):
             first_in.set()
             second_in.wait(0.2)  # in vain, where one waits for the other
         first_out.set()
 
     def second() -> None:
         first_in.wait()
-        with foreign_parser("a log", PATH):
+        with handle_parser_errors("a log", PATH):
             second_in.set()
             first_out.wait()
 
@@ -49,5 +49,5 @@ def test_threads_that_parse_at_once_leave_the_process_as_it_was() -> None:
 
 def test_any_fault_of_a_parser_names_the_file() -> None:
     told = r"log\.mf4: a log cannot be read.*KeyError: 3"
-    with pytest.raises(FileFormatError, match=told), foreign_parser("a log", PATH):
+    with pytest.raises(FileFormatError, match=told), handle_parser_errors("a log", PATH):
         raise KeyError(3)

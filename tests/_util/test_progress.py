@@ -7,21 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin._util.progress import listening, part, tell
+from drivetwin._util.progress import attach_listener, notify_progress, scale_progress
 
 
 def test_nothing_happens_without_a_listener() -> None:
-    with part(0.0, 0.5, "alone"):
-        tell(0.3)
+    with scale_progress(0.0, 0.5, "alone"):
+        notify_progress(0.3)
 
 
 def test_parts_have_their_place_in_the_whole() -> None:
     heard: list[tuple[float, str]] = []
-    with listening(lambda share, text: heard.append((share, text))):
-        with part(0.0, 0.5, "first"):
-            tell(0.5)
-        with part(0.5, 1.0, "second"), part(0.0, 0.5):
-            tell(0.5)
+    with attach_listener(lambda share, text: heard.append((share, text))):
+        with scale_progress(0.0, 0.5, "first"):
+            notify_progress(0.5)
+        with scale_progress(0.5, 1.0, "second"), scale_progress(0.0, 0.5):
+            notify_progress(0.5)
     assert (0.25, "first") in heard
     assert (0.625, "second") in heard
     assert heard[-1] == (1.0, "second")
@@ -29,9 +29,9 @@ def test_parts_have_their_place_in_the_whole() -> None:
 
 def test_a_listener_hears_nothing_after_its_block() -> None:
     heard: list[float] = []
-    with listening(lambda share, _: heard.append(share)):
+    with attach_listener(lambda share, _: heard.append(share)):
         pass
-    tell(0.5)
+    notify_progress(0.5)
     assert heard == []
 
 
@@ -44,21 +44,21 @@ def test_a_listener_cancels_by_raising() -> None:
 
     def compute() -> None:
         for step in range(10):
-            tell(step / 10)
+            notify_progress(step / 10)
             done.append(step)
 
-    with listening(refuse), pytest.raises(InterruptedError):
+    with attach_listener(refuse), pytest.raises(InterruptedError):
         compute()
     assert done == [0, 1, 2, 3, 4, 5]
-    tell(1.0)
+    notify_progress(1.0)
 
 
 @given(st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), st.floats(-1, 2)), max_size=20))
 def test_shares_stay_in_bounds_and_never_fall(steps: list[tuple[float, float, float]]) -> None:
     heard: list[float] = []
-    with listening(lambda share, _: heard.append(share)):
+    with attach_listener(lambda share, _: heard.append(share)):
         for start, end, share in steps:
-            with part(min(start, end), max(start, end)):
-                tell(share)
+            with scale_progress(min(start, end), max(start, end)):
+                notify_progress(share)
     assert all(0.0 <= share <= 1.0 for share in heard)
     assert heard == sorted(heard)

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from drivetwin.cli.identify_run import run
+from drivetwin.cli.identify_run import run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.result.method import DEFAULT_METHOD
-from drivetwin.report.comparison import save_comparison, trials_of
+from drivetwin.report.comparison import save_comparison, simulate_trials
 from drivetwin.report.find_reports import Candidate
 from drivetwin.report.html import save_report
-from drivetwin.validation.simulate_log import with_fit
+from drivetwin.validation.simulate_log import attach_fit
 from tests.browser.watch import grave_findings
 from tests.report.sample import identification, log, validation
 
@@ -37,11 +37,11 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Report of an identification by the default method."""
     folder = tmp_path_factory.mktemp("report")
     shift, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=1))
-    outcome = run(shift, card, None, DEFAULT_METHOD)
+    outcome = run_identification(shift, card, None, DEFAULT_METHOD)
     save_report(folder / "report.html", outcome.found, outcome.log)
     twin = {"first": outcome.twin, "second": outcome.twin}
-    trials = trials_of(twin, outcome.log, outcome.found.shifts, "shift.csv")
-    candidates = [Candidate.of_twin(name, one) for name, one in twin.items()]
+    trials = simulate_trials(twin, outcome.log, outcome.found.shifts, "shift.csv")
+    candidates = [Candidate.from_twin(name, one) for name, one in twin.items()]
     save_comparison(folder / "comparison.html", candidates, trials)
     return folder / "report.html"
 
@@ -50,7 +50,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def long_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Report of a log of 200 s at 1 kHz."""
     path = tmp_path_factory.mktemp("long") / "report.html"
-    found = with_fit(identification(), [validation()])
+    found = attach_fit(identification(), [validation()])
     save_report(path, found, log(np.arange(0.0, 200.0, 1e-3)))
     return path
 

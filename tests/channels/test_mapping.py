@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from drivetwin.channels.mapping import ChannelSpec, guess, plain, resolve
+from drivetwin.channels.mapping import ChannelSpec, infer_candidates, normalise_name, resolve_roles
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.roles import NEEDED
 from drivetwin.errors import MappingError, MissingChannelError
@@ -42,28 +42,28 @@ def columns(names: Sequence[str]) -> list[Column]:
 )
 def test_names_in_use_are_recognised(role: str, names: str) -> None:
     for name in names.split():
-        assert guess(columns([name]), ELEMENTS) == {role: columns([name])}
+        assert infer_candidates(columns([name]), ELEMENTS) == {role: columns([name])}
 
 
 def test_a_clutch_and_a_brake_of_one_number_are_told_apart_by_kind() -> None:
     elements = {"B2": "brake", "K2": "clutch"}
-    found = guess(columns(["PrsBrk2", "pKup2", "p_Temp"]), elements)
+    found = infer_candidates(columns(["PrsBrk2", "pKup2", "p_Temp"]), elements)
     assert found == {"pressure.B2": columns(["PrsBrk2"]), "pressure.K2": columns(["pKup2"])}
 
 
 def test_a_plain_name_comes_before_one_with_a_source() -> None:
-    found = guess(columns(["nMot_CAN", "nMot", "XCP_nRad", "nRad_Mittel"]), ELEMENTS)
+    found = infer_candidates(columns(["nMot_CAN", "nMot", "XCP_nRad", "nRad_Mittel"]), ELEMENTS)
     assert found["engine_speed"] == columns(["nMot"])
     assert found["wheel_speed"] == columns(["XCP_nRad", "nRad_Mittel"])
 
 
 def test_left_and_right_wheel_are_for_the_user_to_choose() -> None:
     both = columns(["n_Rad_HL", "n_Rad_HR"])
-    assert guess(both, ELEMENTS)["wheel_speed"] == both
+    assert infer_candidates(both, ELEMENTS)["wheel_speed"] == both
 
 
 def test_a_whole_name_comes_before_the_last_part_of_one() -> None:
-    found = guess(columns(["Soll.EngTrq", "EngTrq"]), ELEMENTS)
+    found = infer_candidates(columns(["Soll.EngTrq", "EngTrq"]), ELEMENTS)
     assert found["engine_torque"] == columns(["EngTrq"])
 
 
@@ -71,17 +71,17 @@ def test_a_whole_name_comes_before_the_last_part_of_one() -> None:
     "name", ["Kp2", "bp2", "DriversDemandEngTorque", "ActualEngTorque", "p_Oel"]
 )
 def test_names_of_other_things_are_left_alone(name: str) -> None:
-    assert guess(columns([name]), {**ELEMENTS, "K2": "clutch"}) == {}
+    assert infer_candidates(columns([name]), {**ELEMENTS, "K2": "clutch"}) == {}
 
 
 def test_plain_names() -> None:
-    assert plain("n_Ab [1/min]") == "nab"
-    assert plain("Öldruck\\XCP:1") == "oeldruck"
+    assert normalise_name("n_Ab [1/min]") == "nab"
+    assert normalise_name("Öldruck\\XCP:1") == "oeldruck"
 
 
 def test_resolve_orders_roles_and_prefers_what_is_stated() -> None:
     stated = {"output_torque": ChannelSpec("Sensor7", unit="Nm", sign=-1)}
-    mapped = resolve(columns([*ENGLISH, "Sensor7"]), stated, ELEMENTS, NEEDED, "log.csv")
+    mapped = resolve_roles(columns([*ENGLISH, "Sensor7"]), stated, ELEMENTS, NEEDED, "log.csv")
     assert list(mapped.channels) == [
         "engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed",
         "pressure.B2", "pressure.B3",
@@ -94,57 +94,57 @@ def test_resolve_orders_roles_and_prefers_what_is_stated() -> None:
 def test_a_stated_column_is_not_guessed_for_another_role() -> None:
     stated = {"wheel_speed": ChannelSpec("SpdIn")}
     with pytest.raises(MissingChannelError, match="'input_speed'"):
-        resolve(columns(ENGLISH), stated, ELEMENTS, NEEDED, "log.csv")
+        resolve_roles(columns(ENGLISH), stated, ELEMENTS, NEEDED, "log.csv")
 
 
 def test_the_engine_speed_stands_in_for_the_input_speed() -> None:
     stated = {"engine_speed": ChannelSpec("SpdIn")}
-    mapped = resolve(columns(ENGLISH), stated, ELEMENTS, NEEDED, "log.csv")
+    mapped = resolve_roles(columns(ENGLISH), stated, ELEMENTS, NEEDED, "log.csv")
     assert "input_speed" not in mapped.channels
     assert mapped.channels["engine_speed"].source == "SpdIn"
 
 
 def test_what_nobody_needs_may_be_missing() -> None:
-    mapped = resolve(columns(["SpdIn", "SpdOut"]), {}, ELEMENTS, ("input_speed",), "log.csv")
+    mapped = resolve_roles(columns(["SpdIn", "SpdOut"]), {}, ELEMENTS, ("input_speed",), "log.csv")
     assert list(mapped.channels) == ["input_speed", "output_speed"]
     assert mapped.warnings == ("no pressure of B2, B3: nothing that needs it can be told",)
 
 
 def test_a_pressure_can_be_needed() -> None:
     with pytest.raises(MissingChannelError, match=r"'pressure\.B2' among SpdIn"):
-        resolve(columns(["SpdIn"]), {}, ELEMENTS, ("pressure.B2",), "log.csv")
+        resolve_roles(columns(["SpdIn"]), {}, ELEMENTS, ("pressure.B2",), "log.csv")
 
 
 def test_columns_of_one_name_are_told_apart_by_group() -> None:
     both = [*columns(ENGLISH), Column("n", group="10ms"), Column("n", group="100ms")]
     stated = {"engine_speed": ChannelSpec("n", group="100ms")}
-    mapped = resolve(both, stated, ELEMENTS, NEEDED, "log.mf4")
+    mapped = resolve_roles(both, stated, ELEMENTS, NEEDED, "log.mf4")
     assert mapped.channels["engine_speed"].group == "100ms"
     with pytest.raises(MappingError, match="the file has 'n' in '10ms', '100ms'") as caught:
-        resolve(both, {"engine_speed": ChannelSpec("n")}, ELEMENTS, NEEDED, "log.mf4")
+        resolve_roles(both, {"engine_speed": ChannelSpec("n")}, ELEMENTS, NEEDED, "log.mf4")
     assert 'channels.engine_speed.group = "10ms"' in caught.value.remedy
     with pytest.raises(MappingError, match="'n' in '1s' for 'gear'; the file has it in '10ms'"):
-        resolve(both, {"gear": ChannelSpec("n", group="1s")}, ELEMENTS, NEEDED, "log.mf4")
+        resolve_roles(both, {"gear": ChannelSpec("n", group="1s")}, ELEMENTS, NEEDED, "log.mf4")
 
 
 def test_two_groups_with_one_recognised_name_are_ambiguous_with_both_named() -> None:
     names = [name for name in ENGLISH if name != "SpdIn"]
     both = [*columns(names), Column("SpdIn", group="10ms"), Column("SpdIn", group="100ms")]
     with pytest.raises(MappingError, match=r"SpdIn \(10ms\), SpdIn \(100ms\)"):
-        resolve(both, {}, ELEMENTS, NEEDED, "log.mf4")
+        resolve_roles(both, {}, ELEMENTS, NEEDED, "log.mf4")
 
 
 def test_a_column_without_numbers_is_no_rival() -> None:
     names = [name for name in ENGLISH if name != "SpdIn"]
     both = [*columns(names), Column("SpdIn", group="a", empty=True), Column("SpdIn", group="b")]
-    mapped = resolve(both, {}, ELEMENTS, NEEDED, "log.mf4")
+    mapped = resolve_roles(both, {}, ELEMENTS, NEEDED, "log.mf4")
     assert mapped.channels["input_speed"] == ChannelSpec("SpdIn", group="b")
 
 
 def test_missing_roles_are_all_named_with_columns_and_remedy() -> None:
     names = [name for name in ENGLISH if name not in ("TrqOut", "SpdIn")]
     with pytest.raises(MissingChannelError) as caught:
-        resolve(columns(names), {}, ELEMENTS, NEEDED, "log.csv")
+        resolve_roles(columns(names), {}, ELEMENTS, NEEDED, "log.csv")
     assert str(caught.value) == (
         "log.csv: no column for 'output_torque' nor 'input_speed' among EngTrq, PrsBrk2, PrsBrk3, "
         "SpdOut, SpdWhl\n"
@@ -155,20 +155,20 @@ def test_missing_roles_are_all_named_with_columns_and_remedy() -> None:
 
 def test_a_third_element_may_lack_its_pressure() -> None:
     elements = {**ELEMENTS, "K2": "clutch"}
-    mapped = resolve(columns(ENGLISH), {}, elements, NEEDED, "log.csv")
+    mapped = resolve_roles(columns(ENGLISH), {}, elements, NEEDED, "log.csv")
     assert "pressure.K2" not in mapped.channels
     assert mapped.warnings == ("no pressure of K2: nothing that needs it can be told",)
 
 
 def test_several_candidates_for_a_needed_role_are_an_error() -> None:
     with pytest.raises(MappingError) as caught:
-        resolve(columns([*ENGLISH, "Motormoment"]), {}, ELEMENTS, NEEDED, "log.csv")
+        resolve_roles(columns([*ENGLISH, "Motormoment"]), {}, ELEMENTS, NEEDED, "log.csv")
     assert caught.value.what == "'engine_torque' may be any of the columns EngTrq, Motormoment"
     assert "channels.engine_torque = { source" in caught.value.remedy
 
 
 def test_several_candidates_for_another_role_are_a_warning() -> None:
-    mapped = resolve(columns([*ENGLISH, "Gang", "gear"]), {}, ELEMENTS, NEEDED, "log.csv")
+    mapped = resolve_roles(columns([*ENGLISH, "Gang", "gear"]), {}, ELEMENTS, NEEDED, "log.csv")
     assert "gear" not in mapped.channels
     assert mapped.warnings == (
         "'gear' may be any of the columns Gang, gear; none is used, name one in a channel mapping",
@@ -177,29 +177,31 @@ def test_several_candidates_for_another_role_are_a_warning() -> None:
 
 def test_a_repeated_column_name_is_ambiguous() -> None:
     with pytest.raises(MappingError, match="EngTrq, EngTrq") as caught:
-        resolve(columns([*ENGLISH, "EngTrq"]), {}, ELEMENTS, NEEDED, "log.csv")
+        resolve_roles(columns([*ENGLISH, "EngTrq"]), {}, ELEMENTS, NEEDED, "log.csv")
     assert caught.value.remedy == "rename the repeated column in the file"
     stated = {"engine_torque": ChannelSpec("EngTrq")}
     with pytest.raises(MappingError, match="the file has 2 columns 'EngTrq'"):
-        resolve(columns([*ENGLISH, "EngTrq"]), stated, ELEMENTS, NEEDED, "log.csv")
+        resolve_roles(columns([*ENGLISH, "EngTrq"]), stated, ELEMENTS, NEEDED, "log.csv")
 
 
 def test_one_column_for_two_elements_is_ambiguous() -> None:
     names = [name for name in ENGLISH if not name.startswith("Prs")]
     with pytest.raises(MappingError, match=r"column 'p2' may be pressure\.B2 or pressure\.K2"):
-        resolve(columns([*names, "p2"]), {}, {"B2": "brake", "K2": "clutch"}, NEEDED, "log.csv")
+        resolve_roles(
+            columns([*names, "p2"]), {}, {"B2": "brake", "K2": "clutch"}, NEEDED, "log.csv"
+        )
 
 
 def test_a_stated_column_must_exist() -> None:
     with pytest.raises(MappingError, match=r"'Trq_Out' for 'output_torque'.* mean 'TrqOut'"):
-        resolve(
+        resolve_roles(
             columns(ENGLISH), {"output_torque": ChannelSpec("Trq_Out")}, ELEMENTS, NEEDED, "log.csv"
         )
 
 
 def test_a_stated_element_must_be_on_the_card() -> None:
     with pytest.raises(MappingError, match="'B4', which is no element"):
-        resolve(
+        resolve_roles(
             columns(ENGLISH), {"pressure.B4": ChannelSpec("PrsBrk2")}, ELEMENTS, NEEDED, "log.csv"
         )
 
@@ -207,8 +209,8 @@ def test_a_stated_element_must_be_on_the_card() -> None:
 def test_a_strange_sender_counts_where_no_other_has_numbers() -> None:
     own, strange = Column("EngSpeed", group="EEC1 from 0x00"), "EEC1 from 0xF9"
     other = Column("EngSpeed", group=strange, aside=True)
-    mapped = resolve([own, other], {}, {}, (), "bus.log")
+    mapped = resolve_roles([own, other], {}, {}, (), "bus.log")
     assert mapped.channels["engine_speed"].group == own.group
     assert strange in mapped.warnings[0]
     never = Column("EngSpeed", group=own.group, empty=True)
-    assert guess([never, other], {}) == {"engine_speed": [other]}
+    assert infer_candidates([never, other], {}) == {"engine_speed": [other]}

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.channels.mapping import ChannelSpec
-from drivetwin.channels.mapping_file import ByRole, ChannelTable, mapping_text, read_mapping
+from drivetwin.channels.mapping_file import ByRole, ChannelTable, format_mapping, read_mapping
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.channels.roles import ROLES
 from drivetwin.errors import MappingError
@@ -22,7 +22,7 @@ def test_a_written_mapping_reads_back(tmp_path: Path) -> None:
         "pressure.K 1": ChannelSpec("p1", "kPa"),
     }
     path = tmp_path / "map.toml"
-    path.write_text(mapping_text(channels), encoding="utf-8")
+    path.write_text(format_mapping(channels), encoding="utf-8")
     assert read_mapping(path).channels == channels
     assert path.read_text(encoding="utf-8").startswith("# Channel mapping")
 
@@ -31,7 +31,7 @@ def test_options_for_the_whole_file_read_back(tmp_path: Path) -> None:
     bus = BusOptions((tmp_path / "bus.dbc",), 1109.0)
     options = ReadOptions(TimeColumn("clk", "ms", simultaneous=True), bus)
     path = tmp_path / "map.toml"
-    text = mapping_text({"gear": ChannelSpec("Gang", group="10ms")}, options)
+    text = format_mapping({"gear": ChannelSpec("Gang", group="10ms")}, options)
     path.write_text(text, encoding="utf-8")
     again = read_mapping(path)
     assert again.options == options
@@ -73,7 +73,7 @@ def test_a_missing_file_is_told(tmp_path: Path) -> None:
 
 def test_a_unit_that_the_log_does_not_name_has_a_line_to_fill_in(tmp_path: Path) -> None:
     path = tmp_path / "map.toml"
-    text = mapping_text({"input_speed": ChannelSpec("n")}, unitless={"input_speed"})
+    text = format_mapping({"input_speed": ChannelSpec("n")}, unitless={"input_speed"})
     path.write_text(text, encoding="utf-8")
     assert read_mapping(path).channels == {"input_speed": ChannelSpec("n")}
     path.write_text(text.replace('# unit = "..."', 'unit = "rpm"'), encoding="utf-8")

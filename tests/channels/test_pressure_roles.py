@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.pressure_roles import pressed_element, pressure_role
-from drivetwin.channels.roles import ROLES, quantity_of
+from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
+from drivetwin.channels.roles import ROLES, get_quantity
 from drivetwin.channels.shiftlog import Quantity
 
 
 @given(st.text())
 def test_an_element_returns_from_the_role_of_its_pressure(element: str) -> None:
-    assert pressed_element(pressure_role(element)) == element
-    assert quantity_of(pressure_role(element)) is Quantity.PRESSURE
+    assert get_pressure_element(make_pressure_role(element)) == element
+    assert get_quantity(make_pressure_role(element)) is Quantity.PRESSURE
 
 
 @pytest.mark.parametrize("role", [*ROLES, "pressure", "P.pressure."])
 def test_other_roles_are_the_pressure_of_nothing(role: str) -> None:
-    assert pressed_element(role) is None
+    assert get_pressure_element(role) is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.channels.units import Unit, lookup
+from drivetwin.channels.units import Unit, find_unit
 from drivetwin.errors import TimeError
 
 
@@ -22,4 +22,4 @@ def test_a_log_whose_time_is_too_far_from_zero_is_refused(start: float) -> None:
 
 @pytest.mark.parametrize("quantity", [one for one in Quantity if one is not Quantity.STATE])
 def test_the_unit_of_a_quantity_is_that_of_numbers_in_si(quantity: Quantity) -> None:
-    assert lookup(quantity.unit) == Unit(1.0, 0.0, quantity)
+    assert find_unit(quantity.unit) == Unit(1.0, 0.0, quantity)

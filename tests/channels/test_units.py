@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Quantity
-from drivetwin.channels.units import UNITS, channel_unit, is_unit, lookup, time_factor
+from drivetwin.channels.units import (
+    UNITS,
+    find_unit,
+    get_time_factor,
+    is_unit,
+    resolve_channel_unit,
+)
 from drivetwin.errors import UnitError, Where
 
 HERE = Where(file="log.csv", channel="X")
@@ -29,7 +35,9 @@ RPM = 2.0 * math.pi / 60.0
     ],
 )
 def test_torque_spellings(spelling: str, factor: float) -> None:
-    assert channel_unit(spelling, Quantity.TORQUE, HERE).factor == pytest.approx(factor, rel=1e-15)
+    assert resolve_channel_unit(spelling, Quantity.TORQUE, HERE).factor == pytest.approx(
+        factor, rel=1e-15
+    )
 
 
 @pytest.mark.parametrize(
@@ -44,7 +52,9 @@ def test_torque_spellings(spelling: str, factor: float) -> None:
     ],
 )
 def test_speed_spellings(spelling: str, factor: float) -> None:
-    assert channel_unit(spelling, Quantity.SPEED, HERE).factor == pytest.approx(factor, rel=1e-15)
+    assert resolve_channel_unit(spelling, Quantity.SPEED, HERE).factor == pytest.approx(
+        factor, rel=1e-15
+    )
 
 
 @pytest.mark.parametrize(
@@ -66,22 +76,22 @@ def test_speed_spellings(spelling: str, factor: float) -> None:
     ],
 )
 def test_pressure_spellings(spelling: str, factor: float) -> None:
-    assert channel_unit(spelling, Quantity.PRESSURE, HERE).factor == factor
+    assert resolve_channel_unit(spelling, Quantity.PRESSURE, HERE).factor == factor
 
 
 def test_fraction_and_temperature() -> None:
-    assert channel_unit("%", Quantity.FRACTION, HERE).factor == 0.01
-    assert channel_unit("-", Quantity.FRACTION, HERE).factor == 1.0
-    celsius = channel_unit("°C", Quantity.TEMPERATURE, HERE)
+    assert resolve_channel_unit("%", Quantity.FRACTION, HERE).factor == 0.01
+    assert resolve_channel_unit("-", Quantity.FRACTION, HERE).factor == 1.0
+    celsius = resolve_channel_unit("°C", Quantity.TEMPERATURE, HERE)
     assert celsius.to_si(np.array([20.0])) == pytest.approx(np.array([293.15]))
-    fahrenheit = channel_unit("°F", Quantity.TEMPERATURE, HERE)
+    fahrenheit = resolve_channel_unit("°F", Quantity.TEMPERATURE, HERE)
     assert fahrenheit.to_si(np.array([212.0])) == pytest.approx(np.array([373.15]))
-    assert channel_unit("℃", Quantity.TEMPERATURE, HERE) == celsius
+    assert resolve_channel_unit("℃", Quantity.TEMPERATURE, HERE) == celsius
 
 
 def test_case_is_told_apart_only_where_it_carries_the_size() -> None:
-    assert lookup("MPa") != lookup("mPa")
-    assert lookup("mPa") is None
+    assert find_unit("MPa") != find_unit("mPa")
+    assert find_unit("mPa") is None
     folded = [spelling.casefold() for spelling in UNITS if spelling.casefold() not in UNITS]
     assert len(folded) == len(set(folded))
 
@@ -107,7 +117,7 @@ def test_refusals_give_reason_and_remedy(
     spelling: str | None, quantity: Quantity, reason: str
 ) -> None:
     with pytest.raises(UnitError) as caught:
-        channel_unit(spelling, quantity, HERE)
+        resolve_channel_unit(spelling, quantity, HERE)
     text = str(caught.value)
     assert reason in text
     assert 'unit = "..."' in text
@@ -115,7 +125,7 @@ def test_refusals_give_reason_and_remedy(
 
 
 def test_a_state_needs_no_unit() -> None:
-    assert channel_unit(None, Quantity.STATE, HERE).factor == 1.0
+    assert resolve_channel_unit(None, Quantity.STATE, HERE).factor == 1.0
 
 
 @pytest.mark.parametrize(
@@ -123,13 +133,13 @@ def test_a_state_needs_no_unit() -> None:
     [("s", 1.0), ("[s]", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("min", 60.0), ("d", 86400.0)],
 )
 def test_time_units(spelling: str, factor: float) -> None:
-    assert time_factor(spelling, HERE) == factor
+    assert get_time_factor(spelling, HERE) == factor
 
 
 @pytest.mark.parametrize("spelling", [None, "", "bar"])
 def test_time_without_unit_is_refused(spelling: str | None) -> None:
     with pytest.raises(UnitError, match=r'time = { unit = "s" }'):
-        time_factor(spelling, HERE)
+        get_time_factor(spelling, HERE)
 
 
 def test_names_are_not_taken_for_units() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.logs.quality.update_raster import find_raster, shown_late
+from drivetwin.logs.quality.update_raster import find_raster, mark_late_samples
 
 STEP = 1e-3
 
@@ -197,10 +197,10 @@ def test_a_coarse_table_that_shows_messages_on_is_told(step: float, own: float, 
     held = replace(held, time=np.linspace(0.0, 199 * step, 200))
     speed = replace(held, role="output_speed", quantity=Quantity.SPEED, held=False)
     speed = replace(speed, values=wave(200, 0.01), time=speed.time + own)
-    found, texts = shown_late({"engine_torque": held, "output_speed": speed})
+    found, texts = mark_late_samples({"engine_torque": held, "output_speed": speed})
     assert len(texts) == told
     late = [step if told else 0.0] * 2
     assert [one.late for one in found.values()] == pytest.approx(late)
     for text in texts:
         assert "10 ms apart and repeat values of 'EngTrq'" in text
-    assert shown_late({"output_speed": speed}) == ({"output_speed": speed}, [])
+    assert mark_late_samples({"output_speed": speed}) == ({"output_speed": speed}, [])

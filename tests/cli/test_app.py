@@ -101,7 +101,7 @@ def test_interrupt_is_exit_code_130(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("drivetwin.dyno.files.truth_text", interrupted)
+    monkeypatch.setattr("drivetwin.dyno.files.format_truth", interrupted)
     monkeypatch.chdir(tmp_path)
     assert main(["synth", "-o", "out/log.csv"]) == 130
     assert list(tmp_path.iterdir()) == []

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin._util.atomic import keeping
-from drivetwin.cli.atomic_outputs import staged
+from drivetwin._util.atomic import protect_files
+from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.errors import FileFormatError, InputError, Where
 
 
 def test_files_appear_together_in_a_new_folder(tmp_path: Path) -> None:
     target = tmp_path / "a" / "b"
-    with staged(target) as beside:
+    with write_atomically(target) as beside:
         (beside / "one.txt").write_text("1")
         (beside / "two.txt").write_text("2")
         assert not target.exists()
@@ -27,7 +27,7 @@ def test_files_appear_together_in_a_new_folder(tmp_path: Path) -> None:
 
 def test_an_error_names_the_file_where_it_was_to_stand(tmp_path: Path) -> None:
     def fail(named: Path) -> None:
-        with staged(tmp_path) as beside:
+        with write_atomically(tmp_path) as beside:
             raise FileFormatError("no", "do", Where(file=str(beside / named), channel="x"))
 
     with pytest.raises(FileFormatError) as caught:
@@ -45,7 +45,7 @@ def test_failure_or_interrupt_leaves_everything_as_it_was(
     (tmp_path / "old.txt").write_text("old")
 
     def fail(target: Path) -> None:
-        with staged(target) as beside:
+        with write_atomically(target) as beside:
             (beside / "old.txt").write_text("new")
             raise stop
 
@@ -58,7 +58,7 @@ def test_failure_or_interrupt_leaves_everything_as_it_was(
 
 def test_an_existing_folder_keeps_its_other_files(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
-    with staged(tmp_path) as beside:
+    with write_atomically(tmp_path) as beside:
         (beside / "result.json").write_text("{}")
     assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "result.json"}
 
@@ -68,11 +68,11 @@ def test_a_file_to_be_kept_keeps_the_whole_folder_as_it_was(tmp_path: Path) -> N
     log.write_text("log")
 
     def write() -> None:
-        with staged(tmp_path) as beside:
+        with write_atomically(tmp_path) as beside:
             (beside / "a.toml").write_text("card")
             (beside / "z.csv").write_text("synthetic")
 
-    with keeping([log]), pytest.raises(InputError) as caught:
+    with protect_files([log]), pytest.raises(InputError) as caught:
         write()
     assert caught.value.where.file == str(log)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("z.csv", "log")]
@@ -81,14 +81,14 @@ def test_a_file_to_be_kept_keeps_the_whole_folder_as_it_was(tmp_path: Path) -> N
 def test_a_folder_that_is_a_file_is_named_as_given(tmp_path: Path) -> None:
     (tmp_path / "afile").touch()
     for folder in (tmp_path / "afile", tmp_path / "afile" / "deep"):
-        with pytest.raises(NotADirectoryError) as caught, staged(folder):
+        with pytest.raises(NotADirectoryError) as caught, write_atomically(folder):
             pass
         assert caught.value.filename == str(tmp_path / "afile")
 
 
 def test_a_refusal_of_the_system_names_the_file_where_it_was_to_stand(tmp_path: Path) -> None:
     def write(name: str) -> None:
-        with staged(tmp_path / "out") as beside:
+        with write_atomically(tmp_path / "out") as beside:
             (beside / name).write_text("1")
 
     with pytest.raises(FileNotFoundError) as absent:

@@ -33,7 +33,7 @@ def test_during_an_identification(
         if share >= moment:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Remaining, "hear", stop)
+    monkeypatch.setattr(Remaining, "update", stop)
     assert main(identify(bench_files, tmp_path / "out")) == 130
     assert list(tmp_path.iterdir()) == []
     assert "interrupted" in capsys.readouterr().err

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.fleet.mixed_model.observations import facts
+from drivetwin.fleet.mixed_model.observations import collect_facts
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
 from tests.support.synthetic_fleet import make_fleet
@@ -53,10 +53,10 @@ def test_a_second_run_computes_nothing_and_tells_events(
 
 def test_the_store_holds_what_a_log_told(fleet: Path) -> None:
     with Store(fleet / "store") as store:
-        kinds = set(store.rows().column("kind").to_pylist())
-        rows = store.rows(RowKind.PARAMETER).to_pylist()
-        known = facts(store)
-        shifts = store.table("shifts")
+        kinds = set(store.read_rows().column("kind").to_pylist())
+        rows = store.read_rows(RowKind.PARAMETER).to_pylist()
+        known = collect_facts(store)
+        shifts = store.read_table("shifts")
     assert kinds >= {"parameter", "friction", "fit", "quality"}
     values = {row["name"]: row for row in rows}
     assert values["eta"]["value"] == pytest.approx(0.85, abs=0.01)

@@ -44,9 +44,9 @@ def test_a_log_beyond_its_time_is_done_when_it_is_given_more(
     assert (enough["done"], enough["computed"], enough["failures"]) == (1, 1, {})
     (made,) = plan(1, Truth())
     with Store(logs.parent / "store") as store:
-        parameters = {row["name"]: row for row in store.rows(RowKind.PARAMETER).to_pylist()}
-        kinds = set(store.rows().column("kind").to_pylist())
-        (settings,) = store.table("settings")
+        parameters = {row["name"]: row for row in store.read_rows(RowKind.PARAMETER).to_pylist()}
+        kinds = set(store.read_rows().column("kind").to_pylist())
+        (settings,) = store.read_table("settings")
     assert kinds >= {"parameter", "friction", "fit", "quality"}
     assert json.loads(settings["document"])["method"] == "likelihood"
     assert parameters["eta"]["method"] == "likelihood"

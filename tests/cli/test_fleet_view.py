@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from drivetwin.cli import fleet_view
-from drivetwin.cli.fleet_view import Tally, watching
+from drivetwin.cli.fleet_view import Tally, show_progress
 from drivetwin.fleet.events import Noted, Retried, Settled, Started, Summary
 from drivetwin.fleet.task import State
 
@@ -28,15 +28,15 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 def test_rate_and_time_left_are_those_of_late(clock: list[float]) -> None:
     tally = Tally()
-    tally.hear(Started(7300, "s", None))
+    tally.update(Started(7300, "s", None))
     for _ in range(100):
         clock[0] += 0.5
-        tally.hear(DONE)
-    assert tally.rate() == pytest.approx(2.0)
-    assert tally.line() == "100 of 7300 logs, 2.0/s, 1 h 00 min left"
+        tally.update(DONE)
+    assert tally.compute_rate() == pytest.approx(2.0)
+    assert tally.format_line() == "100 of 7300 logs, 2.0/s, 1 h 00 min left"
     clock[0] += 1000.0
-    tally.hear(DONE)
-    assert tally.rate() == 0.0
+    tally.update(DONE)
+    assert tally.compute_rate() == 0.0
 
 
 def test_a_terminal_shows_failures_by_reason_and_the_dashboard(clock: list[float]) -> None:
@@ -46,9 +46,9 @@ def test_a_terminal_shows_failures_by_reason_and_the_dashboard(clock: list[float
     )  # fmt: skip
     for event in events:
         clock[0] += 1.0
-        tally.hear(event)
+        tally.update(event)
     shown = Console(file=StringIO(), width=100)
-    shown.print(fleet_view._picture(tally))
+    shown.print(fleet_view._render_tally(tally))
     text = shown.file.getvalue()  # type: ignore[attr-defined]
     for words in ("2/4", "1  UnitError", "1  retries", "http://host:8787", "hm", "left"):
         assert words in text
@@ -57,7 +57,7 @@ def test_a_terminal_shows_failures_by_reason_and_the_dashboard(clock: list[float
 def test_a_file_gets_a_line_now_and_then(
     clock: list[float], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with watching(as_json=False) as tell:
+    with show_progress(as_json=False) as tell:
         tell(Started(4, "s", "http://host:8787"))
         tell(BAD)
         clock[0] += 31.0
@@ -73,7 +73,7 @@ def test_a_file_gets_a_line_now_and_then(
 
 def test_machines_get_an_event_a_line(capsys: pytest.CaptureFixture[str]) -> None:
     end = Summary(1, 0, 1, 0, 0, 1, 0.5, True, {"UnitError": 1})
-    with watching(as_json=True) as tell:
+    with show_progress(as_json=True) as tell:
         tell(BAD)
         tell(end)
     first, last = map(json.loads, capsys.readouterr().out.splitlines())

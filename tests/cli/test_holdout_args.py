@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.cli.holdout_args import held_numbers
+from drivetwin.cli.holdout_args import parse_holdouts
 from drivetwin.errors import InputError
 from drivetwin.shifts.detect import FoundShifts
 from tests.estimation.multi_log.fixtures import pair
@@ -17,7 +17,7 @@ LOGS = (Path("runs/a.csv"), Path("runs/b.mf4"))
 
 def _held(*wanted: str, logs: tuple[Path, ...] = LOGS) -> list[set[int]]:
     two = FoundShifts(2 * pair()[0].shifts.shifts, ())
-    return [set(one) for one in held_numbers(wanted, logs, [two] * len(logs))]
+    return [set(one) for one in parse_holdouts(wanted, logs, [two] * len(logs))]
 
 
 @pytest.mark.parametrize("name", ["b", "b.mf4", "runs/b.mf4"])

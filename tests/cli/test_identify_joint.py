@@ -54,7 +54,7 @@ def test_result_report_and_a_twin_of_each_log_are_written(written: Written) -> N
         "run2.twin.toml",
     }
     second = load_twin(written.folder / "run2.twin.toml")
-    assert second.value("Tv_over_if", 0.0) == pytest.approx(LOADS[1], rel=5e-3)
+    assert second.get_value("Tv_over_if", 0.0) == pytest.approx(LOADS[1], rel=5e-3)
 
 
 def test_the_result_tells_logs_test_and_prediction(written: Written) -> None:

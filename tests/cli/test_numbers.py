@@ -5,26 +5,26 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.cli.numbers import deviation, percent, quantity, shown
+from drivetwin.cli.numbers import format_deviation, format_estimate, format_percent, format_quantity
 
 
 def test_digits_follow_the_interval() -> None:
-    assert shown(17.50312, (17.37, 17.63), "kg*m^2") == ("17.50", "± 0.13", "kg·m²")
+    assert format_estimate(17.50312, (17.37, 17.63), "kg*m^2") == ("17.50", "± 0.13", "kg·m²")
 
 
 def test_display_units() -> None:
-    assert shown(80500.0, (79500.0, 81500.0), "Pa") == ("0.805", "± 0.010", "bar")
-    assert shown(0.0101, (0.0098, 0.0104), "s") == ("10.10", "± 0.30", "ms")
+    assert format_estimate(80500.0, (79500.0, 81500.0), "Pa") == ("0.805", "± 0.010", "bar")
+    assert format_estimate(0.0101, (0.0098, 0.0104), "s") == ("10.10", "± 0.30", "ms")
 
 
 def test_a_known_value_has_no_interval() -> None:
-    assert shown(80000.0, (80000.0 - 1e-5, 80000.0 + 1e-5), "Pa") == ("0.8000", "", "bar")
+    assert format_estimate(80000.0, (80000.0 - 1e-5, 80000.0 + 1e-5), "Pa") == ("0.8000", "", "bar")
 
 
 def test_what_is_not_known_is_a_dash() -> None:
-    assert shown(None, None, "1")[0] == "-"
-    assert quantity(None, "N*m") == "-"
-    assert percent(float("nan")) == "-"
+    assert format_estimate(None, None, "1")[0] == "-"
+    assert format_quantity(None, "N*m") == "-"
+    assert format_percent(float("nan")) == "-"
 
 
 @pytest.mark.parametrize(
@@ -32,4 +32,4 @@ def test_what_is_not_known_is_a_dash() -> None:
     [(18.0, 17.5, "+2.86"), (17.5, 17.5, "+0.00"), (None, 17.5, ""), (0.01, 0.0, "")],
 )
 def test_deviation(value: float | None, truth: float, text: str) -> None:
-    assert deviation(value, truth) == text
+    assert format_deviation(value, truth) == text

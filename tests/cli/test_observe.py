@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.observe import observed_channels
+from drivetwin.cli.observe import collect_channels
 from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.observer.kind import Observer
-from drivetwin.observer.observe import observed
+from drivetwin.observer.observe import estimate_torques
 from drivetwin.observer.result import Band, Observation
 from drivetwin.shifts.detect import FoundShifts
 from tests.observer.conftest import Bench, bench
@@ -62,7 +62,7 @@ def test_a_shift_with_a_gap_is_left_out_and_told(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of several shifts; a log whose only shift has one is refused."""
-    whole = observed(bench.twin, bench.log, bench.shift)
+    whole = estimate_torques(bench.twin, bench.log, bench.shift)
     refusal = DamagedChannelError("a gap", "record it again")
     shifts = [bench.shift] * 2
     answers: list[DamagedChannelError | Observation] = [refusal, whole]
@@ -73,9 +73,9 @@ def test_a_shift_with_a_gap_is_left_out_and_told(
             raise answer
         return answer
 
-    monkeypatch.setattr("drivetwin.observer.observe.observed", told)
+    monkeypatch.setattr("drivetwin.observer.observe.estimate_torques", told)
     monkeypatch.setattr(
-        "drivetwin.shifts.detect.usable_shifts", lambda *_: FoundShifts(tuple(shifts), ())
+        "drivetwin.shifts.detect.require_shifts", lambda *_: FoundShifts(tuple(shifts), ())
     )
     command = ["observe", *map(str, bench.files), "--json"]
     assert main(command) == 0
@@ -95,7 +95,7 @@ def test_time_increases_from_shift_to_shift() -> None:
         time = np.arange(shift.before[0], shift.after[1] + 0.25, 0.5)
         band = Band(np.full(time.size, float(level)), np.ones(time.size))
         found.append(Observation(shift, Observer.SMOOTHER, time, band, {"B2": band}))
-    channels = {channel.name: channel for channel in observed_channels(found)}
+    channels = {channel.name: channel for channel in collect_channels(found)}
     assert set(channels) == {"output_torque", "output_torque_std", "torque.B2", "torque.B2_std"}
     for channel in channels.values():
         assert (np.diff(channel.time) > 0.0).all()

@@ -12,9 +12,9 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from drivetwin._util.progress import tell
+from drivetwin._util.progress import notify_progress
 from drivetwin.cli import main
-from drivetwin.cli.output import say, show, step, table_of
+from drivetwin.cli.output import make_table, print_line, print_table, show_step
 from tests.cli.conftest import Files
 
 COMMANDS = ("inspect", "shifts")
@@ -40,9 +40,9 @@ def test_texts_are_folded_and_numbers_stay_whole(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "24")
-    table = table_of("title", "name", "value", right=("value",))
+    table = make_table("title", "name", "value", right=("value",))
     table.add_row("a_channel_with_a_long_name", "-1234567.25")
-    show(table)
+    print_table(table)
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 24
     assert any("-1234567.25" in line for line in lines)
@@ -54,11 +54,11 @@ def test_texts_in_brackets_and_between_colons_are_shown_as_they_are(
 ) -> None:
     """As markup a unit `[bar]` would vanish and `[/min]` be an error."""
     monkeypatch.setenv("COLUMNS", "80")
-    table = table_of("of [bar].csv", "column", "unit")
+    table = make_table("of [bar].csv", "column", "unit")
     table.add_row("PrsBrk2\\XCP:on:1", "[bar]")
     table.add_row("SpdIn", "[/min]")
-    show(table)
-    say("[bar] :on:")
+    print_table(table)
+    print_line("[bar] :on:")
     text = capsys.readouterr().out
     assert "of [bar].csv" in text
     assert "PrsBrk2\\XCP:on:1" in text
@@ -100,15 +100,15 @@ def test_colour_is_off_where_there_is_no_terminal(capsys: pytest.CaptureFixture[
 def test_a_terminal_sees_what_is_being_done(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = StringIO()
     monkeypatch.setattr(
-        "drivetwin.cli.output.console",
+        "drivetwin.cli.output.make_console",
         lambda **_: Console(file=screen, force_terminal=True, width=80),
     )
-    with step("reading log.csv"):
-        tell(0.5)
+    with show_step("reading log.csv"):
+        notify_progress(0.5)
     assert "reading log.csv" in screen.getvalue()
 
 
 def test_a_step_is_silent_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
-    with step("reading log.csv"):
-        tell(0.5)
+    with show_step("reading log.csv"):
+        notify_progress(0.5)
     assert capsys.readouterr() == ("", "")

@@ -13,7 +13,7 @@ from drivetwin.cli import main
 from drivetwin.files.result_file import save_result
 from drivetwin.files.twin_conversion import save_twin
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import with_fit
+from drivetwin.validation.simulate_log import attach_fit
 from tests.cli.conftest import Files
 from tests.report.sample import card, identification, validation
 
@@ -21,7 +21,7 @@ from tests.report.sample import card, identification, validation
 @pytest.fixture
 def made(tmp_path: Path) -> tuple[Path, Path]:
     """Two folders as `identify -o` writes them, without their page."""
-    found = with_fit(identification(), [validation()])
+    found = attach_fit(identification(), [validation()])
     for name in ("first", "second"):
         save_result(tmp_path / name / "result.json", found)
         save_twin(tmp_path / name / "twin.toml", build_twin(found, card()))

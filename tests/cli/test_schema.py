@@ -8,7 +8,7 @@ import json
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.files.schemas import FileKind, json_schema
+from drivetwin.files.schemas import FileKind, build_json_schema
 
 
 def test_without_a_kind_it_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
@@ -20,7 +20,7 @@ def test_without_a_kind_it_lists_them(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_the_schema_of_a_kind_is_printed_whole(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "vehicle-card"]) == 0
-    assert json.loads(capsys.readouterr().out) == json_schema(FileKind.VEHICLE_CARD)
+    assert json.loads(capsys.readouterr().out) == build_json_schema(FileKind.VEHICLE_CARD)
 
 
 def test_a_kind_that_does_not_exist_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.simulate import traces_text
+from drivetwin.cli.simulate import format_traces
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.logs.read import read_raw
 from drivetwin.shifts.shift import Shift
-from drivetwin.validation.simulate_log import validate
+from drivetwin.validation.simulate_log import simulate_shift
 from tests.observer.conftest import Bench, bench
 from tests.shifts.test_split_gears import CHAIN
 
@@ -33,16 +33,16 @@ def test_traces_are_those_of_the_run(bench: Bench, tmp_path: Path) -> None:
     exact = np.interp(torque.time, bench.motion.time, bench.motion.shaft_torque)
     assert np.sqrt(np.mean((torque.values - exact) ** 2)) < 80.0
     ratio = read["input_speed"].values / read["output_speed"].values
-    held = bench.twin.gear(bench.shift.start_gear).ratio
+    held = bench.twin.get_gear(bench.shift.start_gear).ratio
     assert ratio[0] == pytest.approx(held, rel=1e-9)
 
 
 def test_time_increases_from_shift_to_shift(bench: Bench, tmp_path: Path) -> None:
     """The gear between two shifts is simulated with both of them."""
-    run = validate(bench.twin, bench.log, bench.shift)
+    run = simulate_shift(bench.twin, bench.log, bench.shift)
     runs = [_as(run, shift) for shift in CHAIN[:2]]
     file = tmp_path / "traces.csv"
-    file.write_text(traces_text(runs), encoding="utf-8")
+    file.write_text(format_traces(runs), encoding="utf-8")
     torque = read_raw(file).channels[0]
     assert (np.diff(torque.time) > 0.0).all()
     one, other = (each.trajectory for each in runs)

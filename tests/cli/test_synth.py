@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 
 
@@ -57,7 +57,7 @@ def test_other_formats_hold_the_same_channels(suffix: str, library: str, tmp_pat
         path = tmp_path / name
         assert main(["synth", "-o", str(path), "--scenario", "gearbox_chain"]) == 0
         card = load_card(path.with_suffix(".card.toml"))
-        logs.append((read_log(path, card), find_shifts(read_log(path, card), card)))
+        logs.append((read_log(path, card), detect_shifts(read_log(path, card), card)))
     (table, _), (other, found) = logs
     assert [(s.start_gear, s.end_gear) for s in found.shifts] == [("2", "3"), ("3", "4")]
     assert set(table.channels) == set(other.channels)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.cli.time_left import Remaining, duration
+from drivetwin.cli.time_left import Remaining, format_duration
 
 
 class Clock:
@@ -21,7 +21,7 @@ class Clock:
 def test_a_short_step_shows_no_numbers() -> None:
     clock = Clock()
     line = Remaining("reading", clock)
-    line.hear(0.5, "channels")
+    line.update(0.5, "channels")
     clock.now += 0.9
     assert str(line) == "reading"
 
@@ -30,7 +30,7 @@ def test_time_left_follows_from_the_share_done() -> None:
     clock = Clock()
     line = Remaining("identifying", clock)
     clock.now += 6.0
-    line.hear(0.25, "likelihood")
+    line.update(0.25, "likelihood")
     assert str(line) == "identifying, likelihood: 25 %, about 18 s left"
 
 
@@ -38,10 +38,10 @@ def test_time_left_counts_down_between_two_shares() -> None:
     clock = Clock()
     line = Remaining("identifying", clock)
     clock.now += 10.0
-    line.hear(0.5, "")
+    line.update(0.5, "")
     clock.now += 4.0
     assert str(line) == "identifying: 50 %, about 6 s left"
-    line.hear(0.5, "")
+    line.update(0.5, "")
     clock.now += 30.0
     assert str(line) == "identifying: 50 %, about 1 s left"
 
@@ -51,7 +51,7 @@ def test_without_a_share_the_time_passed_is_shown() -> None:
     line = Remaining("reading", clock)
     clock.now += 4.0
     assert str(line) == "reading: 4 s"
-    line.hear(1.0, "")
+    line.update(1.0, "")
     assert str(line) == "reading: 4 s"
 
 
@@ -60,4 +60,4 @@ def test_without_a_share_the_time_passed_is_shown() -> None:
     [(0.2, "1 s"), (59.4, "59 s"), (61.0, "1 min"), (150.0, "2 min"), (5400.0, "1.5 h")],
 )
 def test_durations_are_rounded_for_people(seconds: float, text: str) -> None:
-    assert duration(seconds) == text
+    assert format_duration(seconds) == text

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.drive import DriveRun, Powertrain, all_kinds, load_powertrain, run
+from drivetwin.drive import DriveRun, Powertrain, load_powertrain, plan_all_shift_kinds, run
 from drivetwin.gearbox import Gearbox, load_gearbox
 
 
@@ -24,4 +24,4 @@ def truck() -> Powertrain:
 @pytest.fixture(scope="session")
 def drive(gearbox: Gearbox, truck: Powertrain) -> DriveRun:
     """Launch to sixth gear, kick-down, up-shift with closed pedal, coast-down."""
-    return run(gearbox, truck, all_kinds(gearbox, truck.control))
+    return run(gearbox, truck, plan_all_shift_kinds(gearbox, truck.control))

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.drive import builtin_powertrains, load_powertrain, suited_powertrain
+from drivetwin.drive import list_builtin_powertrains, load_powertrain, select_powertrain
 from drivetwin.errors import CardError
 from drivetwin.gearbox import load_gearbox
 
 TRUCK = files("drivetwin.drive").joinpath("powertrains", "truck-324kw.toml").read_text("utf-8")
 
 
-@pytest.mark.parametrize("name", builtin_powertrains())
+@pytest.mark.parametrize("name", list_builtin_powertrains())
 def test_built_in_files_load(name: str) -> None:
     assert load_powertrain(name).engine.lag > 0.0
 
@@ -57,5 +57,5 @@ def test_an_unknown_name_lists_the_built_in_ones() -> None:
 
 
 def test_the_suited_engine_is_of_the_card_s_size() -> None:
-    assert suited_powertrain(load_gearbox("three-set-3000")) == "truck-324kw"
-    assert suited_powertrain(load_gearbox("gm-8l90")) == "car-350nm"
+    assert select_powertrain(load_gearbox("three-set-3000")) == "truck-324kw"
+    assert select_powertrain(load_gearbox("gm-8l90")) == "car-350nm"

@@ -15,40 +15,46 @@ from drivetwin.drive import (
     ShiftTo,
     Until,
     Watched,
-    all_kinds,
-    coast_down,
-    launch,
+    plan_all_shift_kinds,
+    plan_coast_down,
+    plan_launch,
 )
-from drivetwin.drive.plan import forward_gears
+from drivetwin.drive.plan import list_forward_gears
 from drivetwin.errors import InputError
 from drivetwin.gearbox import Gearbox, load_gearbox
 
 
 def test_forward_gears_are_ordered_and_without_reverse(gearbox: Gearbox) -> None:
-    assert forward_gears(gearbox) == ("1", "2", "3", "4", "5", "6")
+    assert list_forward_gears(gearbox) == ("1", "2", "3", "4", "5", "6")
 
 
 @pytest.mark.parametrize("name", ["three-set-3000", "simpson-3", "zf-8hp70"])
 def test_all_gears_are_driven_up_and_down(name: str, truck: Powertrain) -> None:
     box = load_gearbox(name)
-    gears = list(forward_gears(box))
-    up = [leg.then.gear for leg in launch(box, truck.control) if isinstance(leg.then, ShiftTo)]
+    gears = list(list_forward_gears(box))
+    up = [leg.then.gear for leg in plan_launch(box, truck.control) if isinstance(leg.then, ShiftTo)]
     down = [
-        leg.then.gear for leg in coast_down(box, truck.control) if isinstance(leg.then, ShiftTo)
+        leg.then.gear
+        for leg in plan_coast_down(box, truck.control)
+        if isinstance(leg.then, ShiftTo)
     ]
     assert up == gears[1:]
     assert down == gears[-2::-1]
 
 
 def test_lock_up_closes_once_and_opens_once(gearbox: Gearbox, truck: Powertrain) -> None:
-    moves = [leg.then for leg in all_kinds(gearbox, truck.control) if isinstance(leg.then, LockUp)]
+    moves = [
+        leg.then
+        for leg in plan_all_shift_kinds(gearbox, truck.control)
+        if isinstance(leg.then, LockUp)
+    ]
     assert moves == [LockUp(closed=True), LockUp(closed=False)]
 
 
 def test_too_few_gears_are_refused(gearbox: Gearbox, truck: Powertrain) -> None:
     short = replace(gearbox, gears=gearbox.gears[:2])
     with pytest.raises(InputError, match="has 2 forward gears"):
-        launch(short, truck.control)
+        plan_launch(short, truck.control)
 
 
 @pytest.mark.parametrize("time", [0.0, -1.0, 600.0, math.nan])

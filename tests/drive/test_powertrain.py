@@ -19,31 +19,33 @@ RPM = math.pi / 30.0
 def test_engine_gives_the_published_torques(
     truck: Powertrain, rpm: float, full: float, motoring: float
 ) -> None:
-    assert truck.engine.steady(1.0, rpm * RPM) == pytest.approx(full)
-    assert truck.engine.steady(0.0, rpm * RPM) == pytest.approx(motoring)
-    assert truck.engine.steady(0.25, rpm * RPM) == pytest.approx(0.25 * full + 0.75 * motoring)
+    assert truck.engine.compute_steady_torque(1.0, rpm * RPM) == pytest.approx(full)
+    assert truck.engine.compute_steady_torque(0.0, rpm * RPM) == pytest.approx(motoring)
+    assert truck.engine.compute_steady_torque(0.25, rpm * RPM) == pytest.approx(
+        0.25 * full + 0.75 * motoring
+    )
 
 
 def test_closed_pedal_holds_idle(truck: Powertrain) -> None:
     idle = truck.engine.idle
-    assert truck.engine.steady(0.0, idle) == pytest.approx(0.0)
-    assert truck.engine.steady(0.0, 0.95 * idle) > 500.0
-    assert truck.engine.steady(0.0, 1.05 * idle) < -50.0
+    assert truck.engine.compute_steady_torque(0.0, idle) == pytest.approx(0.0)
+    assert truck.engine.compute_steady_torque(0.0, 0.95 * idle) > 500.0
+    assert truck.engine.compute_steady_torque(0.0, 1.05 * idle) < -50.0
 
 
 def test_lag_answers_a_ramp_as_first_order(truck: Powertrain) -> None:
     time = np.arange(0.0, 1.0, 1e-3)
     lag, slope = truck.engine.lag, 400.0
     exact = slope * (time - lag * (1.0 - np.exp(-time / lag)))
-    assert np.abs(truck.engine.lagged(time, slope * time) - exact).max() < 1e-9
+    assert np.abs(truck.engine.apply_lag(time, slope * time) - exact).max() < 1e-9
 
 
 def test_converter_takes_the_published_torque_scaled_by_speed_squared(truck: Powertrain) -> None:
     converter, pump = truck.converter, 1000.0 * RPM
-    assert converter.pump_torque(pump, 0.0) == pytest.approx(1.79 * 404.8)
-    assert converter.pump_torque(2.0 * pump, 0.0) == pytest.approx(4.0 * 1.79 * 404.8)
-    assert converter.ratio(pump, 0.5 * pump) == pytest.approx(1.328)
-    assert converter.pump_torque(pump, 1.22 * pump) == pytest.approx(1.79 * -80.0)
+    assert converter.compute_pump_torque(pump, 0.0) == pytest.approx(1.79 * 404.8)
+    assert converter.compute_pump_torque(2.0 * pump, 0.0) == pytest.approx(4.0 * 1.79 * 404.8)
+    assert converter.compute_torque_ratio(pump, 0.5 * pump) == pytest.approx(1.328)
+    assert converter.compute_pump_torque(pump, 1.22 * pump) == pytest.approx(1.79 * -80.0)
 
 
 def test_road_load_is_that_of_the_vehicle(truck: Powertrain) -> None:

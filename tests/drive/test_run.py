@@ -16,27 +16,27 @@ from drivetwin.drive import (
     ShiftTo,
     Until,
     Watched,
-    all_kinds,
-    launch,
     load_powertrain,
+    plan_all_shift_kinds,
+    plan_launch,
     run,
-    suited_powertrain,
+    select_powertrain,
 )
 from drivetwin.drive.network import LOCK_UP
 from drivetwin.drive.result import Maneuver
 from drivetwin.errors import InputError, SimulationError
-from drivetwin.gearbox import Gearbox, gear_statics, load_gearbox
+from drivetwin.gearbox import Gearbox, load_gearbox, solve_gear
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.drive.bus import REFERENCE, candump
 from tests.shifts.fixtures import make_card
 
 
 def test_energy_of_a_launch_to_the_highest_gear_closes(gearbox: Gearbox, truck: Powertrain) -> None:
-    motion = run(gearbox, truck, launch(gearbox, truck.control))
+    motion = run(gearbox, truck, plan_launch(gearbox, truck.control))
     ratio = motion.input_speed[-1] / motion.output_speed[-1]
-    assert ratio == pytest.approx(gear_statics(gearbox, "6").ratio, rel=1e-9)
+    assert ratio == pytest.approx(solve_gear(gearbox, "6").ratio, rel=1e-9)
     assert [each.action.label for each in motion.maneuvers] == [
         "1→2",
         "lock-up",
@@ -50,7 +50,7 @@ def test_energy_of_a_launch_to_the_highest_gear_closes(gearbox: Gearbox, truck: 
 def test_a_drive_begins_without_a_jerk(drive: DriveRun, gearbox: Gearbox) -> None:
     """At rest the shaft carries what the turbine pulls in first gear, from the first instant on."""
     still = drive.time < 0.9
-    pull = drive.turbine_torque[still] * gear_statics(gearbox, "1").ratio
+    pull = drive.turbine_torque[still] * solve_gear(gearbox, "1").ratio
     assert pull.min() > 1000.0
     assert drive.shaft_torque[still] == pytest.approx(pull, rel=0.02)
 
@@ -62,7 +62,7 @@ def test_all_four_kinds_of_shift_end_in_their_gear(drive: DriveRun, gearbox: Gea
         gear = each.action.label.rpartition("→")[2]
         at = np.searchsorted(drive.time, each.action.end)
         ratio = drive.input_speed[at] / drive.output_speed[at]
-        assert ratio == pytest.approx(gear_statics(gearbox, gear).ratio, rel=1e-9)
+        assert ratio == pytest.approx(solve_gear(gearbox, gear).ratio, rel=1e-9)
         assert each.break_away is not None
         assert each.lock is not None
         assert 0.1 < each.lock - each.break_away < 0.7
@@ -130,7 +130,7 @@ def test_converter_goes_from_stall_to_lock_up(drive: DriveRun, truck: Powertrain
 def test_what_has_been_driven_does_not_depend_on_what_follows(
     drive: DriveRun, gearbox: Gearbox, truck: Powertrain
 ) -> None:
-    part = run(gearbox, truck, all_kinds(gearbox, truck.control)[:4])
+    part = run(gearbox, truck, plan_all_shift_kinds(gearbox, truck.control)[:4])
     n = part.time.size
     assert np.array_equal(part.time, drive.time[:n])
     assert np.abs(part.shaft_torque - drive.shaft_torque[:n]).max() < 1e-6
@@ -140,15 +140,15 @@ def test_what_has_been_driven_does_not_depend_on_what_follows(
 @pytest.mark.parametrize("name", ["ravigneaux-4", "zf-8hp70", "three-set-4500wr"])
 def test_other_gearboxes_drive_as_well(name: str) -> None:
     box = load_gearbox(name)
-    chosen = load_powertrain(suited_powertrain(box))
-    motion = run(box, chosen, all_kinds(box, chosen.control))
+    chosen = load_powertrain(select_powertrain(box))
+    motion = run(box, chosen, plan_all_shift_kinds(box, chosen.control))
     assert motion.maneuvers[-1].action.label == "2→1"
     assert abs(motion.audit.error) < 1e-9 * motion.audit.source
 
 
 def test_an_element_that_slips_in_gear_is_named(gearbox: Gearbox, truck: Powertrain) -> None:
     weak = replace(truck, control=replace(truck.control, main=5e5))
-    launching = launch(gearbox, weak.control)
+    launching = plan_launch(gearbox, weak.control)
     plan = (launching[0], replace(launching[1], then=None))
     assert any("C5 slips" in text for text in run(gearbox, weak, plan).warnings)
 
@@ -188,7 +188,7 @@ def test_a_double_transition_is_refused(gearbox: Gearbox, truck: Powertrain) -> 
 def test_a_gearbox_with_dogs_is_refused(name: str, truck: Powertrain) -> None:
     box = load_gearbox(name)
     with pytest.raises(InputError, match="shifts with dogs"):
-        run(box, truck, launch(box, truck.control))
+        run(box, truck, plan_launch(box, truck.control))
 
 
 def test_every_shift_is_found_in_what_the_bus_tells(
@@ -198,15 +198,15 @@ def test_every_shift_is_found_in_what_the_bus_tells(
     log, mapping = tmp_path / "bus.log", tmp_path / "bus.toml"
     log.write_text(candump(drive))
     mapping.write_text(f"[bus]\nreference_torque_Nm = {REFERENCE}\n")
-    card = make_card({gear: gear_statics(gearbox, gear).ratio for gear in "123456"})
-    found = find_shifts(read_log(log, card, mapping), card)
+    card = make_card({gear: solve_gear(gearbox, gear).ratio for gear in "123456"})
+    found = detect_shifts(read_log(log, card, mapping), card)
     made = [each for each in drive.maneuvers if each.action.kind in list(ShiftKind)]
     assert found.rejected == ()
     assert [
         (f"{shift.start_gear}→{shift.end_gear}", str(shift.kind)) for shift in found.shifts
     ] == [(each.action.label, str(each.action.kind)) for each in made]
     for shift, each in zip(found.shifts, made, strict=True):
-        begun = _slip_begun(drive, each, gear_statics(gearbox, shift.start_gear).ratio)
+        begun = _slip_begun(drive, each, solve_gear(gearbox, shift.start_gear).ratio)
         assert shift.inertia_phase == pytest.approx((begun, each.lock), abs=0.05)
 
 

@@ -22,16 +22,16 @@ def test_a_decision_leaves_the_past_as_it_was(
     start: float,
     second: tuple[tuple[float, float], ...],
 ) -> None:
-    before = Schedule({"P": ((0.0, 0.0),)}).go("P", 0.0, *first)
-    after = before.go("P", start, *second)
+    before = Schedule({"P": ((0.0, 0.0),)}).add_knots("P", 0.0, *first)
+    after = before.add_knots("P", start, *second)
     past = np.linspace(0.0, start, 50)
-    assert np.allclose(after.at("P", past), before.at("P", past), rtol=1e-9, atol=1e-6)
-    assert after.at("P", np.array([start + second[-1][0]]))[0] == pytest.approx(second[-1][1])
+    assert np.allclose(after.evaluate("P", past), before.evaluate("P", past), rtol=1e-9, atol=1e-6)
+    assert after.evaluate("P", np.array([start + second[-1][0]]))[0] == pytest.approx(second[-1][1])
 
 
 def test_signals_span_the_time_asked_for() -> None:
-    schedule = Schedule({"P": ((0.0, 1.0),)}).go("P", 2.0, (1.0, 5.0))
+    schedule = Schedule({"P": ((0.0, 1.0),)}).add_knots("P", 2.0, (1.0, 5.0))
     for end, last in ((1.0, 1.0), (2.5, 3.0), (9.0, 5.0)):
-        signal = schedule.signals(end)["P"]
+        signal = schedule.to_signals(end)["P"]
         assert (signal.time[0], signal.time[-1]) == (0.0, end)
         assert signal.values[-1] == pytest.approx(last)

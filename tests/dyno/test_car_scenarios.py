@@ -8,7 +8,7 @@ import tomllib
 import numpy as np
 
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import card_text
+from drivetwin.dyno.files import format_card
 from drivetwin.dyno.scenario_file import load_scenario
 
 
@@ -36,7 +36,7 @@ def test_the_manual_gearbox_has_one_clutch_and_a_gap() -> None:
 
 
 def test_the_card_of_a_manual_gearbox_maps_one_column_to_both_elements() -> None:
-    card = tomllib.loads(card_text(load_scenario("manual")))
+    card = tomllib.loads(format_card(load_scenario("manual")))
     sources = {one["source"] for one in card["channels"]["pressure"].values()}
     assert sources == {"PrsClutch"}
     ratios = [gear["ratio"] for gear in card["gears"]]

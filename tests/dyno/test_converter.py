@@ -22,9 +22,9 @@ def test_the_turbine_torque_moves_the_dual_clutch_as_the_converter_does() -> Non
     assert scenario.converter is not None
     crank = next(each for each in made.channels if each.role == "engine_speed")
     turbine = np.interp(crank.time, motion.time, motion.engine_speed)
-    torque = scenario.converter.converter.turbine_torque(crank.values, turbine)
+    torque = scenario.converter.converter.compute_turbine_torque(crank.values, turbine)
     pressures = {
-        name: Signal(crank.time, actuator.pressure(crank.time))
+        name: Signal(crank.time, actuator.compute_pressure(crank.time))
         for name, actuator in scenario.actuators.items()
     }
     alone = simulate(
@@ -61,8 +61,8 @@ def test_all_inertias_of_the_model_turn_behind_the_converter() -> None:
 def test_the_engine_starts_where_its_torque_is_steady() -> None:
     scenario = load_scenario("open_converter")
     assert scenario.converter is not None
-    engine, turbine = scenario.converter.steady(1545.0, 140.0)
-    assert scenario.converter.converter.pump_torque(engine, 140.0) == pytest.approx(1545.0)
+    engine, turbine = scenario.converter.solve_steady_speed(1545.0, 140.0)
+    assert scenario.converter.converter.compute_pump_torque(engine, 140.0) == pytest.approx(1545.0)
     assert turbine > 1545.0
 
 

@@ -14,7 +14,7 @@ from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.identify import MAP_EXACT
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 
 KINDS = "samples are means"
@@ -25,7 +25,7 @@ def test_noise_that_turbine_and_its_torque_share_is_no_sign_of_means(tmp_path: P
     path, card_path, _ = write_run(tmp_path / "open.csv", made)
     card = load_card(card_path)
     log = read_log(path, card)
-    shifts = find_shifts(log, card)
+    shifts = detect_shifts(log, card)
     found = identify(log, card, shifts)
     # Taken for noise of its own, Q fell by 32 for means of all outputs, and J_prime_2 was 3 σ off.
     assert not [text for text in found.warnings if KINDS in text]

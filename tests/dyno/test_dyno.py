@@ -50,7 +50,7 @@ def test_engine_torque_is_as_old_as_te_delay_says() -> None:
     channel = next(c for c in bench.channels if c.role == "engine_torque")
     delay = bench.truth.parameters["te_delay"]
     assert delay == pytest.approx(0.010)
-    asked = bench.scenario.torque(np.maximum(channel.time - delay, 0.0))
+    asked = bench.scenario.compute_torque(np.maximum(channel.time - delay, 0.0))
     assert np.allclose(channel.values, asked, rtol=1e-9)
 
 

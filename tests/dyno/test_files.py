@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.files import card_text, log_text, truth_text
+from drivetwin.dyno.files import format_card, format_log, format_truth
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.card import load_card
@@ -22,8 +22,8 @@ def bench() -> DynoRun:
 
 
 def test_log_and_card_read_back(bench: DynoRun, tmp_path: Path) -> None:
-    (tmp_path / "run.csv").write_text(log_text(bench), encoding="utf-8")
-    (tmp_path / "card.toml").write_text(card_text(bench.scenario), encoding="utf-8")
+    (tmp_path / "run.csv").write_text(format_log(bench), encoding="utf-8")
+    (tmp_path / "card.toml").write_text(format_card(bench.scenario), encoding="utf-8")
     card = load_card(tmp_path / "card.toml")
     log = read_log(tmp_path / "run.csv", card)
     assert not log.warnings
@@ -36,22 +36,24 @@ def test_log_and_card_read_back(bench: DynoRun, tmp_path: Path) -> None:
 
 def test_held_torque_shows_each_value_for_one_can_period(bench: DynoRun) -> None:
     sent = next(c for c in bench.channels if c.role == "engine_torque")
-    rows = np.array([line.split(",")[1] for line in log_text(bench).splitlines()[2:]], dtype=float)
+    rows = np.array(
+        [line.split(",")[1] for line in format_log(bench).splitlines()[2:]], dtype=float
+    )
     assert np.array_equal(rows[:-1].reshape(-1, 10), np.repeat(sent.values[:-1, None], 10, axis=1))
 
 
 def test_card_knows_the_design(bench: DynoRun, tmp_path: Path) -> None:
-    (tmp_path / "card.toml").write_text(card_text(bench.scenario), encoding="utf-8")
+    (tmp_path / "card.toml").write_text(format_card(bench.scenario), encoding="utf-8")
     card = load_card(tmp_path / "card.toml")
     for element in bench.scenario.model.elements:
-        assert card.clutch_ratios(element.name) == pytest.approx((element.i_c, element.i_out))
+        assert card.get_clutch_ratios(element.name) == pytest.approx((element.i_c, element.i_out))
         assert card.elements[element.name].gain == element.gain
         assert card.elements[element.name].P0.value == pytest.approx(element.P0)
     assert card.final_drive == bench.scenario.model.i_f
 
 
 def test_truth_file_names_parameters_with_units_and_the_run(bench: DynoRun) -> None:
-    truth = json.loads(truth_text(bench))
+    truth = json.loads(format_truth(bench))
     assert truth["parameters"]["J_vehicle"] == {"value": 6056.0, "unit": "kg*m^2"}
     assert truth["friction"]["B3"]["mu_c"] == 0.11
     assert truth["run"]["seed"] == 3

@@ -40,7 +40,7 @@ def test_gears_are_held_between_the_shifts(bench: DynoRun) -> None:
         assert end is not None
         held = (motion.time > begin) & (motion.time < end)
         ratio = motion.engine_speed[held] / motion.output_speed[held]
-        assert np.abs(ratio / scenario.ratio(gear.element) - 1.0).max() < 1e-9
+        assert np.abs(ratio / scenario.get_ratio(gear.element) - 1.0).max() < 1e-9
 
 
 def test_the_on_coming_element_fills_before_it_carries(bench: DynoRun) -> None:
@@ -49,7 +49,7 @@ def test_the_on_coming_element_fills_before_it_carries(bench: DynoRun) -> None:
     actuator = scenario.actuators[scenario.oncoming]
     assert actuator.fill is not None
     time = np.arange(round(1000 * scenario.duration)) / 1000.0
-    pressure, asked = actuator.pressure(time), actuator.command.at(time)
+    pressure, asked = actuator.compute_pressure(time), actuator.command.evaluate(time)
     start = bench.truth.torque_start
     assert start is not None
     before = (time > start - 0.15) & (time < start)
@@ -59,7 +59,7 @@ def test_the_on_coming_element_fills_before_it_carries(bench: DynoRun) -> None:
 
 def test_torque_intervention_acts_in_every_shift() -> None:
     scenario = load_scenario(ScenarioName.GEARBOX_CHAIN)
-    plain, cut = (run(each, noise=0.0) for each in (scenario, scenario.with_torque_reduction(0.3)))
+    plain, cut = (run(each, noise=0.0) for each in (scenario, scenario.set_torque_reduction(0.3)))
     for whole, reduced in zip(plain.truth.shifts, cut.truth.shifts, strict=True):
         assert whole.lockup is not None
         assert reduced.lockup is not None

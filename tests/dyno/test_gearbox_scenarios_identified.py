@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.files import card_text, log_text
+from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 
 SLIPS = np.array([10.0, 30.0, 50.0])
@@ -25,16 +25,16 @@ SEEDS = (1, 2)
 
 def identified(bench: DynoRun, folder: Path, method: Method, *, drums: bool) -> Identification:
     """The identification of a run from its files; without `drums` the card knows of none."""
-    text = card_text(bench.scenario)
+    text = format_card(bench.scenario)
     if not drums:
         stated = f"drum_inertia_kgm2 = {bench.scenario.model.elements[0].drum_inertia}"
         assert stated in text
         text = text.replace(stated, "drum_inertia_kgm2 = 0.0")
-    (folder / "log.csv").write_text(log_text(bench), encoding="utf-8")
+    (folder / "log.csv").write_text(format_log(bench), encoding="utf-8")
     (folder / "card.toml").write_text(text, encoding="utf-8")
     card = load_card(folder / "card.toml")
     log = read_log(folder / "log.csv", card)
-    return identify(log, card, find_shifts(log, card), method)
+    return identify(log, card, detect_shifts(log, card), method)
 
 
 def test_truth_lies_in_the_intervals_where_the_card_states_the_drums(tmp_path: Path) -> None:
@@ -53,7 +53,7 @@ def test_truth_lies_in_the_intervals_where_the_card_states_the_drums(tmp_path: P
             held.append(low <= true <= high)
         curve, law = found.friction["C3"], bench.truth.friction["C3"]
         mu = np.interp(SLIPS, curve.slip, curve.mu)
-        assert np.abs(mu / law.at(SLIPS) - 1.0).max() < 5e-3
+        assert np.abs(mu / law.evaluate(SLIPS) - 1.0).max() < 5e-3
     assert len(held) >= 20
     assert np.mean(held) >= 0.9
 
@@ -73,7 +73,7 @@ def predicted_bias(bench: DynoRun) -> float:
         each.drum_inertia * each.i_out * np.polyfit(time, motion.slip[each.name][inside], 1)[0]
         for each in scenario.model.elements
     )
-    oncoming = scenario.element(scenario.oncoming)
+    oncoming = scenario.get_element(scenario.oncoming)
     torque = motion.clutch_torque[oncoming.name][inside].mean()
     return float(moved / (oncoming.i_out * torque))
 

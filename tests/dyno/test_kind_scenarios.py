@@ -48,7 +48,7 @@ def test_with_the_power_off_the_engine_falls_before_the_upshift_takes_hold() -> 
     fill = made.truth.torque_start
     assert fill is not None
     assert fill > (made.truth.inertia_start or 0.0)
-    demand = made.scenario.torque(np.array([2.2]))
+    demand = made.scenario.compute_torque(np.array([2.2]))
     assert demand[0] < 0.0
 
 

@@ -10,11 +10,11 @@ import pytest
 
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.plant import Surroundings, form_of, plant_of
+from drivetwin.dyno.plant import Surroundings, build_form, build_plant
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import ReductionError
-from drivetwin.gearbox import gear_statics, load_gearbox, reduce
+from drivetwin.gearbox import load_gearbox, reduce, solve_gear
 from drivetwin.simulation import dual_clutch
 from drivetwin.simulation.dual_clutch import FloatArray, Signal, Trajectory
 
@@ -48,11 +48,11 @@ def test_the_drum_of_an_open_element_that_is_no_shift_element_breaks_the_form() 
     scenario = load_scenario(ScenarioName.GEARBOX)
     assert scenario.plant is not None
     box = scenario.plant.gearbox
-    heavy = plant_of(replace(box, inertias={**box.inertias, "R3-C2": 0.2}), scenario.plant.gears)
+    heavy = build_plant(replace(box, inertias={**box.inertias, "R3-C2": 0.2}), scenario.plant.gears)
     assert "R3-C2" in [each.member for each in reduce(heavy.gearbox, "2", "3").violations]
     light = scenario.model
     fields = ("J1", "eta", "i_f", "J_v", "k_o", "c_o", "load")
-    form = form_of(heavy, Surroundings(**{name: getattr(light, name) for name in fields}))
+    form = build_form(heavy, Surroundings(**{name: getattr(light, name) for name in fields}))
     assert form.J_out > light.J_out
     assert form.J2e > light.J2e
     whole, reduced = both(replace(scenario, model=form, plant=heavy))
@@ -66,7 +66,7 @@ def test_inertia_of_a_gear_is_the_kinetic_energy_of_its_members() -> None:
     box, model = scenario.plant.gearbox, scenario.model
     truth = run(scenario, noise=0.0).truth.parameters
     for gear in ("2", "3", "4"):
-        speeds = gear_statics(box, gear).speeds
+        speeds = solve_gear(box, gear).speeds
         members = sum(
             inertia * (speeds[member] or 0.0) ** 2
             for member, inertia in box.inertias.items()
@@ -84,7 +84,7 @@ def test_what_is_simulated_starts_without_a_jerk() -> None:
 
 def test_double_transitions_have_no_plant() -> None:
     with pytest.raises(ReductionError, match="not one element off and one on"):
-        plant_of(load_gearbox("three-set-4000cr"), ("2", "5"))
+        build_plant(load_gearbox("three-set-4000cr"), ("2", "5"))
 
 
 def test_a_form_is_a_driveline_that_runs() -> None:

@@ -13,7 +13,7 @@ from drivetwin.errors import InputError
 def test_torque_comes_down_and_back_by_ramps() -> None:
     reduction = TorqueReduction(0.4, start=1.0, end=1.5, ramp=0.1)
     time = np.array([0.9, 1.0, 1.05, 1.1, 1.5, 1.55, 1.6, 2.0])
-    assert np.allclose(reduction.factor(time), [1.0, 1.0, 0.8, 0.6, 0.6, 0.8, 1.0, 1.0])
+    assert np.allclose(reduction.compute_factor(time), [1.0, 1.0, 0.8, 0.6, 0.6, 0.8, 1.0, 1.0])
 
 
 @pytest.mark.parametrize("fraction", [-0.1, 1.0, 30.0])

@@ -9,7 +9,7 @@ import pytest
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.dyno.truth import lockup_oscillation
+from drivetwin.dyno.truth import compute_lockup_oscillation
 from drivetwin.errors import InputError
 
 DUAL = (ScenarioName.PAPER, ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS)
@@ -81,13 +81,13 @@ def test_lockup_oscillation_rings_at_its_closed_form_frequency(bench: DynoRun) -
     rising = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
     crossings = t[rising] - y[rising] * (t[rising + 1] - t[rising]) / (y[rising + 1] - y[rising])
     scenario = bench.scenario
-    frequency, _ = lockup_oscillation(scenario.model, scenario.ratio(scenario.oncoming))
+    frequency, _ = compute_lockup_oscillation(scenario.model, scenario.get_ratio(scenario.oncoming))
     assert 1.0 / np.mean(np.diff(crossings)) == pytest.approx(frequency, rel=0.02)
 
 
 def test_torque_reduction_shortens_the_inertia_phase() -> None:
     whole = load_scenario("paper")
-    reduced = whole.with_torque_reduction(0.4)
+    reduced = whole.set_torque_reduction(0.4)
     plain, cut = (run(scenario, noise=0.0) for scenario in (whole, reduced))
     torque = next(c for c in cut.channels if c.role == "engine_torque")
     assert torque.values.min() == pytest.approx(0.6 * 1545.0)

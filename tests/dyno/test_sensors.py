@@ -16,7 +16,7 @@ def _sensor(rate: float = 100.0, noise: float = 3.0, resolution: float = 0.0) ->
 
 @pytest.mark.parametrize(("rate", "count"), [(1000.0, 5001), (100.0, 501), (30.0, 151)])
 def test_stamps_are_multiples_of_the_period_up_to_the_end(rate: float, count: int) -> None:
-    stamps = _sensor(rate).stamps(5.0)
+    stamps = _sensor(rate).compute_stamps(5.0)
     assert stamps.size == count
     assert stamps[-1] <= 5.0
     assert np.allclose(np.diff(stamps), 1.0 / rate, rtol=1e-12)

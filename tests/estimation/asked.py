@@ -15,9 +15,9 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.fit import spread_of
+from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.result.method import Method
 from drivetwin.pipeline import identify
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -48,7 +48,7 @@ def record_log(scenario: str, P0_std: float = 0.0) -> tuple[ShiftLog, VehicleCar
 
 def _identified(scenario: str, method: Method, P0_std: float = 0.0) -> Identification:
     log, card = record_log(scenario, P0_std)
-    return identify(log, card, drivetwin.find_shifts(log, card), method)
+    return identify(log, card, drivetwin.detect_shifts(log, card), method)
 
 
 @shared
@@ -77,12 +77,12 @@ def by_the_paper() -> Identification:
 
 def slowed(found: Identification) -> Identification:
     """The same, if its residuals were those of sensors behind a filter of some 20 ms."""
-    fit, _ = likelihood_of(found)
+    fit, _ = get_likelihood_fit(found)
     rng = np.random.default_rng(2)
     residuals = tuple(
         part.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], rng.normal(size=part.record.size))
         for part in fit.problem.parts
     )
     normal = replace(fit.normal, residuals=residuals)
-    wide = replace(fit, normal=normal, covariance=spread_of(fit.problem, normal, fit.chi2))
+    wide = replace(fit, normal=normal, covariance=compute_covariance(fit.problem, normal, fit.chi2))
     return replace(found, evidence=replace(found.evidence, likelihood=wide))

@@ -13,8 +13,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.noise import resolution, white_noise
-from drivetwin.estimation.data.shift_data import Coupling, Driveline, Sampled, ShiftSignals
+from drivetwin.estimation.data.noise import estimate_resolution, estimate_white_noise
+from drivetwin.estimation.data.shift_data import (
+    KnownDriveline,
+    MeasuredSignal,
+    ShiftElementKinematics,
+    ShiftSignals,
+)
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
@@ -49,12 +54,16 @@ class Truth:
         s = abs(slip)
         return self.mu_c + (self.mu_s - self.mu_c) * float(np.exp(-s / self.v_s)) + self.mu_v * s
 
-    def driveline(self, J_out_std: float = 0.0, P0_std: float = 0.0) -> Driveline:
+    def driveline(self, J_out_std: float = 0.0, P0_std: float = 0.0) -> KnownDriveline:
         """What the estimators are told."""
         P0 = PriorValue(self.P0, P0_std)
-        a = Coupling("B2", 1.0 / (self.i_a - 1.0), self.i_a / (self.i_a - 1.0), self.gain_a, P0)
-        b = Coupling("B3", 1.0 / (self.i_b - 1.0), self.i_b / (self.i_b - 1.0), self.gain_b, P0)
-        return Driveline(self.i_f, a, b, {"B2": a, "B3": b}, PriorValue(self.J_out, J_out_std))
+        a = ShiftElementKinematics(
+            "B2", 1.0 / (self.i_a - 1.0), self.i_a / (self.i_a - 1.0), self.gain_a, P0
+        )
+        b = ShiftElementKinematics(
+            "B3", 1.0 / (self.i_b - 1.0), self.i_b / (self.i_b - 1.0), self.gain_b, P0
+        )
+        return KnownDriveline(self.i_f, a, b, {"B2": a, "B3": b}, PriorValue(self.J_out, J_out_std))
 
 
 @dataclass(frozen=True)
@@ -130,7 +139,7 @@ class Run:
         c = self.columns
         level = {"engine_torque": 5.0, "output_torque": 30.0, "engine_speed": 0.05}
         level |= {"output_speed": 0.03, "wheel_speed": 0.006, "B2": 7e3, "B3": 7e3}
-        s = {name: Sampled(self.time, c[name], level[name]) for name in level}
+        s = {name: MeasuredSignal(self.time, c[name], level[name]) for name in level}
         return self._pack(s, 0.0)
 
     def noisy(
@@ -145,15 +154,15 @@ class Run:
         s = {}
         for name, sigma in level.items():
             values = self.columns[name] + sigma * rng.standard_normal(self.time.size)
-            s[name] = Sampled(self.time, values, white_noise(values))
+            s[name] = MeasuredSignal(self.time, values, estimate_white_noise(values))
         fresh = self.time[::10]
         torque = np.array([self.manoeuvre.engine_torque(t - age) for t in fresh])
         torque = step * np.round((torque + 4.0 * rng.standard_normal(fresh.size)) / step)
-        sigma = max(white_noise(torque), step / np.sqrt(12.0))
-        s["engine_torque"] = Sampled(fresh, torque, sigma)
-        return self._pack(s, resolution(torque))
+        sigma = max(estimate_white_noise(torque), step / np.sqrt(12.0))
+        s["engine_torque"] = MeasuredSignal(fresh, torque, sigma)
+        return self._pack(s, estimate_resolution(torque))
 
-    def _pack(self, s: dict[str, Sampled], step: float) -> ShiftSignals:
+    def _pack(self, s: dict[str, MeasuredSignal], step: float) -> ShiftSignals:
         m = self.manoeuvre
         shift = Shift(
             "2",

@@ -12,18 +12,18 @@ import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError, NoShiftError
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.data.prepare import driveline_of
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
+from drivetwin.estimation.data.prepare import build_driveline
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import ALL_BEFORE_LOSS
-from drivetwin.estimation.likelihood.estimates import WITH_ETA, conclude
+from drivetwin.estimation.likelihood.estimates import WITH_ETA, build_estimates
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import FoundShifts, find_shifts
+from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -39,7 +39,7 @@ def recording(name: str) -> tuple[ShiftLog, VehicleCard, FoundShifts]:
         pytest.skip(f"{path.name} is not beside the repository")
     card = load_card(ROOT / "examples" / "vehicles" / f"{name}.toml")
     log = read_log(path, card)
-    return log, card, find_shifts(log, card)
+    return log, card, detect_shifts(log, card)
 
 
 @cache
@@ -77,7 +77,7 @@ def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
     def gives_up(*_: object) -> None:
         raise IdentificationError("the search crawls", "drive on")
 
-    monkeypatch.setattr("drivetwin.estimation.identify.likelihood", gives_up)
+    monkeypatch.setattr("drivetwin.estimation.identify.estimate_likelihood", gives_up)
     found = identify(*recording("paper_like"), Method.LIKELIHOOD)
     assert found.method is Method.INTEGRAL
     assert found.evidence.gave_up == "the search crawls"
@@ -86,7 +86,7 @@ def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
     assert found.estimates["J_vehicle"].value == integral.estimates["J_vehicle"].value
     assert integral.evidence.gave_up == ""
     with pytest.raises(IdentificationError, match=r"gave up on this log.*the search crawls"):
-        likelihood_of(found)
+        get_likelihood_fit(found)
 
 
 def _held_briefly(before: float, after: float) -> tuple[ShiftLog, VehicleCard, FoundShifts]:
@@ -122,7 +122,7 @@ def test_where_neither_method_finds_anything_the_linear_one_says_what_to_record(
     def gives_up(*_: object) -> None:
         raise IdentificationError("the search crawls", "drive on")
 
-    monkeypatch.setattr("drivetwin.estimation.identify.likelihood_alone", gives_up)
+    monkeypatch.setattr("drivetwin.estimation.identify.estimate_without_linear", gives_up)
     with pytest.raises(IdentificationError, match=r"no 0\.4 s of held gear") as caught:
         identify(*_held_briefly(0.2, 0.2), Method.LIKELIHOOD)
     assert "record at least a second" in caught.value.remedy
@@ -183,7 +183,7 @@ def test_the_default_method_agrees_with_the_linear_one_and_knows_more() -> None:
         assert new.std_noise < old.std_noise, name
         assert abs(new.value - old.value) < 4.0 * old.std_noise, name
     assert found.estimates["J_out"].method == "likelihood with design prior"
-    assert likelihood_of(found)[0].chi2 == pytest.approx(1.0, abs=0.05)
+    assert get_likelihood_fit(found)[0].chi2 == pytest.approx(1.0, abs=0.05)
 
 
 def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
@@ -192,7 +192,9 @@ def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
     def fail(*_: object, **__: object) -> None:
         raise IdentificationError("the simulation went astray", "nothing")
 
-    monkeypatch.setattr("drivetwin.estimation.likelihood.selection.select_model.fit", fail)
+    monkeypatch.setattr(
+        "drivetwin.estimation.likelihood.selection.select_model.fit_multistart", fail
+    )
     found = identify(*recording("truck_a"), Method.LIKELIHOOD)
     assert found.method is Method.INTEGRAL
     assert any("went astray" in text for text in found.warnings)
@@ -273,9 +275,9 @@ def test_without_an_output_torque_ratios_are_told_and_absolute_values_refused() 
 def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> None:
     """With η on the card the absolute values are told, and η's spread is their systematic part."""
     known = replace(card, known={"eta": PriorValue(0.9, 0.02)})
-    driveline = driveline_of(known, found.shifts[0])
-    fit, signals = likelihood_of(found)
-    told = conclude(fit, signals, [driveline], {}, {}).estimates
+    driveline = build_driveline(known, found.shifts[0])
+    fit, signals = get_likelihood_fit(found)
+    told = build_estimates(fit, signals, [driveline], {}, {}).estimates
     ratio = found.estimates["J_vehicle_over_eta"]
     assert ratio.value is not None
     assert told["J_vehicle"].value == pytest.approx(0.9 * ratio.value)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.export.subject import Subject, steady_start
+from drivetwin.export.subject import Subject, compute_steady_start
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
@@ -65,7 +65,7 @@ def paper_model() -> DualClutch:
 def paper_subject() -> Subject:
     """The driveline of the paper, steady in its lower gear."""
     model = paper_model()
-    return Subject("paper 2-3", model, steady_start(model, "B2", 178.0), "published values")
+    return Subject("paper 2-3", model, compute_steady_start(model, "B2", 178.0), "published values")
 
 
 def own(name: str) -> Case:

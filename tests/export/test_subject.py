@@ -9,35 +9,35 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.export.fixed_step import InputKind, stepped_run
-from drivetwin.export.subject import steady_start, subject_of
+from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.subject import build_subject, compute_steady_start
 from drivetwin.simulation.dual_clutch import RoadLoad
 from tests.export.cases import paper_model
 from tests.export.parameters.sample import twin
 
 
 def test_the_first_shift_with_a_friction_curve_is_taken() -> None:
-    subject = subject_of(twin())
+    subject = build_subject(twin())
     assert subject.name.endswith("2-3")
     assert [element.name for element in subject.model.elements] == ["B2", "B3"]
     assert subject.start.locked == ("B2",)
-    same = subject_of(twin(), ("2", "3"))
+    same = build_subject(twin(), ("2", "3"))
     assert same == subject
 
 
 def test_unknown_or_impossible_shifts_are_refused() -> None:
     with pytest.raises(InputError, match="knows no gear '9'"):
-        subject_of(twin(), ("2", "9"))
+        build_subject(twin(), ("2", "9"))
     with pytest.raises(InputError, match="held by the same element"):
-        subject_of(twin(), ("2", "2"))
+        build_subject(twin(), ("2", "2"))
     bare = replace(twin(), friction={})
     with pytest.raises(InputError, match="known friction curve"):
-        subject_of(bare)
+        build_subject(bare)
 
 
 def test_rolling_resistance_opposes_the_motion() -> None:
     model = replace(paper_model(), load=RoadLoad(rolling=8000.0, aero=20.0))
-    ahead, back = (steady_start(model, "B2", speed).twist for speed in (150.0, -150.0))
+    ahead, back = (compute_steady_start(model, "B2", speed).twist for speed in (150.0, -150.0))
     wheel = 150.0 / 1.91 / model.i_f
     assert ahead == pytest.approx((8000.0 + 20.0 * wheel**2) / model.i_f / model.k_o)
     assert back == -ahead
@@ -46,10 +46,10 @@ def test_rolling_resistance_opposes_the_motion() -> None:
 def test_a_steady_start_is_steady() -> None:
     """With the engine torque that carries the load nothing accelerates."""
     model = paper_model()
-    start = steady_start(model, "B2", 150.0)
+    start = compute_steady_start(model, "B2", 150.0)
     torque = model.load.constant / model.i_f / 1.91 / model.eta
     time = np.linspace(0.0, 0.5, 51)
     inputs = np.column_stack([np.full(51, torque), np.full(51, 14e5), np.zeros(51)])
-    run = stepped_run(model, start, time, inputs, InputKind.LINEAR)
+    run = run_fixed_step(model, start, time, inputs, InputKind.LINEAR)
     assert np.abs(run.engine_speed - 150.0).max() < 1e-9
     assert np.abs(run.shaft_torque - 2300.0).max() < 1e-6

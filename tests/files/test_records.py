@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.estimation.analysis.experiment_design import suggest
+from drivetwin.estimation.analysis.experiment_design import compute_rankings
 from drivetwin.files.result_file import ResultFile
 from tests.estimation.asked import still
 
 
 def test_what_would_narrow_an_open_parameter_stands_in_the_result() -> None:
     found = still()
-    told = suggest(found)
+    told = compute_rankings(found)
     made = ResultFile.from_result(
         replace(found, evidence=replace(found.evidence, suggestions=told))
     )

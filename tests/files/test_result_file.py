@@ -80,7 +80,7 @@ def test_round_trip(tmp_path: Path) -> None:
     save_result(tmp_path / "result.json", found)
     back = load_result(tmp_path / "result.json")
     assert back == ResultFile.from_result(found)
-    assert back.parameters["k_o"].estimate("k_o").std_total == pytest.approx(
+    assert back.parameters["k_o"].to_estimate("k_o").std_total == pytest.approx(
         found.estimates["k_o"].std_total
     )
 

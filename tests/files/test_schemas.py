@@ -14,11 +14,11 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from drivetwin.channels.mapping import ChannelSpec
-from drivetwin.channels.mapping_file import mapping_text
-from drivetwin.export.parameters.json_file import json_text
-from drivetwin.export.parameters.of_twin import parameters_of
+from drivetwin.channels.mapping_file import format_mapping
+from drivetwin.export.parameters.json_file import format_json
+from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.files.result_file import ResultFile
-from drivetwin.files.schemas import FileKind, json_schema
+from drivetwin.files.schemas import FileKind, build_json_schema
 from drivetwin.files.twin_conversion import save_twin
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
@@ -48,7 +48,7 @@ def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
         case FileKind.RESULT:
             yield json.loads(ResultFile.from_result(sample.identification()).to_json())
         case FileKind.PARAMETERS:
-            yield json.loads(json_text(parameters_of(twin())))
+            yield json.loads(format_json(collect_parameters(twin())))
         case _:
             yield from (tomllib.loads(text) for text in _toml(kind, folder))
 
@@ -62,7 +62,7 @@ def _toml(kind: FileKind, folder: Path) -> list[str]:
         case FileKind.POWERTRAIN:
             return toml_files(PACKAGE / "drive" / "powertrains")
         case FileKind.CHANNEL_MAPPING:
-            written = mapping_text({"pressure.B2": ChannelSpec("p2", unit="bar", sign=-1)})
+            written = format_mapping({"pressure.B2": ChannelSpec("p2", unit="bar", sign=-1)})
             return [written, *fenced(REFERENCE / "channel-mapping.md", "toml")]
         case FileKind.FLEET_RULES:
             return fenced(ROOT / "docs" / "howto" / "fleet.md", "toml")[:1]
@@ -75,7 +75,7 @@ def _toml(kind: FileKind, folder: Path) -> list[str]:
 def test_files_of_the_program_fit_their_schema_and_a_wrong_key_does_not(
     kind: FileKind, tmp_path: Path
 ) -> None:
-    schema = json_schema(kind)
+    schema = build_json_schema(kind)
     Draft202012Validator.check_schema(schema)
     validator = Draft202012Validator(schema)
     found = list(documents(kind, tmp_path))
@@ -92,4 +92,4 @@ def test_the_page_lists_every_kind() -> None:
 
 def test_a_kind_that_does_not_exist_is_refused() -> None:
     with pytest.raises(ValueError, match="card"):
-        json_schema("card")
+        build_json_schema("card")

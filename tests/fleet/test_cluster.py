@@ -19,7 +19,7 @@ import pytest
 from drivetwin.errors import SchedulerError
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.cluster import DaskPool
-from drivetwin.fleet.task import Recipe, Task, WorkerSpec
+from drivetwin.fleet.task import Task, TaskSpec, WorkerSpec
 from tests.fleet.test_coordinator_faults import COUNT, takes_long, undisturbed
 from tests.fleet.toys import ROOT, contents, make_logs
 
@@ -130,7 +130,7 @@ def test_tasks_of_two_runs_have_no_key_in_common(monkeypatch: pytest.MonkeyPatch
             return Future()
 
     monkeypatch.setattr(DaskPool, "_connect", lambda *_: Client())
-    recipe = Recipe("card", None, Method.PAPER, (), "1")
+    recipe = TaskSpec("card", None, Method.PAPER, (), "1")
     for store in ("one", "other"):
         pool = DaskPool("tcp://nowhere", WorkerSpec(), lambda _: None)
         pool.submit(Task("0123", "log", "content", recipe, f"{store}/0123.parquet"))

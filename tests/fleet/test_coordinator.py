@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.errors import StoreError
 from drivetwin.estimation.result.method import Method
-from drivetwin.fleet.coordinator import Wishes
+from drivetwin.fleet.coordinator import RunOptions
 from drivetwin.fleet.events import Started, Summary
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State, WorkerSpec
@@ -74,7 +74,7 @@ def test_what_hangs_eats_or_kills_is_quarantined_with_its_reason(tmp_path: Path)
     spoilt = ["hang", "eat", "die"]
     logs, store = make_logs(tmp_path / "logs", 8, spoilt=spoilt), tmp_path / "store"
     spec = WorkerSpec("tests.fleet.work:toy", replace(LIMITS, seconds=2.0))
-    summary, events = run_toys(logs, store, worker=spec, wishes=Wishes(attempts=2))
+    summary, events = run_toys(logs, store, worker=spec, wishes=RunOptions(attempts=2))
     assert (summary.done, summary.quarantined) == (5, 3)
     assert summary.failures == {"TimeLimit": 1, "MemoryLimit": 1, "WorkerLost": 1}
     for number, error in enumerate(("TimeLimit", "MemoryLimit", "WorkerLost")):
@@ -91,9 +91,9 @@ def test_what_hangs_eats_or_kills_is_quarantined_with_its_reason(tmp_path: Path)
 
 def test_quarantine_is_left_when_asked_for(tmp_path: Path) -> None:
     logs, store = make_logs(tmp_path / "logs", 2, spoilt=["die"]), tmp_path / "store"
-    assert run_toys(logs, store, wishes=Wishes(attempts=1))[0].quarantined == 1
-    assert run_toys(logs, store, wishes=Wishes(attempts=1))[0].computed == 0
-    again, _ = run_toys(logs, store, wishes=Wishes(attempts=1, retry=True))
+    assert run_toys(logs, store, wishes=RunOptions(attempts=1))[0].quarantined == 1
+    assert run_toys(logs, store, wishes=RunOptions(attempts=1))[0].computed == 0
+    again, _ = run_toys(logs, store, wishes=RunOptions(attempts=1, retry=True))
     assert (again.computed, again.quarantined) == (1, 1)
 
 

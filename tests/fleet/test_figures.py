@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.fleet.figures import drift_figure, unit_label, units_figure
+from drivetwin.fleet.figures import format_unit, plot_drift, plot_units
 from drivetwin.fleet.mixed_model.result import (
     Change,
     Drift,
@@ -37,7 +37,7 @@ def one() -> JointEstimate:
 
 
 def test_every_log_is_drawn_and_the_line_goes_through_the_reference(one: JointEstimate) -> None:
-    figure = drift_figure(one)
+    figure = plot_drift(one)
     traces = {trace.name: trace for trace in figure.data}
     assert list(traces["log"].x) == [0.0, 50.0]
     assert list(traces["unit that changed, from there"].x) == [150.0]
@@ -53,13 +53,13 @@ def test_every_log_is_drawn_and_the_line_goes_through_the_reference(one: JointEs
 
 def test_dates_are_drawn_as_dates(one: JointEstimate) -> None:
     dated = replace(one, drifts=(replace(one.drifts[0], field="date"),), changes=())
-    first = drift_figure(dated).data[0]
+    first = plot_drift(dated).data[0]
     assert str(first.x[0]).startswith("1970-01-01")
 
 
 def test_units_are_sorted_and_odd_ones_stand_out(one: JointEstimate) -> None:
-    usual, odd = units_figure(one).data
+    usual, odd = plot_units(one).data
     assert list(usual.text) == ["a", "b"]
     assert list(odd.text) == ["b from 120"]
     assert odd.y[0] == pytest.approx(0.09)
-    assert unit_label(one, one.units[0]) == "a"
+    assert format_unit(one, one.units[0]) == "a"

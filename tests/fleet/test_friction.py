@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.fleet import parts
-from drivetwin.fleet.friction import fleet_friction
+from drivetwin.fleet.friction import compute_fleet_friction
 from drivetwin.fleet.rows import Row, RowKind
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import Outcome, State
@@ -22,10 +22,10 @@ def test_the_middle_and_the_band_are_those_of_the_logs(tmp_path: Path) -> None:
             slips = np.linspace(5.0 + 0.01 * number, 100.0 - 0.3 * number, 30)
             level = 0.1 + 1e-4 * number
             rows = [Row(RowKind.FRICTION, "B3", level + 1e-4 * slip, at=slip) for slip in slips]
-            parts.write_part(store.part(log), log, Outcome(State.DONE), rows)
-            store.index.put_waiting(log, "c", "s", "v")
-            store.index.put_outcome(log, Outcome(State.DONE), 1.0)
-        curve = fleet_friction(store)["B3"]
+            parts.write_part(store.get_part_path(log), log, Outcome(State.DONE), rows)
+            store.index.add_waiting_log(log, "c", "s", "v")
+            store.index.set_outcome(log, Outcome(State.DONE), 1.0)
+        curve = compute_fleet_friction(store)["B3"]
     inside = (curve.slip > 10.0) & (curve.slip < 69.0)
     assert np.count_nonzero(inside) > 10
     law = 1e-4 * curve.slip[inside]
@@ -36,4 +36,4 @@ def test_the_middle_and_the_band_are_those_of_the_logs(tmp_path: Path) -> None:
 
 def test_a_store_without_friction_has_no_curve(tmp_path: Path) -> None:
     with Store(tmp_path, write=True) as store:
-        assert fleet_friction(store) == {}
+        assert compute_fleet_friction(store) == {}

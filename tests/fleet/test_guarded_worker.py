@@ -11,25 +11,25 @@ import pytest
 
 from drivetwin._util.version import program_version
 from drivetwin.estimation.result.method import Method
-from drivetwin.fleet.guarded_worker import Cell
+from drivetwin.fleet.guarded_worker import GuardedWorker
 from drivetwin.fleet.task import (
-    Finished,
+    Aborted,
+    Completed,
     Limits,
-    Lost,
-    Recipe,
     ShiftRow,
     State,
-    Stopped,
     Task,
+    TaskSpec,
+    WorkerLost,
     WorkerSpec,
 )
 from tests.fleet.toys import LIMITS
 
 
 @pytest.fixture
-def cell() -> Iterator[Cell]:
+def cell() -> Iterator[GuardedWorker]:
     """A cell whose worker does the toy."""
-    made = Cell(WorkerSpec("tests.fleet.work:toy", LIMITS))
+    made = GuardedWorker(WorkerSpec("tests.fleet.work:toy", LIMITS))
     yield made
     made.close()
 
@@ -37,7 +37,7 @@ def cell() -> Iterator[Cell]:
 def _task(folder: Path, text: str) -> Task:
     path = folder / "log.csv"
     path.write_text(text)
-    recipe = Recipe("card", None, Method.PAPER, (("vehicle", "00"),), program_version())
+    recipe = TaskSpec("card", None, Method.PAPER, (("vehicle", "00"),), program_version())
     return Task("0123", str(path), "content", recipe, str(folder / "part.parquet"))
 
 
@@ -46,69 +46,77 @@ def test_tasks_survive_the_way_to_the_worker(tmp_path: Path) -> None:
     assert Task.from_json(task.to_json()) == task
 
 
-def test_a_worker_does_one_log_after_the_other(cell: Cell, tmp_path: Path) -> None:
+def test_a_worker_does_one_log_after_the_other(cell: GuardedWorker, tmp_path: Path) -> None:
     first = cell.run(_task(tmp_path, "one two"))
-    assert isinstance(first, Finished)
+    assert isinstance(first, Completed)
     assert first.outcome.state is State.DONE
     assert first.outcome.shifts == (ShiftRow(True, 0.0, 2.0, "2", "3"),)
     second = cell.run(_task(tmp_path, "bad one"))
-    assert isinstance(second, Finished)
+    assert isinstance(second, Completed)
     assert (second.outcome.state, second.outcome.error) == (State.BAD, "FileFormatError")
 
 
-def test_what_a_function_prints_is_not_taken_for_an_answer(cell: Cell, tmp_path: Path) -> None:
-    assert isinstance(cell.run(_task(tmp_path, "print")), Finished)
+def test_what_a_function_prints_is_not_taken_for_an_answer(
+    cell: GuardedWorker, tmp_path: Path
+) -> None:
+    assert isinstance(cell.run(_task(tmp_path, "print")), Completed)
 
 
 def test_a_worker_behind_dask_keeps_the_memory_that_it_has(
-    cell: Cell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cell: GuardedWorker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "65536")
     reply = cell.run(_task(tmp_path, "one environment"))
-    assert isinstance(reply, Finished)
+    assert isinstance(reply, Completed)
     assert reply.outcome.shifts == (ShiftRow(True, 0.0, 2.0, "2", "3"),)
 
 
-def test_a_fault_that_nobody_thought_of_is_the_logs(cell: Cell, tmp_path: Path) -> None:
+def test_a_fault_that_nobody_thought_of_is_the_logs(cell: GuardedWorker, tmp_path: Path) -> None:
     reply = cell.run(_task(tmp_path, ""))
-    assert isinstance(reply, Finished)
+    assert isinstance(reply, Completed)
     assert (reply.outcome.state, reply.outcome.error) == (State.BAD, "IndexError")
 
 
-def test_a_killed_worker_is_lost_and_the_next_one_works(cell: Cell, tmp_path: Path) -> None:
+def test_a_killed_worker_is_lost_and_the_next_one_works(
+    cell: GuardedWorker, tmp_path: Path
+) -> None:
     reply = cell.run(_task(tmp_path, "die"))
-    assert isinstance(reply, Lost)
+    assert isinstance(reply, WorkerLost)
     assert "SIGKILL" in reply.reason
-    assert isinstance(cell.run(_task(tmp_path, "one")), Finished)
+    assert isinstance(cell.run(_task(tmp_path, "one")), Completed)
 
 
-def test_a_part_that_cannot_be_written_stops_all(cell: Cell, tmp_path: Path) -> None:
+def test_a_part_that_cannot_be_written_stops_all(cell: GuardedWorker, tmp_path: Path) -> None:
     task = replace(_task(tmp_path, "one"), part=str(tmp_path / "log.csv" / "part.parquet"))
     reply = cell.run(task)
-    assert isinstance(reply, Stopped)
+    assert isinstance(reply, Aborted)
     assert "cannot write" in reply.what
 
 
-def test_a_log_whose_drive_fails_stops_nobody_and_is_no_bad_log(cell: Cell, tmp_path: Path) -> None:
+def test_a_log_whose_drive_fails_stops_nobody_and_is_no_bad_log(
+    cell: GuardedWorker, tmp_path: Path
+) -> None:
     task = _task(tmp_path, "one unread")
     reply = cell.run(task)
-    assert isinstance(reply, Finished)
+    assert isinstance(reply, Completed)
     assert (reply.outcome.state, reply.outcome.error) == (State.QUARANTINED, "OSError")
     assert "Input/output error" in reply.outcome.what
     assert "--retry" in reply.outcome.remedy
     assert not Path(task.part).exists()
 
 
-def test_another_version_is_not_mixed_in(cell: Cell, tmp_path: Path) -> None:
+def test_another_version_is_not_mixed_in(cell: GuardedWorker, tmp_path: Path) -> None:
     task = _task(tmp_path, "one")
     other = replace(task, recipe=replace(task.recipe, version="0.0.0+other"))
     reply = cell.run(other)
-    assert isinstance(reply, Stopped)
+    assert isinstance(reply, Aborted)
     assert "0.0.0+other" in reply.what
     assert not Path(task.part).exists()
 
 
 def test_a_worker_that_is_told_a_wrong_function_says_so(tmp_path: Path) -> None:
-    reply = Cell(WorkerSpec("tests.fleet.work:nothing", Limits())).run(_task(tmp_path, "one"))
-    assert isinstance(reply, Stopped)
+    reply = GuardedWorker(WorkerSpec("tests.fleet.work:nothing", Limits())).run(
+        _task(tmp_path, "one")
+    )
+    assert isinstance(reply, Aborted)
     assert "nothing" in reply.what

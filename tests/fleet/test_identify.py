@@ -17,8 +17,8 @@ from drivetwin.errors import FileFormatError, StoreError
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.identify import identify_log
 from drivetwin.fleet.rows import RowKind
-from drivetwin.fleet.scan import inputs_of
-from drivetwin.fleet.task import Recipe, Task
+from drivetwin.fleet.scan import compute_input_hashes
+from drivetwin.fleet.task import Task, TaskSpec
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +34,8 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _task(log: Path, *means: tuple[str, str]) -> Task:
     card = str(log.with_suffix(".card.toml"))
-    inputs = inputs_of(card, None)
-    recipe = Recipe(card, None, Method.PAPER, inputs, program_version(), means)
+    inputs = compute_input_hashes(card, None)
+    recipe = TaskSpec(card, None, Method.PAPER, inputs, program_version(), means)
     content = hashlib.sha256(log.read_bytes()).hexdigest()
     return Task("0123", str(log), content, recipe, str(log.with_suffix(".parquet")))
 

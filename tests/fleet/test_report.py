@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, Points
-from drivetwin.fleet.report import ageing, remark
+from drivetwin.fleet.report import build_ageing_section, write_remark
 from drivetwin.report.sections.blocks import FigureBlock
 
 
@@ -25,27 +25,27 @@ def drifting() -> JointEstimate:
 
 
 def test_a_drift_is_told_over_the_range_of_its_field(drifting: JointEstimate) -> None:
-    assert remark(drifting) == "drifts by −10 % between 0 and 200 odometer_Mm"
+    assert write_remark(drifting) == "drifts by −10 % between 0 and 200 odometer_Mm"
 
 
 def test_what_is_said_of_all_is_not_said_of_each(drifting: JointEstimate) -> None:
     noted = replace(drifting, notes=("of all", "of this one"), drifts=())
-    assert remark(noted, ["of all"]) == "of this one"
+    assert write_remark(noted, ["of all"]) == "of this one"
 
 
 def test_a_drift_below_a_logs_own_error_is_doubted(drifting: JointEstimate) -> None:
     coarse = replace(drifting, points=replace(drifting.points, std=np.full(2, 0.02)))
-    assert remark(coarse).endswith("an error of the method may look like that")
+    assert write_remark(coarse).endswith("an error of the method may look like that")
 
 
 def test_a_drift_that_may_be_none_is_not_told(drifting: JointEstimate) -> None:
     unsure = replace(drifting.drifts[0], ci95=(-1.3e-4, 1e-5))
-    assert remark(replace(drifting, drifts=(unsure,))) == ""
+    assert write_remark(replace(drifting, drifts=(unsure,))) == ""
 
 
 def test_what_drifts_most_by_its_own_error_comes_first(drifting: JointEstimate) -> None:
     steady = replace(drifting.drifts[0], slope=1e-6, ci95=(-1e-6, 3e-6))
     calm = replace(drifting, parameter="eta", drifts=(steady,))
-    blocks = ageing([calm, drifting]).blocks
+    blocks = build_ageing_section([calm, drifting]).blocks
     captions = [block.caption for block in blocks if isinstance(block, FigureBlock)]
     assert [caption.split(":")[0] for caption in captions] == ["μ (B3)", "η"]

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import RulesError
-from drivetwin.fleet.rows import schema
-from drivetwin.fleet.rules import FILE_COLUMNS, field_value, read_rules, rule_for
+from drivetwin.fleet.rows import make_schema
+from drivetwin.fleet.rules import FILE_COLUMNS, parse_field_value, read_rules, select_rule
 from drivetwin.fleet.sources import Source
 from tests.fleet.toys import ROOT
 
@@ -34,7 +34,7 @@ def rules_file(tmp_path: Path) -> Path:
 
 def _chosen(rules_file: Path, path: str, channels: frozenset[str] = frozenset()) -> str:
     rules, source = read_rules(rules_file), Source(Path(path))
-    return rule_for(rules, source, rules.unit_of(source), lambda: channels).name
+    return select_rule(rules, source, rules.get_unit(source), lambda: channels).name
 
 
 def test_the_first_rule_that_fits_decides(rules_file: Path) -> None:
@@ -57,21 +57,21 @@ def test_a_rule_without_a_name_is_one_of_its_own(rules_file: Path) -> None:
 def test_fields_come_from_path_and_list_and_name_channels(rules_file: Path) -> None:
     rules = read_rules(rules_file)
     told = {"recorded": "2025-03-31", "other": "x"}
-    fields = rules.fields_of(Source(Path("/x/unit_1/a_1234km.csv"), told))
+    fields = rules.get_fields(Source(Path("/x/unit_1/a_1234km.csv"), told))
     assert fields == {"odometer_km": 1234.0, "recorded_date": 1743379200.0}
-    assert rules.means() == (("oil_temperature_degC", "TOil"),)
-    assert rules.fields_of(Source(Path("/x/unit_1/a.csv"))) == {}
+    assert rules.list_channel_means() == (("oil_temperature_degC", "TOil"),)
+    assert rules.get_fields(Source(Path("/x/unit_1/a.csv"))) == {}
 
 
 def test_the_unit_is_the_lists_else_the_patterns_else_the_folder(rules_file: Path) -> None:
     rules = read_rules(rules_file)
-    assert rules.unit_of(Source(Path("/x/unit_12/a.csv"))) == "12"
-    assert rules.unit_of(Source(Path("/x/unit_12/a.csv"), {"unit": "T9"})) == "T9"
+    assert rules.get_unit(Source(Path("/x/unit_12/a.csv"))) == "12"
+    assert rules.get_unit(Source(Path("/x/unit_12/a.csv"), {"unit": "T9"})) == "T9"
     with pytest.raises(RulesError, match="unit's id"):
-        rules.unit_of(Source(Path("/x/y/a.csv")))
+        rules.get_unit(Source(Path("/x/y/a.csv")))
     card = rules_file.with_name("card.toml")
     card.write_text("gears = 1")
-    assert read_rules(card).unit_of(Source(Path("/x/y/a.csv"))) == "y"
+    assert read_rules(card).get_unit(Source(Path("/x/y/a.csv"))) == "y"
 
 
 def test_no_rule_is_told(rules_file: Path) -> None:
@@ -100,7 +100,7 @@ def test_faults_of_a_rules_file_are_told(rules_file: Path, text: str, says: str)
         read_rules(rules_file)
 
 
-@pytest.mark.parametrize("name", ["Value", "OIL", *FILE_COLUMNS, *schema().names])
+@pytest.mark.parametrize("name", ["Value", "OIL", *FILE_COLUMNS, *make_schema().names])
 def test_no_field_has_the_name_of_a_column(rules_file: Path, name: str) -> None:
     fields = f'[fields.oil]\ncolumn = "a"\n[fields.{name}]\ncolumn = "b"'
     rules_file.write_text(f"[[rules]]\nskip = true\n{fields}")
@@ -110,13 +110,13 @@ def test_no_field_has_the_name_of_a_column(rules_file: Path, name: str) -> None:
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_numbers_of_fields_are_what_they_say(number: float) -> None:
-    assert field_value("odometer_km", repr(number)) == number
+    assert parse_field_value("odometer_km", repr(number)) == number
 
 
 @given(st.datetimes())
 def test_dates_are_seconds_since_1970(moment: datetime) -> None:
     since = (moment - datetime(1970, 1, 1)).total_seconds()
-    assert field_value("date", moment.isoformat()) == pytest.approx(since, abs=1e-3)
+    assert parse_field_value("date", moment.isoformat()) == pytest.approx(since, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -131,4 +131,4 @@ def test_dates_are_seconds_since_1970(moment: datetime) -> None:
 )
 def test_a_text_that_is_no_field_is_told(field: str, text: str) -> None:
     with pytest.raises(RulesError, match=text):
-        field_value(field, text)
+        parse_field_value(field, text)

@@ -11,7 +11,7 @@ import pytest
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.rules import FieldTable, RulesFile, RuleTable
-from drivetwin.fleet.scan import Scan, Scanned, settings_of
+from drivetwin.fleet.scan import Scan, Scanned, compute_settings_hash
 from drivetwin.fleet.sources import Sources
 
 
@@ -27,7 +27,7 @@ def folder(tmp_path: Path) -> Path:
 def _scan(folder: Path, known: dict[str, FileRow] | None = None, **rule: object) -> list[Scanned]:
     table = RuleTable(name="r", vehicle=str(folder / "card.toml"), **rule)  # type: ignore[arg-type]
     scan = Scan(RulesFile(rules=[table]), Method.PAPER)
-    found = list(scan.scanned(Sources([str(folder)]), (known or {}).get))
+    found = list(scan.scan_files(Sources([str(folder)]), (known or {}).get))
     return [one for one in found if isinstance(one, Scanned)]
 
 
@@ -45,7 +45,7 @@ def test_every_part_of_a_recipe_counts_but_its_paths(folder: Path) -> None:
     recipe = _scan(folder)[0].recipe
     assert recipe is not None
     same = replace(recipe, vehicle="/elsewhere/card.toml")
-    assert settings_of(same) == settings_of(recipe)
+    assert compute_settings_hash(same) == compute_settings_hash(recipe)
     for change in (
         {"method": Method.INTEGRAL},
         {"inputs": (("vehicle", "0"),)},
@@ -53,7 +53,7 @@ def test_every_part_of_a_recipe_counts_but_its_paths(folder: Path) -> None:
         {"means": (("oil", "TOil"),)},
         {"mu_slip": 40.0},
     ):
-        assert settings_of(replace(recipe, **change)) != settings_of(recipe)
+        assert compute_settings_hash(replace(recipe, **change)) != compute_settings_hash(recipe)
 
 
 def test_a_file_that_did_not_change_is_not_read_again(folder: Path) -> None:
@@ -78,6 +78,6 @@ def test_a_field_that_is_no_number_is_the_logs_fault(folder: Path) -> None:
         rules=[RuleTable(vehicle=str(folder / "card.toml"))],
         fields={"odometer": FieldTable(pattern=r"/(\w)\.csv")},
     )
-    found = list(Scan(rules, Method.PAPER).scanned(Sources([str(folder)]), lambda _: None))
+    found = list(Scan(rules, Method.PAPER).scan_files(Sources([str(folder)]), lambda _: None))
     faults = [one.fault for one in found if isinstance(one, Scanned)]
     assert all(fault is not None and "odometer" in fault.what for fault in faults)

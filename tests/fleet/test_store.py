@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.errors import StoreError
 from drivetwin.fleet import parts
-from drivetwin.fleet.rows import Row, RowKind, schema
+from drivetwin.fleet.rows import Row, RowKind, make_schema
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import Outcome, ShiftRow, State
 from tests.fleet.toys import contents, make_logs, run_toys
@@ -29,9 +29,9 @@ def _fill(store: Store, numbers: range) -> None:
     for number in numbers:
         log = _key(number)
         outcome = Outcome(State.DONE, (ShiftRow(True, 0.0, float(number)),))
-        parts.write_part(store.part(log), log, outcome, ROWS)
-        store.index.put_waiting(log, "c", "s", "v")
-        store.index.put_outcome(log, outcome, 1.0)
+        parts.write_part(store.get_part_path(log), log, outcome, ROWS)
+        store.index.add_waiting_log(log, "c", "s", "v")
+        store.index.set_outcome(log, outcome, 1.0)
 
 
 def _files(store: Store) -> dict[str, bytes]:
@@ -46,9 +46,9 @@ def test_compaction_depends_on_the_logs_alone(
     with Store(tmp_path / "a", write=True) as store:
         for start in range(0, 40, 10):
             _fill(store, range(start, start + 10))
-            before = store.rows()
+            before = store.read_rows()
             store.compact()
-            assert store.rows() == before
+            assert store.read_rows() == before
             assert not list((store.folder / parts.INBOX).glob("*/*"))
         step_by_step = _files(store)
     with Store(tmp_path / "b", write=True) as store:
@@ -61,11 +61,11 @@ def test_compaction_depends_on_the_logs_alone(
 def test_rows_come_back_as_they_were(tmp_path: Path) -> None:
     with Store(tmp_path / "a", write=True) as store:
         _fill(store, range(2))
-        rows = store.rows().to_pylist()
+        rows = store.read_rows().to_pylist()
         assert [row["log"] for row in rows] == sorted(2 * [_key(0), _key(1)])
         assert [row["reason"] for row in rows] == ["", "ü", "", "ü"]
-        assert store.rows(RowKind.PARAMETER).num_rows == 2
-        assert store.written(_key(1)) == Outcome(State.DONE, (ShiftRow(True, 0.0, 1.0),))
+        assert store.read_rows(RowKind.PARAMETER).num_rows == 2
+        assert store.read_part_outcome(_key(1)) == Outcome(State.DONE, (ShiftRow(True, 0.0, 1.0),))
 
 
 @pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1 and some more that is no footer PAR1"])
@@ -91,7 +91,7 @@ def test_no_flipped_bit_becomes_another_number(tmp_path: Path) -> None:
 
 
 def test_a_table_of_other_columns_is_no_part(tmp_path: Path) -> None:
-    pq.write_table(schema().empty_table().drop(["free_std"]), tmp_path / "x.parquet")
+    pq.write_table(make_schema().empty_table().drop(["free_std"]), tmp_path / "x.parquet")
     with pytest.raises(StoreError, match="columns"):
         parts.read_rows(tmp_path / "x.parquet")
 
@@ -109,10 +109,10 @@ def test_what_a_stopped_compaction_left_is_no_harm(tmp_path: Path) -> None:
     with Store(tmp_path / "a", write=True) as store:
         _fill(store, range(3))
         (store.folder / parts.ROWS / "all-0123.parquet").write_bytes(b"no run finished this")
-        (store.part(_key(0)).parent / "x.partial").write_bytes(b"half")
-        before = store.rows()
+        (store.get_part_path(_key(0)).parent / "x.partial").write_bytes(b"half")
+        before = store.read_rows()
     with Store(tmp_path / "a", write=True) as store:
-        assert store.rows() == before
+        assert store.read_rows() == before
         assert not _files(store)
         assert not list(store.folder.glob("inbox/*/*.partial"))
 

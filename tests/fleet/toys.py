@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin.estimation.result.method import Method
-from drivetwin.fleet.coordinator import Wishes
-from drivetwin.fleet.events import Event, Settled, Summary, document
+from drivetwin.fleet.coordinator import RunOptions
+from drivetwin.fleet.events import Event, Settled, Summary, to_document
 from drivetwin.fleet.rules import RulesFile, RuleTable
 from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.sources import Sources
@@ -58,8 +58,8 @@ def run_toys(logs: Path, store: Path, **changes: Any) -> tuple[Summary, list[Eve
 def contents(store: Path) -> dict[str, Any]:
     """All that a store holds of its logs: every table but what tells of the runs, every row."""
     with Store(store) as opened:
-        tables = {name: opened.table(name) for name in ("settings", "files", "logs", "shifts")}
-        return {**tables, "rows": opened.rows().to_pylist()}
+        tables = {name: opened.read_table(name) for name in ("settings", "files", "logs", "shifts")}
+        return {**tables, "rows": opened.read_rows().to_pylist()}
 
 
 def names(events: Sequence[Event], **wanted: object) -> list[str]:
@@ -73,12 +73,12 @@ def names(events: Sequence[Event], **wanted: object) -> list[str]:
 
 
 def _tell(event: Event) -> None:
-    print(json.dumps(document(event)), flush=True)
+    print(json.dumps(to_document(event)), flush=True)
 
 
 if __name__ == "__main__":
     scheduler = sys.argv[3] if len(sys.argv) > 3 else None
     asked = request(
-        Path(sys.argv[1]), Path(sys.argv[2]), scheduler=scheduler, wishes=Wishes(attempts=20)
+        Path(sys.argv[1]), Path(sys.argv[2]), scheduler=scheduler, wishes=RunOptions(attempts=20)
     )
     run_fleet(asked, _tell)

@@ -21,7 +21,7 @@ import numpy as np
 
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import card_text, recorded_channels
+from drivetwin.dyno.files import convert_channels, format_card
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import DrivetwinError
@@ -29,9 +29,9 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import usable_shifts
+from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import validated
+from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import load_card
 from tests.fuzz import harness
 from tests.fuzz.mutate import mutate
@@ -51,7 +51,7 @@ AGE = "te_delay"
 def table_of(name: ScenarioName) -> tuple[Table, str]:
     """A log of a built-in scenario as a table, and its vehicle card."""
     bench = run(load_scenario(name), seed=5)
-    channels = recorded_channels(bench)
+    channels = convert_channels(bench)
     count = int(channels[0].time[-1] / STEP)
     time = np.linspace(0.0, STEP * (count - 1), count).round(6)
     columns: dict[str, FloatArray] = {TIME: time}
@@ -60,7 +60,7 @@ def table_of(name: ScenarioName) -> tuple[Table, str]:
         held = np.searchsorted(one.time, time + 1e-9, side="right") - 1
         columns[one.name] = one.values[np.clip(held, 0, None)]
         units[one.name] = one.unit or ""
-    return Table(columns, units, ()), card_text(bench.scenario)
+    return Table(columns, units, ()), format_card(bench.scenario)
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,8 @@ def identified(log: Path, card: Path, method: Method) -> Identification:
     """All that the command line does with a log, but the report."""
     vehicle = load_card(card)
     recording = read_log(log, vehicle)
-    found = identify(recording, vehicle, usable_shifts(recording, vehicle), method)
-    return validated(found, build_twin(found, vehicle), recording)
+    found = identify(recording, vehicle, require_shifts(recording, vehicle), method)
+    return attach_validation(found, build_twin(found, vehicle), recording)
 
 
 def moved(found: Identification, sound: Identification, limit: float = 1.0) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.errors import CardError, InputError, ReductionError
-from drivetwin.gearbox import Gearbox, builtin_gearboxes, load_gearbox
+from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
 
 SMALL = """
 name = "small"
@@ -50,8 +50,8 @@ def card(folder: Path, text: str) -> Gearbox:
 
 
 def test_every_built_in_card_is_sound_and_names_its_source() -> None:
-    assert len(builtin_gearboxes()) == 10
-    for name in builtin_gearboxes():
+    assert len(list_builtin_gearboxes()) == 10
+    for name in list_builtin_gearboxes():
         box = load_gearbox(name)
         assert box.source
         assert box.drive is not None
@@ -60,8 +60,8 @@ def test_every_built_in_card_is_sound_and_names_its_source() -> None:
 def test_a_card_is_read_from_a_path(tmp_path: Path) -> None:
     box = card(tmp_path, SMALL)
     assert box.sets[0].z == 2.5
-    assert box.gear("1").published == 3.5
-    assert box.gear("1").tolerance == pytest.approx(0.005)
+    assert box.get_gear("1").published == 3.5
+    assert box.get_gear("1").tolerance == pytest.approx(0.005)
     assert box.elements["B"].b == "ground"
     assert box.dogs == ()
 
@@ -136,6 +136,6 @@ def test_what_a_card_leaves_out_is_asked_for_when_needed(tmp_path: Path) -> None
     with pytest.raises(CardError, match=r"no \[drive\]"):
         box.require_drive()
     with pytest.raises(ReductionError, match="B of small states no capacity"):
-        box.capacity("B")
+        box.get_capacity("B")
     with pytest.raises(InputError, match="no gear '3'"):
-        box.gear("3")
+        box.get_gear("3")

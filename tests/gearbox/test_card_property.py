@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 
 import drivetwin.gearbox
 from drivetwin.errors import InputError
-from drivetwin.gearbox import builtin_gearboxes, gear_statics
-from drivetwin.gearbox.card import gearbox_of
-from drivetwin.gearbox.check import gearbox_faults
+from drivetwin.gearbox import list_builtin_gearboxes, solve_gear
+from drivetwin.gearbox.card import build_gearbox
+from drivetwin.gearbox.check import find_gearbox_faults
 
 CARDS = Path(drivetwin.gearbox.__file__).parent / "cards"
 DOCUMENTS = [
     tomllib.loads((CARDS / f"{name}.toml").read_text(encoding="utf-8"))
-    for name in builtin_gearboxes()
+    for name in list_builtin_gearboxes()
 ]
 JUNK = st.one_of(
     st.none(),
@@ -55,14 +55,14 @@ def test_a_damaged_card_is_read_or_refused_by_key(data: st.DataObject) -> None:
         holder[last] = data.draw(JUNK)
     else:
         del holder[last]
-    faults = gearbox_faults(document)
+    faults = find_gearbox_faults(document)
     if faults:
         assert all(fault.text for fault in faults)
         return
-    box = gearbox_of(document)
+    box = build_gearbox(document)
     for gear in box.gears:
         try:
-            solved = gear_statics(box, gear.name)
+            solved = solve_gear(box, gear.name)
         except InputError:
             continue
         assert solved.power_error < 1e-6 * max(1.0, abs(solved.ratio))

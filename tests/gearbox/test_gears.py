@@ -8,22 +8,30 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.gearbox import Gearbox, builtin_gearboxes, gear_statics, load_gearbox, ratio_remarks
+from drivetwin.gearbox import (
+    Gearbox,
+    describe_ratio_differences,
+    list_builtin_gearboxes,
+    load_gearbox,
+    solve_gear,
+)
 
-ALL_GEARS = [(name, gear.name) for name in builtin_gearboxes() for gear in load_gearbox(name).gears]
+ALL_GEARS = [
+    (name, gear.name) for name in list_builtin_gearboxes() for gear in load_gearbox(name).gears
+]
 
 
 @pytest.mark.parametrize(("name", "gear"), ALL_GEARS)
 def test_the_ratio_is_the_published_one(name: str, gear: str) -> None:
     box = load_gearbox(name)
-    entry = box.gear(gear)
-    assert gear_statics(box, gear).ratio == pytest.approx(entry.published, abs=entry.tolerance)
+    entry = box.get_gear(gear)
+    assert solve_gear(box, gear).ratio == pytest.approx(entry.published, abs=entry.tolerance)
 
 
 @pytest.mark.parametrize(("name", "gear"), ALL_GEARS)
 def test_powers_and_torques_balance(name: str, gear: str) -> None:
     box = load_gearbox(name)
-    solved = gear_statics(box, gear)
+    solved = solve_gear(box, gear)
     assert solved.power_error < 1e-12
     assert solved.torque_error < 1e-12
     # What leaves at the output is the input power, and no element between them stores any.
@@ -36,31 +44,31 @@ def test_powers_and_torques_balance(name: str, gear: str) -> None:
 def test_a_planetary_set_shares_torque_as_its_teeth_do(name: str) -> None:
     box = load_gearbox(name)
     for gear in box.gears:
-        solved = gear_statics(box, gear.name)
+        solved = solve_gear(box, gear.name)
         for each in box.sets:
-            sun = solved.torque(each.name, each.sun)
-            assert solved.torque(each.name, each.ring) == pytest.approx(each.z * sun, abs=1e-12)
-            carrier = solved.torque(each.name, each.carrier)
+            sun = solved.get_torque(each.name, each.sun)
+            assert solved.get_torque(each.name, each.ring) == pytest.approx(each.z * sun, abs=1e-12)
+            carrier = solved.get_torque(each.name, each.carrier)
             assert carrier == pytest.approx(-(1.0 + each.z) * sun, abs=1e-12)
 
 
 def test_held_members_stand_and_open_elements_carry_nothing() -> None:
-    solved = gear_statics(load_gearbox("three-set-3000"), "2")
+    solved = solve_gear(load_gearbox("three-set-3000"), "2")
     assert solved.speeds["R2-C1"] == pytest.approx(0.0, abs=1e-12)
-    assert solved.torque("C4", "R2-C1") == pytest.approx(solved.ratio - 1.0, rel=1e-9)
-    assert solved.torque("C3", "R1") == 0.0
-    assert solved.power("P3", "output") == pytest.approx(1.0, abs=1e-12)
+    assert solved.get_torque("C4", "R2-C1") == pytest.approx(solved.ratio - 1.0, rel=1e-9)
+    assert solved.get_torque("C3", "R1") == 0.0
+    assert solved.compute_power("P3", "output") == pytest.approx(1.0, abs=1e-12)
 
 
 def test_a_ratio_that_is_not_the_published_one_is_told() -> None:
     box = load_gearbox("zf-8hp70")
-    assert not ratio_remarks(box, {each.name: each.published for each in box.gears})
-    (remark,) = ratio_remarks(box, {"6": 1.0, "R": -box.gear("R").published})
+    assert not describe_ratio_differences(box, {each.name: each.published for each in box.gears})
+    (remark,) = describe_ratio_differences(box, {"6": 1.0, "R": -box.get_gear("R").published})
     assert remark.startswith("gear R: the computed ratio 3.2968 is not the published -3.2968 ")
 
 
 def test_an_idle_shaft_has_no_speed() -> None:
-    solved = gear_statics(load_gearbox("dual-clutch-7"), "1")
+    solved = solve_gear(load_gearbox("dual-clutch-7"), "1")
     assert solved.speeds["even shaft"] is None
     assert solved.speeds["odd shaft"] == pytest.approx(1.0)
 
@@ -90,20 +98,20 @@ def test_three_published_ratios_predict_the_other_gears(
     sets = tuple(replace(each, z=value) for each, value in zip(box.sets, z, strict=True))
     family: Gearbox = replace(box, sets=sets)
     for gear, ratio in zip(("1", "2", "3"), first_three, strict=True):
-        assert gear_statics(family, gear).ratio == pytest.approx(ratio, rel=1e-12)
+        assert solve_gear(family, gear).ratio == pytest.approx(ratio, rel=1e-12)
     for gear, ratio in predicted.items():
-        assert gear_statics(family, gear).ratio == pytest.approx(ratio, rel=bound)
+        assert solve_gear(family, gear).ratio == pytest.approx(ratio, rel=bound)
 
 
 def test_only_the_reverse_of_the_3000_is_more_than_one_percent_off() -> None:
     box = load_gearbox("three-set-3000")
-    assert gear_statics(box, "5").ratio == pytest.approx(0.75, rel=0.01)
-    assert gear_statics(box, "6").ratio == pytest.approx(0.65, rel=0.01)
-    assert gear_statics(box, "R").ratio / -5.03 - 1.0 == pytest.approx(0.016, abs=1e-3)
+    assert solve_gear(box, "5").ratio == pytest.approx(0.75, rel=0.01)
+    assert solve_gear(box, "6").ratio == pytest.approx(0.65, rel=0.01)
+    assert solve_gear(box, "R").ratio / -5.03 - 1.0 == pytest.approx(0.016, abs=1e-3)
 
 
 def test_elements_that_make_no_gear_are_refused_with_the_reason() -> None:
     box = load_gearbox("three-set-3000")
     gears = tuple(replace(gear, elements=gear.elements[:1]) for gear in box.gears)
     with pytest.raises(InputError, match="2 free speeds remain where 1 must"):
-        gear_statics(replace(box, gears=gears), "1")
+        solve_gear(replace(box, gears=gears), "1")

@@ -39,7 +39,7 @@ def read(folder: Path, table: Table | None = None, units: dict[str, str] | None 
 def test_channels_are_in_si_by_role(tmp_path: Path) -> None:
     log, source = read(tmp_path), columns()
     assert log["input_speed"].values == pytest.approx(source["SpdIn"] * RPM, rel=1e-12)
-    assert log.pressure("B3").values == pytest.approx(source["PrsBrk3"] * 1e5)
+    assert log.get_pressure("B3").values == pytest.approx(source["PrsBrk3"] * 1e5)
     assert log["engine_torque"].values.tolist() == source["EngTrq"].tolist()
     assert log["output_torque"].quantity is Quantity.TORQUE
     assert (log["wheel_speed"].source_name, log["wheel_speed"].source_unit) == ("SpdWhl", "rpm")
@@ -105,7 +105,7 @@ def test_a_unit_asserted_against_the_file_is_told(tmp_path: Path) -> None:
     table["PrsBrk2"] = table["PrsBrk2"] * 1e5
     mapping = '[channels.pressure.B2]\nsource = "PrsBrk2"\nunit = "Pa"\n'
     log = mapped(tmp_path, table, UNITS, mapping)
-    assert log.pressure("B2").values.max() == pytest.approx(14e5)
+    assert log.get_pressure("B2").values.max() == pytest.approx(14e5)
     assert log.warnings == ("channel 'PrsBrk2': read in 'Pa' as mapped, the file says 'bar'",)
 
 
@@ -231,7 +231,7 @@ def test_recorded_logs(name: str, samples: int) -> None:
     log = read_log(path, load_card(ROOT / "examples" / "vehicles" / f"{name}.toml"))
     assert {channel.time.size for channel in log.channels.values()} == {samples}
     assert [role for role, channel in log.channels.items() if channel.held] == ["engine_torque"]
-    assert 12e5 < log.pressure("B2").values.max() < 16e5
+    assert 12e5 < log.get_pressure("B2").values.max() < 16e5
     assert log.warnings == ()
 
 
@@ -242,7 +242,9 @@ def test_the_remedy_of_a_refusal_is_a_mapping_that_cures_it(tmp_path: Path) -> N
         read(tmp_path, table)
     cure = caught.value.remedy.split("channel mapping, ")[1]
     assert cure == 'channels.pressure.B2 = { source = "PrsBrk2", unit = "Pa" }'
-    assert mapped(tmp_path, table, UNITS, cure).pressure("B2").values.max() == pytest.approx(14e5)
+    assert mapped(tmp_path, table, UNITS, cure).get_pressure("B2").values.max() == pytest.approx(
+        14e5
+    )
 
 
 def test_only_what_finds_a_shift_is_needed(tmp_path: Path) -> None:
@@ -259,8 +261,8 @@ def test_a_run_without_numbers_stays_a_gap(tmp_path: Path) -> None:
     torque = read(tmp_path, table)["output_torque"]
     assert torque.time.size == 180
     assert torque.gaps == ((0.19, 0.4),)
-    assert np.isnan(torque.at(np.array([0.195, 0.3, 0.399]))).all()
-    assert torque.at(np.array([0.19, 0.4])).tolist() == [2500.0, 2500.0]
+    assert np.isnan(torque.interpolate(np.array([0.195, 0.3, 0.399]))).all()
+    assert torque.interpolate(np.array([0.19, 0.4])).tolist() == [2500.0, 2500.0]
 
 
 def test_a_window_leaves_the_rest_out(tmp_path: Path) -> None:

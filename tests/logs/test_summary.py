@@ -10,13 +10,13 @@ import pytest
 
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.summary import Summary, summarise
+from drivetwin.logs.summary import Summary, summarise_recording
 from drivetwin.logs.write import write_log
 
 
 def summary(path: Path) -> Summary:
     with open_recording(path) as recording:
-        return summarise(recording)
+        return summarise_recording(recording)
 
 
 def test_rate_range_span_and_gaps(tmp_path: Path) -> None:

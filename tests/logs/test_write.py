@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin._util.atomic import keeping
+from drivetwin._util.atomic import protect_files
 from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.errors import FileFormatError, InputError, TimeError, UnitError
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
-from drivetwin.logs.write import as_recorded, write_log
+from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.vehicle.card import load_card
 from tests.logs.fixtures import card, columns, write
 
@@ -51,7 +51,7 @@ def test_columns_return_bit_by_bit(tmp_path: Path, suffix: str) -> None:
 def test_a_shift_log_is_the_same_in_every_format(tmp_path: Path, suffix: str) -> None:
     first = read_log(write(tmp_path, columns()), card(tmp_path))
     path = tmp_path / f"again{suffix}"
-    write_log(path, [as_recorded(channel) for channel in first.channels.values()])
+    write_log(path, [convert_to_recorded_units(channel) for channel in first.channels.values()])
     again = read_log(path, card(tmp_path))
     assert set(again.channels) == set(first.channels)
     for role, channel in first.channels.items():
@@ -83,7 +83,7 @@ def _full_disk(_: int) -> None:
 def test_a_log_does_not_take_the_place_of_one_to_be_kept(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     write_log(path, channels())
-    with keeping([path]), pytest.raises(InputError, match="would be written over"):
+    with protect_files([path]), pytest.raises(InputError, match="would be written over"):
         write_log(path, channels())
 
 
@@ -91,7 +91,7 @@ def test_a_channel_in_a_unit_that_is_unknown_is_not_written_in_another() -> None
     time = np.array([0.0, 1.0])
     channel = Channel("output_speed", Quantity.SPEED, time, time, "SpdOut", "furlong")
     with pytest.raises(UnitError, match="channel 'SpdOut': unknown unit 'furlong'"):
-        as_recorded(channel)
+        convert_to_recorded_units(channel)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -102,7 +102,7 @@ def test_a_recorded_log_is_the_same_in_every_format(tmp_path: Path, suffix: str)
     vehicle = load_card(ROOT / "examples" / "vehicles" / "truck_b.toml")
     first = read_log(source, vehicle)
     path = tmp_path / f"again{suffix}"
-    write_log(path, [as_recorded(channel) for channel in first.channels.values()])
+    write_log(path, [convert_to_recorded_units(channel) for channel in first.channels.values()])
     again = read_log(path, vehicle)
     for role, channel in first.channels.items():
         assert np.array_equal(again[role].time, channel.time)

@@ -42,7 +42,7 @@ class Bench:
 
 def brief(log: ShiftLog, card: VehicleCard) -> Shift:
     """The one shift of a log with less of its gears, so that observing it takes less time."""
-    (shift,) = drivetwin.find_shifts(log, card).shifts
+    (shift,) = drivetwin.detect_shifts(log, card).shifts
     return replace(
         shift,
         before=(shift.before[1] - 1.0, shift.before[1]),
@@ -57,10 +57,10 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     first, card_file, _ = write_run(folder / "first.csv", run(load_scenario("paper_steps"), seed=1))
     card = drivetwin.load_card(card_file)
     log = drivetwin.read_log(first, card)
-    found = drivetwin.identify_shifts(log, card, drivetwin.find_shifts(log, card))
+    found = drivetwin.identify(log, card, drivetwin.detect_shifts(log, card))
     twin = build_twin(found, card)
     drivetwin.save_twin(folder / "twin.toml", twin)
-    other = run(load_scenario("paper_steps").with_torque_reduction(0.3), seed=2)
+    other = run(load_scenario("paper_steps").set_torque_reduction(0.3), seed=2)
     second, _, _ = write_run(folder / "second.csv", other)
     log = drivetwin.read_log(second, card)
     shift = brief(log, card)

@@ -13,7 +13,7 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.observer.inputs import is_driving, recorded
+from drivetwin.observer.inputs import collect_recorded, is_driving
 from tests.observer.conftest import brief
 
 
@@ -26,10 +26,10 @@ def test_power_flows_by_the_torque_at_the_gears(name: ScenarioName, tmp_path: Pa
     log = drivetwin.read_log(file, card)
     shift = brief(log, card)
     model, motion = bench.scenario.model, bench.trajectory
-    seen = recorded(log, shift, card.i_in)
+    seen = collect_recorded(log, shift, card.i_in)
     found = is_driving(model, seen, bench.truth.parameters["te_delay"])
     rate = np.gradient(motion.engine_speed, motion.time)
-    carried = bench.scenario.torque(motion.time) - model.J1 * rate
+    carried = bench.scenario.compute_torque(motion.time) - model.J1 * rate
     exact = np.interp(0.5 * (seen.time[1:] + seen.time[:-1]), motion.time, carried)
     # Noise and the swings of the shaft may turn the sign where little flows.
     clear = np.abs(exact) > 250.0

@@ -18,7 +18,7 @@ from drivetwin.observer.linear_model import (
     TWIST,
     WHEEL,
     Course,
-    linear,
+    build_linear_model,
 )
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory, simulate
 
@@ -28,8 +28,8 @@ GRID = 2e-4
 def _run(model: DualClutch) -> tuple[Trajectory, Signal]:
     scenario = load_scenario("paper_steps")
     grid = np.arange(int(scenario.duration * 1000) + 1) / 1000.0
-    torque = Signal(grid, scenario.torque(grid))
-    pressures = {n: Signal(grid, a.pressure(grid)) for n, a in scenario.actuators.items()}
+    torque = Signal(grid, scenario.compute_torque(grid))
+    pressures = {n: Signal(grid, a.compute_pressure(grid)) for n, a in scenario.actuators.items()}
     time = 0.5 * GRID * np.arange(2 * round(3.2 / GRID) + 1, dtype=np.float64)
     run = simulate(model, torque, pressures, scenario.start(), time)
     assert run.status == "completed"
@@ -55,7 +55,7 @@ def test_follows_the_core_through_all_phases(drum: float) -> None:
     time = run.time[::2]
     acting = np.interp(middle, torque.time, torque.values)
     course = Course(time, acting, acting >= 0.0, locked, base, none, 100.0)
-    found = linear(model, course)
+    found = build_linear_model(model, course)
     x = np.zeros((time.size, STATES))
     x[:, ENGINE], x[:, OUTPUT] = run.engine_speed[::2], run.output_speed[::2]
     x[:, WHEEL], x[:, TWIST] = run.wheel_speed[::2], run.twist[::2]
@@ -81,7 +81,9 @@ def test_the_dissipative_law_divides_by_eta_where_power_flows_back() -> None:
     off = {one.name: np.zeros(2, dtype=bool) for one in model.elements}
     none = {name: np.zeros(2) for name in off}
     driving = np.array([True, False])
-    found = linear(model, Course(time, np.full(2, -500.0), driving, off, none, none, 100.0))
+    found = build_linear_model(
+        model, Course(time, np.full(2, -500.0), driving, off, none, none, 100.0)
+    )
     for share, push, transition in zip(
         (model.eta, 1.0 / model.eta), found.push, found.transition, strict=True
     ):

@@ -13,9 +13,9 @@ from drivetwin.errors import DamagedChannelError, MissingChannelError, MissingPa
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import TORQUE_LIKE
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.observer.kind import Observer
-from drivetwin.observer.observe import observed
+from drivetwin.observer.observe import estimate_torques
 from drivetwin.observer.result import Band, FloatArray
-from drivetwin.parameters import OVER_ETA, spec_of
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from tests.observer.conftest import Bench, brief
 
 
@@ -45,7 +45,7 @@ def test_bands_hold_the_truth(bench: Bench, by: Observer, rmse: float) -> None:
     one draw, of which all samples may lie beyond a standard deviation but not far beyond two. The
     simulation begins in the swing of a throttle step, which engine torque alone does not show.
     """
-    one = observed(bench.twin, _without(bench.log, "output_torque"), bench.shift, by)
+    one = estimate_torques(bench.twin, _without(bench.log, "output_torque"), bench.shift, by)
     for name, truth in bench.truth(one).items():
         band = one.bands[name]
         assert _deviates(band, truth) < 2.0, name
@@ -56,16 +56,16 @@ def test_bands_hold_the_truth(bench: Bench, by: Observer, rmse: float) -> None:
 def test_a_measured_output_torque_changes_nothing(bench: Bench) -> None:
     blind = _without(bench.log, "output_torque")
     for by in Observer:
-        seen = observed(bench.twin, bench.log, bench.shift, by)
-        told = observed(bench.twin, blind, bench.shift, by)
+        seen = estimate_torques(bench.twin, bench.log, bench.shift, by)
+        told = estimate_torques(bench.twin, blind, bench.shift, by)
         assert np.array_equal(seen.output_torque.value, told.output_torque.value)
 
 
 def test_without_pressures_the_bands_widen_and_hold(bench: Bench) -> None:
     log = _without(bench.log, "output_torque", "pressure.")
-    shift = brief(log, bench.twin.card())
-    one = observed(bench.twin, log, shift)
-    full = observed(bench.twin, bench.log, bench.shift)
+    shift = brief(log, bench.twin.build_card())
+    one = estimate_torques(bench.twin, log, shift)
+    full = estimate_torques(bench.twin, bench.log, bench.shift)
     truth = bench.truth(one)
     assert _deviates(one.output_torque, truth["output_torque"]) < 2.0
     assert _deviates(one.clutch_torque["B3"], truth["torque.B3"]) < 2.0
@@ -76,8 +76,8 @@ def test_without_pressures_the_bands_widen_and_hold(bench: Bench) -> None:
 
 def test_a_single_pressure_is_not_used_and_the_missing_one_is_named(bench: Bench) -> None:
     """The split of the torque between the elements needs both."""
-    single = observed(bench.twin, _without(bench.log, "pressure.B2"), bench.shift)
-    none = observed(bench.twin, _without(bench.log, "pressure."), bench.shift)
+    single = estimate_torques(bench.twin, _without(bench.log, "pressure.B2"), bench.shift)
+    none = estimate_torques(bench.twin, _without(bench.log, "pressure."), bench.shift)
     assert single.notes[0].startswith("no pressure of B2:")
     assert np.array_equal(single.output_torque.value, none.output_torque.value)
 
@@ -88,18 +88,18 @@ def test_a_twin_without_scale_is_refused(bench: Bench, by: Observer) -> None:
     told = {}
     for name, one in bench.twin.parameters.items():
         told[name] = one
-        if spec_of(name).stem in ("eta", *TORQUE_LIKE):
+        if get_parameter_spec(name).stem in ("eta", *TORQUE_LIKE):
             told[name] = replace(one, value=None, std_noise=None, verdict=Verdict.NOT_IDENTIFIABLE)
             told[name + OVER_ETA] = replace(one, id=name + OVER_ETA)
     twin = replace(bench.twin, parameters=told)
     assert twin.over_eta
     with pytest.raises(MissingParameterError, match="over η only"):
-        observed(twin, bench.log, bench.shift, by)
+        estimate_torques(twin, bench.log, bench.shift, by)
 
 
 def test_a_log_without_engine_torque_is_refused(bench: Bench) -> None:
     with pytest.raises(MissingChannelError, match="engine_torque"):
-        observed(bench.twin, _without(bench.log, "engine_torque"), bench.shift)
+        estimate_torques(bench.twin, _without(bench.log, "engine_torque"), bench.shift)
 
 
 @pytest.mark.parametrize("by", Observer)
@@ -110,13 +110,13 @@ def test_what_is_missing_in_the_shift_is_never_bridged(
     start = bench.shift.inertia_phase[0]
     log = _with_gap(bench.log, role, start, start + 0.2)
     with pytest.raises(DamagedChannelError, match="during the shift"):
-        observed(bench.twin, log, bench.shift, by)
+        estimate_torques(bench.twin, log, bench.shift, by)
 
 
 def test_a_gear_counts_as_far_as_its_torque_was_recorded(bench: Bench) -> None:
     end = bench.shift.before[1]
     log = _with_gap(bench.log, "engine_torque", end - 0.8, end - 0.5)
-    one = observed(bench.twin, log, bench.shift)
+    one = estimate_torques(bench.twin, log, bench.shift)
     assert end - 0.5 < one.time[0] < end - 0.4
     assert "counts from there on" in one.notes[0]
     assert _deviates(one.output_torque, bench.truth(one)["output_torque"]) < 2.0
@@ -126,13 +126,13 @@ def test_of_a_long_gear_what_is_near_the_shift_is_told(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("drivetwin.observer.observe.FAR", 0.4)
-    one = observed(bench.twin, bench.log, bench.shift)
+    one = estimate_torques(bench.twin, bench.log, bench.shift)
     assert one.time[0] == pytest.approx(bench.shift.before[1] - 0.4, abs=0.01)
     assert one.time[-1] == pytest.approx(bench.shift.lockup_time + 0.4, abs=0.01)
 
 
 def test_simulation_repeats_with_its_seed(bench: Bench) -> None:
     once, again = (
-        observed(bench.twin, bench.log, bench.shift, Observer.SIMULATION) for _ in range(2)
+        estimate_torques(bench.twin, bench.log, bench.shift, Observer.SIMULATION) for _ in range(2)
     )
     assert np.array_equal(once.output_torque.std, again.output_torque.std)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivetwin.observer.result import FloatArray
-from drivetwin.observer.smoother import Measurement, Process, filtered, smoothed
+from drivetwin.observer.smoother import Measurement, Process, filter_forward, smooth_states
 
 
 def _process(seed: int, size: int, count: int) -> Process:
@@ -71,14 +71,14 @@ def _joint(process: Process) -> tuple[FloatArray, FloatArray, float]:
 @given(st.integers(0, 10_000), st.integers(1, 4), st.integers(2, 7))
 def test_equals_the_joint_gaussian(seed: int, size: int, count: int) -> None:
     process = _process(seed, size, count)
-    means, covariances = smoothed(process)
+    means, covariances = smooth_states(process)
     mean, covariance, surprise = _joint(process)
     scale = 1.0 + float(np.abs(covariance).max())
     assert means.ravel() == pytest.approx(mean, abs=1e-8 * scale * (1 + np.abs(mean).max()))
     for k in range(count):
         part = slice(k * size, (k + 1) * size)
         assert covariances[k] == pytest.approx(covariance[part, part], abs=1e-8 * scale)
-    assert filtered(process).surprise == pytest.approx(surprise, rel=1e-8, abs=1e-6)
+    assert filter_forward(process).surprise == pytest.approx(surprise, rel=1e-8, abs=1e-6)
 
 
 def test_a_locked_direction_stays_locked() -> None:
@@ -95,6 +95,6 @@ def test_a_locked_direction_stays_locked() -> None:
         process.covariance,
         taken,
     )
-    means, covariances = smoothed(tight)
+    means, covariances = smooth_states(tight)
     assert abs(row @ means[2]) < 1e-5
     assert 0.0 <= row @ covariances[2] @ row + 1e-9 < 1e-8

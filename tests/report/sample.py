@@ -13,7 +13,7 @@ from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import fit_of, phases_of
+from drivetwin.validation.simulate_log import clip_phases, compute_fit
 from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
 from drivetwin.vehicle.shift_kind import ShiftKind
 
@@ -165,13 +165,13 @@ def validation() -> Validation:
         for name, values in simulated.items()
     }
     fit = {
-        name: {"all": fit_of(trace.measured, trace.simulated, trace.log_mean)}
+        name: {"all": compute_fit(trace.measured, trace.simulated, trace.log_mean)}
         for name, trace in traces.items()
     }
     return Validation(
         shift=SHIFT,
-        model=build_twin(identification(), card()).dual_clutch(SHIFT),
-        phases=phases_of(SHIFT, (0.0, 2.999)),
+        model=build_twin(identification(), card()).build_dual_clutch(SHIFT),
+        phases=clip_phases(SHIFT, (0.0, 2.999)),
         engine_torque=Signal(TIME, measured["engine_torque"].values),
         pressures={name: _pressure(measured, name) for name in ("B2", "B3")},
         trajectory=run,
@@ -183,7 +183,7 @@ def validation() -> Validation:
 
 
 def _pressure(measured: ShiftLog, element: str) -> Signal:
-    channel = measured.pressure(element)
+    channel = measured.get_pressure(element)
     return Signal(channel.time, channel.values)
 
 

@@ -9,12 +9,12 @@ from functools import cache
 import numpy as np
 
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.report.comparison import render_comparison, trials_of
-from drivetwin.report.figures.comparison import agreement_figure, trial_figure
+from drivetwin.report.comparison import render_comparison, simulate_trials
+from drivetwin.report.figures.comparison import plot_agreement, plot_trial
 from drivetwin.report.find_reports import Candidate, Trial
 from drivetwin.report.sections.blocks import FigureBlock, TableBlock
-from drivetwin.report.sections.comparison import agreement_section, trial_sections
-from drivetwin.report.style import candidate_style
+from drivetwin.report.sections.comparison import build_agreement_section, build_trial_sections
+from drivetwin.report.style import get_candidate_style
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report.sample import SHIFT, card, friction, identification, log, validation
@@ -36,7 +36,7 @@ def candidates() -> list[Candidate]:
 
 
 def test_what_differs_is_named_first() -> None:
-    section = agreement_section(candidates())
+    section = build_agreement_section(candidates())
     assert section.intro.startswith("1 of 2 common parameters agree")
     table = next(block for block in section.blocks if isinstance(block, TableBlock))
     assert [(row[0].text, row[-1].text) for row in table.rows] == [
@@ -52,7 +52,9 @@ def test_what_has_no_interval_is_named_beside_the_verdict() -> None:
     ]
     paper = candidate("paper", J_vehicle=(6295.0, None), k_o=(1e5, None))
     table = next(
-        block for block in agreement_section([*pair, paper]).blocks if isinstance(block, TableBlock)
+        block
+        for block in build_agreement_section([*pair, paper]).blocks
+        if isinstance(block, TableBlock)
     )
     assert [(row[-1].text, row[-1].note) for row in table.rows] == [
         ("differ", "no interval: paper"),
@@ -62,7 +64,7 @@ def test_what_has_no_interval_is_named_beside_the_verdict() -> None:
 
 
 def test_narrow_and_wide_parameters_are_drawn_alike() -> None:
-    section = agreement_section(candidates())
+    section = build_agreement_section(candidates())
     block = next(block for block in section.blocks if isinstance(block, FigureBlock))
     first, second = block.figure.data
     assert np.allclose(first.error_x.array, Z95)
@@ -71,14 +73,14 @@ def test_narrow_and_wide_parameters_are_drawn_alike() -> None:
 
 def test_a_candidate_without_a_parameter_has_no_point() -> None:
     pair = [candidate("a", eta=(0.9, 0.01), k_o=(1e5, 1e3)), candidate("b", eta=(0.9, 0.01))]
-    section = agreement_section([*pair, candidate("c", k_o=(1e5, 1e3))])
+    section = build_agreement_section([*pair, candidate("c", k_o=(1e5, 1e3))])
     block = next(block for block in section.blocks if isinstance(block, FigureBlock))
     assert [len(trace.x) for trace in block.figure.data] == [2, 1, 1]
-    assert len(agreement_figure(["a"], []).data) == 1
+    assert len(plot_agreement(["a"], []).data) == 1
 
 
 def test_every_twin_simulates_or_says_why_not() -> None:
-    (trial,) = trials_of(twins(), log(), [SHIFT], "sample.csv")
+    (trial,) = simulate_trials(twins(), log(), [SHIFT], "sample.csv")
     assert trial.label == "sample.csv, 2→3 at 1.6 s"
     assert list(trial.runs) == ["good"]
     assert "k_o" in trial.refused["poor"]
@@ -86,9 +88,9 @@ def test_every_twin_simulates_or_says_why_not() -> None:
 
 def test_simulations_stand_over_one_measurement() -> None:
     trial = Trial("log", {"a": validation(), "b": validation()}, {})
-    names = [trace.name for trace in trial_figure(trial, ["a", "b"]).data]
+    names = [trace.name for trace in plot_trial(trial, ["a", "b"]).data]
     assert names[:5] == ["measured", "a", "b", "a", "b"]
-    matrix, shifts = trial_sections([candidate("a"), candidate("b")], [trial])
+    matrix, shifts = build_trial_sections([candidate("a"), candidate("b")], [trial])
     block = matrix.blocks[0]
     assert isinstance(block, FigureBlock)
     fit = validation().fit["output_torque"]["all"].fit_percent
@@ -97,12 +99,12 @@ def test_simulations_stand_over_one_measurement() -> None:
 
 
 def test_many_candidates_are_told_apart() -> None:
-    styles = [candidate_style(k) for k in range(24)]
+    styles = [get_candidate_style(k) for k in range(24)]
     assert len({(one.colour, one.dash) for one in styles}) == 24
 
 
 def test_the_page_is_complete_and_escaped() -> None:
-    trials = trials_of({"first <1>": twins()["good"]}, log(), [SHIFT], "sample.csv")
+    trials = simulate_trials({"first <1>": twins()["good"]}, log(), [SHIFT], "sample.csv")
     page = render_comparison(candidates(), trials)
     for anchor in ("agreement", "logs", "shifts", "friction"):
         assert f'id="{anchor}"' in page

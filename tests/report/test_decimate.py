@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.report.decimate import MAX_POINTS, envelope, focused
+from drivetwin.report.decimate import MAX_POINTS, decimate_around, extract_envelope
 
 
 @settings(max_examples=30)
@@ -15,7 +15,7 @@ from drivetwin.report.decimate import MAX_POINTS, envelope, focused
 def test_envelope_is_a_subset_with_all_extremes(size: int, limit: int, seed: int) -> None:
     time = np.arange(size, dtype=float)
     values = np.random.default_rng(seed).standard_normal(size)
-    kept_time, kept = envelope(time, values, limit)
+    kept_time, kept = extract_envelope(time, values, limit)
     assert kept_time.size <= max(limit, 8)
     assert np.all(np.diff(kept_time) > 0)
     assert np.array_equal(values[kept_time.astype(int)], kept)
@@ -28,7 +28,7 @@ def test_spike_between_gaps_survives() -> None:
     values = np.full(time.size, np.nan)
     values[20_000:30_000] = 0.0
     values[25_123] = 9.0
-    kept_time, kept = envelope(time, values)
+    kept_time, kept = extract_envelope(time, values)
     assert kept_time[np.nanargmax(kept)] == 25_123.0
     assert np.isnan(kept[0])
 
@@ -36,7 +36,7 @@ def test_spike_between_gaps_survives() -> None:
 def test_focus_keeps_its_samples_where_they_fit() -> None:
     time = np.arange(0.0, 200.0, 1e-3)
     values = np.sin(75.0 * time)
-    kept_time, kept = focused(time, values, (100.0, 102.0))
+    kept_time, kept = decimate_around(time, values, (100.0, 102.0))
     inside = (time >= 100.0) & (time < 102.0)
     assert np.isin(time[inside], kept_time).all()
     assert kept_time.size <= MAX_POINTS

@@ -8,16 +8,16 @@ import re
 import numpy as np
 import pytest
 
-from drivetwin.drive import DriveRun, launch, load_powertrain, run
+from drivetwin.drive import DriveRun, load_powertrain, plan_launch, run
 from drivetwin.gearbox import load_gearbox
-from drivetwin.report.drive import render_drive, traces_text
-from drivetwin.report.figures.drive import energy_figure, motion_figure, shift_figure
+from drivetwin.report.drive import format_traces, render_drive
+from drivetwin.report.figures.drive import plot_energy, plot_maneuver, plot_motion
 
 
 @pytest.fixture(scope="module")
 def motion() -> DriveRun:
     box, car = load_gearbox("simpson-3"), load_powertrain("car-350nm")
-    return run(box, car, launch(box, car.control))
+    return run(box, car, plan_launch(box, car.control))
 
 
 def test_page_opens_offline_and_shows_every_shift(motion: DriveRun) -> None:
@@ -31,7 +31,7 @@ def test_page_opens_offline_and_shows_every_shift(motion: DriveRun) -> None:
 
 
 def test_traces_are_the_motion(motion: DriveRun) -> None:
-    names, units, *rows = traces_text(motion).splitlines()
+    names, units, *rows = format_traces(motion).splitlines()
     assert names.split(",")[:3] == ["time", "engine_speed", "input_speed"]
     assert units.split(",")[:3] == ["s", "rad/s", "rad/s"]
     table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
@@ -40,14 +40,14 @@ def test_traces_are_the_motion(motion: DriveRun) -> None:
 
 
 def test_figures_show_display_units_and_all_elements(motion: DriveRun) -> None:
-    whole = motion_figure(motion)
+    whole = plot_motion(motion)
     assert {"engine", "speed ratio", "lock-up", "direct"} <= {trace.name for trace in whole.data}
     engine = next(trace for trace in whole.data if trace.name == "engine")
     assert max(engine.y) == pytest.approx(motion.engine_speed.max() * 30.0 / np.pi, rel=1e-6)
-    single = shift_figure(motion, motion.maneuvers[-1])
+    single = plot_maneuver(motion, motion.maneuvers[-1])
     start, end = single.layout.xaxis.range
     assert start < motion.maneuvers[-1].action.start < motion.maneuvers[-1].action.end < end
-    (bars,) = energy_figure(motion).data
+    (bars,) = plot_energy(motion).data
     assert dict(zip(bars.y, bars.x, strict=True))["direct"] == pytest.approx(
         motion.work["direct"] / 1e3
     )

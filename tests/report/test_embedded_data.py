@@ -18,7 +18,7 @@ from drivetwin.report.embedded_data import NOISE_PARTS, SPAN_PARTS, Store
 
 def unpacked(store: Store) -> list[FloatArray]:
     """The arrays as the page's script reads them."""
-    data = gzip.decompress(base64.b64decode(store.packed()))
+    data = gzip.decompress(base64.b64decode(store.encode()))
     found, place = [], 0
     for entry in store.index:
         count, width = entry["count"], entry.get("width")
@@ -92,4 +92,4 @@ def test_equal_arrays_stand_once() -> None:
 def test_two_hundred_thousand_noisy_samples_stay_small() -> None:
     store = Store()
     store.add_values(np.random.default_rng(1).standard_normal(200_000))
-    assert len(store.packed()) < 250_000
+    assert len(store.encode()) < 250_000

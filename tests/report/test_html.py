@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
-from drivetwin.report.html import render_report, report_sections, save_report
+from drivetwin.report.html import build_report_sections, render_report, save_report
 from drivetwin.report.sections.blocks import FigureBlock
-from drivetwin.validation.simulate_log import with_fit
+from drivetwin.validation.simulate_log import attach_fit
 from tests.report.sample import identification, log, validation
 
 
 @pytest.fixture(scope="module")
 def found() -> Identification:
-    return with_fit(identification(), [validation()])
+    return attach_fit(identification(), [validation()])
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_plotly_stands_in_it_once(page: str) -> None:
 
 
 def test_first_section_answers_the_question_of_trust(found: Identification) -> None:
-    first = report_sections(found, log())[0]
+    first = build_report_sections(found, log())[0]
     assert first.title == "Can I trust this model?"
     assert "10 of 12 parameters are identified, 1 only weakly, 1 cannot be told" in first.intro
 
@@ -90,9 +90,15 @@ def test_stays_small_for_long_logs(found: Identification, tmp_path: Path) -> Non
 
 def test_sparse_identification_leaves_sections_out(found: Identification) -> None:
     sparse = replace(
-        found, estimates={}, friction={}, fit={}, evidence=Evidence(), correlation=None, warnings=()
+        found,
+        estimates={},
+        friction={},
+        fit={},
+        evidence=StageResults(),
+        correlation=None,
+        warnings=(),
     )
-    titles = [section.anchor for section in report_sections(sparse, log())]
+    titles = [section.anchor for section in build_report_sections(sparse, log())]
     assert "friction" not in titles
     assert "validation" not in titles
     assert render_report(sparse, log()).startswith("<!DOCTYPE html>")
@@ -100,11 +106,11 @@ def test_sparse_identification_leaves_sections_out(found: Identification) -> Non
 
 def test_several_shifts_are_shown_in_the_whole_log_first(found: Identification) -> None:
     twice = replace(found, shifts=found.shifts * 2)
-    (whole, *_) = report_sections(twice, log())[1].blocks
+    (whole, *_) = build_report_sections(twice, log())[1].blocks
     assert isinstance(whole, FigureBlock)
     assert len(whole.figure.layout.shapes) == 4
-    assert len(report_sections(found, log())[1].blocks) < len(
-        report_sections(twice, log())[1].blocks
+    assert len(build_report_sections(found, log())[1].blocks) < len(
+        build_report_sections(twice, log())[1].blocks
     )
 
 

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, Quantity
-from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
-from drivetwin.report.notebook import figure_of, summary_of
+from drivetwin.report.notebook import draw_figure, summarise
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import with_fit
+from drivetwin.validation.simulate_log import attach_fit
 from tests.report.sample import card, identification, log, validation
 
 
 def found() -> Identification:
-    return with_fit(identification(), [validation()])
+    return attach_fit(identification(), [validation()])
 
 
 def test_a_summary_fits_a_terminal_and_names_every_parameter() -> None:
@@ -45,7 +45,7 @@ def test_the_rich_representation_escapes_names() -> None:
 
 
 def test_an_identification_without_simulation_shows_its_intervals() -> None:
-    bare = replace(identification(), evidence=Evidence())
+    bare = replace(identification(), evidence=StageResults())
     assert "95 % interval" in bare.plot().layout.xaxis.title.text
     assert "fit %" not in str(bare.summary())
 
@@ -87,6 +87,6 @@ def test_a_validation_is_the_figure_of_the_report() -> None:
 
 def test_other_things_have_neither() -> None:
     with pytest.raises(TypeError, match="no figure of a dict"):
-        figure_of({})
+        draw_figure({})
     with pytest.raises(TypeError, match="no summary of a dict"):
-        summary_of({})
+        summarise({})

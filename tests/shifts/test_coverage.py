@@ -18,9 +18,9 @@ from drivetwin.shifts.coverage import (
     LEAST,
     OLDEST,
     YOUNGEST,
-    near,
-    parts_between,
-    recorded,
+    split_at_gaps,
+    trim_to_recorded,
+    trim_to_window,
 )
 from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE
 from drivetwin.shifts.shift import Shift
@@ -72,7 +72,7 @@ def log_without(gaps: list[tuple[float, float]], role: str) -> ShiftLog:
 def test_parts_and_gaps_make_up_the_span(
     span: tuple[float, float], gaps: list[tuple[float, float]]
 ) -> None:
-    parts = parts_between(span, tuple(gaps))
+    parts = split_at_gaps(span, tuple(gaps))
     assert all(span[0] <= low < high <= span[1] for low, high in parts)
     for time in np.linspace(*span, 97):
         inside = sum(low < time < high for low, high in parts)
@@ -82,26 +82,26 @@ def test_parts_and_gaps_make_up_the_span(
 
 
 def test_a_whole_log_leaves_the_shift_as_it_is() -> None:
-    assert recorded(log(), SHIFT, FILLS) is SHIFT
+    assert trim_to_recorded(log(), SHIFT, FILLS) is SHIFT
 
 
 def test_gap_of_the_engine_torque_cuts_the_gear_before() -> None:
-    cut = recorded(log((1.0, 1.2), "engine_torque"), SHIFT, FILLS)
+    cut = trim_to_recorded(log((1.0, 1.2), "engine_torque"), SHIFT, FILLS)
     assert cut.before == pytest.approx((1.2 + YOUNGEST, 2.0), abs=2e-3)
     assert cut.after == SHIFT.after
     assert "no samples from 0.999 s to 1.201 s" in cut.warnings[0]
-    assert recorded(log((1.0, 1.2), "engine_torque"), cut, FILLS) is cut
+    assert trim_to_recorded(log((1.0, 1.2), "engine_torque"), cut, FILLS) is cut
 
 
 def test_gap_of_the_engine_torque_cuts_the_gear_after() -> None:
-    cut = recorded(log((4.0, 4.5), "engine_torque"), SHIFT, FILLS)
+    cut = trim_to_recorded(log((4.0, 4.5), "engine_torque"), SHIFT, FILLS)
     assert cut.after == pytest.approx((2.5, 4.0 - OLDEST), abs=2e-3)
     assert cut.before == SHIFT.before
 
 
 def test_of_several_gaps_the_nearest_to_the_shift_cuts() -> None:
     gaps = [(0.3, 0.5), (1.0, 1.2), (3.2, 3.4), (4.0, 4.5)]
-    cut = recorded(log_without(gaps, "engine_torque"), SHIFT, FILLS)
+    cut = trim_to_recorded(log_without(gaps, "engine_torque"), SHIFT, FILLS)
     assert cut.before == pytest.approx((1.2 + YOUNGEST, 2.0), abs=2e-3)
     assert cut.after == pytest.approx((2.5, 3.2 - OLDEST), abs=2e-3)
 
@@ -112,10 +112,10 @@ def test_of_several_gaps_the_nearest_to_the_shift_cuts() -> None:
 def test_input_that_starts_late_or_ends_early_cuts_as_a_gap_does(
     role: str, reach: tuple[float, float]
 ) -> None:
-    late = recorded(log((-1.0, 1.0), role), SHIFT, FILLS)
+    late = trim_to_recorded(log((-1.0, 1.0), role), SHIFT, FILLS)
     assert late.before == pytest.approx((1.001 + reach[0], 2.0))
     assert f"{role!r} has no samples from 0.000 s to 1.001 s: gear 2 counts" in late.warnings[0]
-    early = recorded(log((4.0, 9.0), role), SHIFT, FILLS)
+    early = trim_to_recorded(log((4.0, 9.0), role), SHIFT, FILLS)
     assert early.after == pytest.approx((2.5, 3.999 - reach[1]))
     assert early.before == SHIFT.before
 
@@ -123,30 +123,30 @@ def test_input_that_starts_late_or_ends_early_cuts_as_a_gap_does(
 @pytest.mark.parametrize("gap", [(-1.0, 2.1), (2.4, 9.0)])
 def test_input_that_starts_or_ends_in_the_shift_refuses_it(gap: tuple[float, float]) -> None:
     with pytest.raises(DamagedChannelError, match="during the shift"):
-        recorded(log(gap, "pressure.B3"), SHIFT, FILLS)
+        trim_to_recorded(log(gap, "pressure.B3"), SHIFT, FILLS)
 
 
 @pytest.mark.parametrize("role", ["engine_torque", "pressure.B2", "pressure.B3"])
 def test_gap_in_the_shift_refuses_it(role: str) -> None:
     with pytest.raises(DamagedChannelError, match="during the shift"):
-        recorded(log((2.3, 2.4), role), SHIFT, FILLS)
+        trim_to_recorded(log((2.3, 2.4), role), SHIFT, FILLS)
 
 
 def test_refused_is_where_the_gap_begins_and_a_turbine_asks_for_its_clutch() -> None:
     gapped = log((2.3, 2.4), "engine_torque")
     with pytest.raises(DamagedChannelError, match="record the shift again") as refused:
-        recorded(gapped, SHIFT, FILLS)
+        trim_to_recorded(gapped, SHIFT, FILLS)
     assert refused.value.where.time == pytest.approx(2.299)
     turbine = replace(gapped["engine_torque"], source_name=f"{TURBINE_TORQUE} from n_e")
     driven = replace(gapped, channels={**gapped.channels, "engine_torque": turbine})
     with pytest.raises(DamagedChannelError, match="keep the lock-up clutch open, or closed"):
-        recorded(driven, SHIFT, FILLS)
+        trim_to_recorded(driven, SHIFT, FILLS)
 
 
 @pytest.mark.parametrize("gap", [(2.0 - LEAST, 1.95), (2.51 + OLDEST, 2.7)])
 def test_too_short_a_rest_refuses_it(gap: tuple[float, float]) -> None:
     with pytest.raises(DamagedChannelError, match="less than"):
-        recorded(log(gap, "engine_torque"), SHIFT, FILLS)
+        trim_to_recorded(log(gap, "engine_torque"), SHIFT, FILLS)
 
 
 @pytest.mark.parametrize("role", ["pressure.B2", "pressure.B3"])
@@ -154,14 +154,16 @@ def test_too_short_a_rest_refuses_it(gap: tuple[float, float]) -> None:
 def test_pressure_of_an_element_that_stays_locked_or_open_decides_nothing(
     role: str, gap: tuple[float, float]
 ) -> None:
-    assert recorded(log(gap, role), SHIFT, FILLS) is SHIFT
+    assert trim_to_recorded(log(gap, role), SHIFT, FILLS) is SHIFT
 
 
 def test_pressure_that_crosses_the_fill_point_in_its_gap_cuts() -> None:
     whole = log((3.0, 4.0), "pressure.B2")
-    channel = whole.pressure("B2")
+    channel = whole.get_pressure("B2")
     risen = replace(channel, values=np.where(channel.time > 3.5, 1e6, channel.values))
-    cut = recorded(ShiftLog({**whole.channels, "pressure.B2": risen}, "made", ""), SHIFT, FILLS)
+    cut = trim_to_recorded(
+        ShiftLog({**whole.channels, "pressure.B2": risen}, "made", ""), SHIFT, FILLS
+    )
     assert cut.after == pytest.approx((2.5, 3.0), abs=2e-3)
 
 
@@ -176,22 +178,22 @@ def with_converter(opened: tuple[float, float]) -> ShiftLog:
 
 
 def test_a_gear_counts_while_the_converter_is_closed() -> None:
-    cut = recorded(with_converter((-1.0, 1.2)), SHIFT, FILLS)
+    cut = trim_to_recorded(with_converter((-1.0, 1.2)), SHIFT, FILLS)
     assert cut.before == pytest.approx((1.2 + LETS_GO, 2.0), abs=0.06)
     assert "the converter is open" in cut.warnings[-1]
-    cut = recorded(with_converter((3.8, 6.0)), SHIFT, FILLS)
+    cut = trim_to_recorded(with_converter((3.8, 6.0)), SHIFT, FILLS)
     assert cut.after == pytest.approx((2.5, 3.8 - LETS_GO), abs=0.06)
 
 
 def test_a_shift_with_the_converter_opening_is_refused() -> None:
     with pytest.raises(DamagedChannelError, match=r"converter is open .* during the shift"):
-        recorded(with_converter((2.1, 4.0)), SHIFT, FILLS)
+        trim_to_recorded(with_converter((2.1, 4.0)), SHIFT, FILLS)
 
 
 def test_of_long_gears_what_is_near_the_shift_counts() -> None:
-    assert near(SHIFT) is SHIFT
-    cut = near(replace(SHIFT, before=(-60.0, 2.0), after=(2.5, 90.0)))
+    assert trim_to_window(SHIFT) is SHIFT
+    cut = trim_to_window(replace(SHIFT, before=(-60.0, 2.0), after=(2.5, 90.0)))
     assert cut.before == (2.0 - BEFORE, 2.0)
     assert cut.after == (2.5, 2.5 + AFTER)
-    cut = near(replace(SHIFT, before=(-60.0, 2.0), after=(2.5, 90.0)), (15.0, 20.0))
+    cut = trim_to_window(replace(SHIFT, before=(-60.0, 2.0), after=(2.5, 90.0)), (15.0, 20.0))
     assert (cut.before, cut.after) == ((-13.0, 2.0), (2.5, 22.5))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MissingChannelError, TimeError
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.settings import ShiftSettings
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
@@ -23,7 +23,7 @@ _UP = Plan(gears=(("2", 1.91), ("3", 1.43)), break_aways=(1.5,))
 
 
 def _only(plan: Plan) -> Shift:
-    shifts, rejected = find_shifts(plan.log(), plan.card())
+    shifts, rejected = detect_shifts(plan.log(), plan.card())
     assert rejected == ()
     assert len(shifts) == 1
     return shifts[0]
@@ -109,7 +109,7 @@ def test_sigma_covers_the_errors_of_speeds_in_coarse_steps(rpm: float, step: flo
             for role in ("input_speed", "output_speed")
         }
         log = replace(log, channels={**log.channels, **rounded})
-        (shift,) = find_shifts(log, plan.card()).shifts
+        (shift,) = detect_shifts(log, plan.card()).shifts
         assert shift.sigma["lockup"] < 0.05
         scores.append((shift.inertia_phase[0] - start) / shift.sigma["inertia_start"])
         scores.append((shift.lockup_time - start - plan.duration) / shift.sigma["lockup"])
@@ -151,7 +151,7 @@ def test_several_shifts_share_the_gear_between() -> None:
         end=5.0,
         noise=0.1,
     )
-    shifts, rejected = find_shifts(plan.log(), plan.card())
+    shifts, rejected = detect_shifts(plan.log(), plan.card())
     assert rejected == ()
     assert [(s.start_gear, s.end_gear) for s in shifts] == [("2", "3"), ("3", "4"), ("4", "3")]
     for earlier, later in pairwise(shifts):
@@ -169,7 +169,7 @@ def test_engine_and_wheel_speed_stand_in_with_warnings() -> None:
             "wheel_speed": (output.time, output.values / card.final_drive),
         }
     )
-    (shift,), _ = find_shifts(stand_in, card)
+    (shift,), _ = detect_shifts(stand_in, card)
     assert shift.lockup_time == pytest.approx(1.85, abs=2e-3)
     text = " ".join(shift.warnings)
     assert "engine speed" in text
@@ -179,7 +179,7 @@ def test_engine_and_wheel_speed_stand_in_with_warnings() -> None:
 
 def test_torque_phase_from_output_torque_without_pressures() -> None:
     log = _without(_UP.log(), "pressure.B2", "pressure.B3")
-    (shift,), _ = find_shifts(log, _UP.card())
+    (shift,), _ = detect_shifts(log, _UP.card())
     # This fall comes without the delay of a shaft, which a measured one has.
     delay = 0.015
     assert shift.torque_phase[0] == pytest.approx(1.35 - delay, abs=0.01)
@@ -189,7 +189,7 @@ def test_torque_phase_from_output_torque_without_pressures() -> None:
 
 def test_torque_phase_unknown_is_said_with_a_wide_sigma() -> None:
     log = _without(_UP.log(), "pressure.B2", "pressure.B3", "output_torque")
-    (shift,), _ = find_shifts(log, _UP.card())
+    (shift,), _ = detect_shifts(log, _UP.card())
     assert shift.torque_phase[0] == shift.torque_phase[1] == shift.inertia_phase[0]
     assert shift.sigma["torque_start"] >= ShiftSettings().unknown_torque_phase
     assert any("torque phase set empty" in warning for warning in shift.warnings)
@@ -200,7 +200,7 @@ def test_oncoming_element_that_takes_hold_after_break_away() -> None:
     late = log["pressure.B3"]
     shifted = np.interp(late.time - 0.3, late.time, late.values)
     channels = {**log.channels, "pressure.B3": replace(late, values=shifted)}
-    (shift,), _ = find_shifts(replace(log, channels=channels), _UP.card())
+    (shift,), _ = detect_shifts(replace(log, channels=channels), _UP.card())
     assert shift.torque_phase[0] == shift.inertia_phase[0]
     assert any("after break-away" in warning for warning in shift.warnings)
 
@@ -217,7 +217,7 @@ def _pressure_cut(span: tuple[float, float]) -> ShiftLog:
 @pytest.mark.parametrize("span", [(-1.0, 1.4), (-1.0, 1.6), (0.3, 1.4), (1.2, 1.4)])
 def test_refused_where_the_oncoming_pressure_rises_unseen(span: tuple[float, float]) -> None:
     """The first sample there is, or a line across a gap, tells no onset."""
-    shifts, (rejected,) = find_shifts(_pressure_cut(span), _UP.card())
+    shifts, (rejected,) = detect_shifts(_pressure_cut(span), _UP.card())
     low = span[0] - 1e-3 if span[0] > 0.0 else 0.5
     assert shifts == ()
     assert f"the pressure of B3 is missing from {low:.3f} s" in rejected.reason
@@ -227,7 +227,7 @@ def test_refused_where_the_oncoming_pressure_rises_unseen(span: tuple[float, flo
 def test_oncoming_pressure_that_is_there_when_it_rises_tells_the_onset(
     span: tuple[float, float],
 ) -> None:
-    (shift,), _ = find_shifts(_pressure_cut(span), _UP.card())
+    (shift,), _ = detect_shifts(_pressure_cut(span), _UP.card())
     assert shift.torque_phase == _only(_UP).torque_phase
 
 
@@ -240,13 +240,13 @@ def test_refused_where_the_open_element_rests_above_P0() -> None:
         else channel
         for role, channel in log.channels.items()
     }
-    shifts, (rejected,) = find_shifts(replace(log, channels=channels), _UP.card())
+    shifts, (rejected,) = detect_shifts(replace(log, channels=channels), _UP.card())
     assert shifts == ()
     assert "B2 holds the gear, but the pressure of B3 is never below" in rejected.reason
 
 
 def test_ratio_off_the_card_is_warned_of() -> None:
-    (shift,), _ = find_shifts(_UP.log(), make_card({"2": 1.92, "3": 1.43}))
+    (shift,), _ = detect_shifts(_UP.log(), make_card({"2": 1.92, "3": 1.43}))
     assert any("gear 2 is 1.91, the card says 1.92" in warning for warning in shift.warnings)
 
 
@@ -256,7 +256,7 @@ def test_gap_and_spikes_outside_the_shift_do_no_harm() -> None:
     values = speed.values.copy()
     values[700:760] = np.nan
     values[[200, 900, 2600]] = 1e4
-    (shift,), rejected = find_shifts(
+    (shift,), rejected = detect_shifts(
         replace(log, channels={**log.channels, "input_speed": replace(speed, values=values)}),
         _UP.card(),
     )
@@ -265,7 +265,7 @@ def test_gap_and_spikes_outside_the_shift_do_no_harm() -> None:
 
 
 def _refused(log: ShiftLog, ratios: dict[str, float]) -> str:
-    shifts, rejected = find_shifts(log, make_card(ratios))
+    shifts, rejected = detect_shifts(log, make_card(ratios))
     assert shifts == ()
     assert rejected
     return " | ".join(candidate.reason for candidate in rejected)
@@ -332,7 +332,7 @@ def test_standstill_and_steady_gear_hold_no_candidate() -> None:
     output = np.clip(60.0 * (time - 1.0), 0.0, 90.0)
     idle = np.maximum(1.91 * output, 0.0)
     log = make_log({"input_speed": (time, idle), "output_speed": (time, output)})
-    assert find_shifts(log, make_card(_CARD)) == ((), ())
+    assert detect_shifts(log, make_card(_CARD)) == ((), ())
 
 
 def test_standing_throughout_is_said() -> None:
@@ -346,7 +346,7 @@ def test_speeds_without_common_time() -> None:
     log = _UP.log()
     later = replace(log["output_speed"], time=log["output_speed"].time + 100.0)
     with pytest.raises(TimeError, match="common times"):
-        find_shifts(replace(log, channels={**log.channels, "output_speed": later}), _UP.card())
+        detect_shifts(replace(log, channels={**log.channels, "output_speed": later}), _UP.card())
 
 
 def test_repeats_of_a_held_speed_count_once() -> None:
@@ -358,17 +358,17 @@ def test_repeats_of_a_held_speed_count_once() -> None:
         channel = log[role]
         index = np.searchsorted(channel.time, fast + 1e-9, side="right") - 1
         channels[role] = replace(channel, time=fast, values=channel.values[index], held=True)
-    (shift,), _ = find_shifts(replace(log, channels=channels), _UP.card())
-    (fresh,), _ = find_shifts(log, _UP.card())
+    (shift,), _ = detect_shifts(replace(log, channels=channels), _UP.card())
+    (fresh,), _ = detect_shifts(log, _UP.card())
     assert shift.lockup_time == pytest.approx(fresh.lockup_time, abs=1e-6)
     assert shift.sigma["lockup"] == pytest.approx(fresh.sigma["lockup"], rel=1e-3)
 
 
 def test_missing_speed_is_a_typed_error() -> None:
     with pytest.raises(MissingChannelError, match="output_speed"):
-        find_shifts(_without(_UP.log(), "output_speed"), _UP.card())
+        detect_shifts(_without(_UP.log(), "output_speed"), _UP.card())
     with pytest.raises(MissingChannelError, match="input_speed"):
-        find_shifts(_without(_UP.log(), "input_speed"), _UP.card())
+        detect_shifts(_without(_UP.log(), "input_speed"), _UP.card())
 
 
 def test_settings_must_be_positive() -> None:
@@ -385,7 +385,7 @@ def test_a_gear_that_the_slip_passes_once_more_is_not_held_again() -> None:
     inlet = np.where(time < 2.4, (1.0 - fast) * (1.91 * output + off) + fast * 1.43 * output, 0.0)
     inlet = np.where(time < 2.4, inlet, 1.43 * output)
     log = make_log({"input_speed": (time, inlet), "output_speed": (time, output)})
-    (shift,), rejected = find_shifts(log, make_card({"2": 1.91, "3": 1.43}))
+    (shift,), rejected = detect_shifts(log, make_card({"2": 1.91, "3": 1.43}))
     assert rejected == ()
     assert shift.before[0] == 0.0
     assert shift.lockup_time == pytest.approx(2.4, abs=0.02)

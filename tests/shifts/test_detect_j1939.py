@@ -9,8 +9,8 @@ import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.detect import find_shifts
-from drivetwin.shifts.lockup_clutch import lock_ups
+from drivetwin.shifts.detect import detect_shifts
+from drivetwin.shifts.lockup_clutch import detect_lock_ups
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -32,7 +32,7 @@ def recording(name: str) -> tuple[ShiftLog, VehicleCard]:
 
 @pytest.mark.parametrize("name", EVENTS)
 def test_shifts_and_phases(name: str) -> None:
-    found = find_shifts(*recording(name))
+    found = detect_shifts(*recording(name))
     expected = EVENTS[name][1]
     assert found.rejected == ()
     assert [(s.start_gear, s.end_gear) for s in found.shifts] == [e[:2] for e in expected]
@@ -49,6 +49,6 @@ def test_shifts_and_phases(name: str) -> None:
 
 @pytest.mark.parametrize("name", EVENTS)
 def test_lock_up_of_the_converter(name: str) -> None:
-    (found,) = lock_ups(*recording(name))
+    (found,) = detect_lock_ups(*recording(name))
     assert found.time == pytest.approx(EVENTS[name][0], abs=0.05)
     assert found.warning == ""

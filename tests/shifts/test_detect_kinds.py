@@ -9,11 +9,11 @@ import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import card_text, log_text
+from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -32,8 +32,8 @@ def recording(
 ) -> tuple[ShiftLog, VehicleCard, ShiftKind]:
     bench = run(load_scenario(request.param), seed=2)
     folder = tmp_path_factory.mktemp("kind")
-    (folder / "log.csv").write_text(log_text(bench))
-    (folder / "card.toml").write_text(card_text(bench.scenario))
+    (folder / "log.csv").write_text(format_log(bench))
+    (folder / "card.toml").write_text(format_card(bench.scenario))
     card = load_card(folder / "card.toml")
     return read_log(folder / "log.csv", card), card, KINDS[request.param]
 
@@ -43,8 +43,8 @@ def test_kind_and_phases_hold_without_pressures_and_torque_sensor(
 ) -> None:
     log, card, kind = recording
     bare = {r: c for r, c in log.channels.items() if not r.startswith(("pressure", "output_t"))}
-    (full,), rejected = find_shifts(log, card)
-    (few,), none = find_shifts(replace(log, channels=bare), card)
+    (full,), rejected = detect_shifts(log, card)
+    (few,), none = detect_shifts(replace(log, channels=bare), card)
     assert rejected == none == ()
     for shift in (full, few):
         assert shift.kind is kind
@@ -60,10 +60,10 @@ def test_the_vibration_dose_needs_a_torque_sensor(
     recording: tuple[ShiftLog, VehicleCard, ShiftKind],
 ) -> None:
     log, card, _ = recording
-    (shift,), _ = find_shifts(log, card)
+    (shift,), _ = detect_shifts(log, card)
     assert shift.quality["vibration_dose"] > 0.0
     bare = {role: c for role, c in log.channels.items() if role != "output_torque"}
-    (shift,), _ = find_shifts(replace(log, channels=bare), card)
+    (shift,), _ = detect_shifts(replace(log, channels=bare), card)
     assert "vibration_dose" not in shift.quality
 
 
@@ -72,7 +72,7 @@ def test_friction_work_is_told_where_the_on_coming_element_carries_the_torque(
 ) -> None:
     """In a power-on downshift the off-going one slips under it: T_o times the slip is negative."""
     log, card, kind = recording
-    (shift,), _ = find_shifts(log, card)
+    (shift,), _ = detect_shifts(log, card)
     work = {name: value for name, value in shift.quality.items() if name.startswith("friction_")}
     told = {"friction_work", "friction_power_max"}
     assert set(work) == (set() if kind is ShiftKind.POWER_ON_DOWN else told)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.shifts.gear_runs import Run, gear_runs
+from drivetwin.shifts.gear_runs import Run, detect_gear_runs
 from drivetwin.shifts.kinematics import GearboxSpeeds
 from drivetwin.shifts.settings import ShiftSettings
 
@@ -17,7 +17,7 @@ _TIME = np.arange(0.0, 2.0, 1e-3)
 def _runs(ratio: NDArray[np.float64], output: NDArray[np.float64] | None = None) -> list[Run]:
     speed = np.full_like(_TIME, 80.0) if output is None else output
     speeds = GearboxSpeeds(_TIME, ratio * speed, speed)
-    return gear_runs(speeds, _RATIOS, ShiftSettings())
+    return detect_gear_runs(speeds, _RATIOS, ShiftSettings())
 
 
 def _gears(runs: list[Run]) -> list[str | None]:
@@ -48,5 +48,5 @@ def test_close_gears_keep_apart_in_noise() -> None:
     rng = np.random.default_rng(3)
     ratio = np.where(_TIME < 1.0, 1.04, 1.0) * (1.0 + 2e-3 * rng.normal(size=len(_TIME)))
     speeds = GearboxSpeeds(_TIME, 80.0 * ratio, np.full_like(_TIME, 80.0))
-    runs = gear_runs(speeds, {"a": 1.04, "b": 1.0}, ShiftSettings())
+    runs = detect_gear_runs(speeds, {"a": 1.04, "b": 1.0}, ShiftSettings())
     assert [run.gear for run in runs if run.gear] == ["a", "b"]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -22,7 +22,7 @@ def _card(second: float, third: float, P0: PriorValue) -> VehicleCard:
 @pytest.mark.parametrize("name", _CASES)
 def test_noise_free_events(name: str) -> None:
     truth = load_reference(name)
-    (shift,), rejected = find_shifts(truth.log, _card(1.91, 1.43, PriorValue(0.8e5)))
+    (shift,), rejected = detect_shifts(truth.log, _card(1.91, 1.43, PriorValue(0.8e5)))
     assert rejected == ()
     assert shift.lockup_time == pytest.approx(truth.lock_up, abs=5e-4)
     assert shift.inertia_phase[0] == pytest.approx(truth.break_away, abs=2e-3)
@@ -36,7 +36,7 @@ def test_lock_up_with_noise(name: str) -> None:
     errors, scores = [], []
     for seed in range(8):
         truth = load_reference(name, noise=(0.3, 0.05), seed=seed)
-        (shift,), _ = find_shifts(truth.log, _card(1.91, 1.43, PriorValue(0.8e5)))
+        (shift,), _ = detect_shifts(truth.log, _card(1.91, 1.43, PriorValue(0.8e5)))
         errors.append(shift.lockup_time - truth.lock_up)
         scores.append(errors[-1] / shift.sigma["lockup"])
     assert np.median(np.abs(errors)) < 2e-3
@@ -46,7 +46,7 @@ def test_lock_up_with_noise(name: str) -> None:
 @pytest.mark.parametrize("name", ["truck_a", "paper_like"])
 def test_measured_logs(name: str) -> None:
     log, card = load_measured(name)
-    (shift,), rejected = find_shifts(log, card)
+    (shift,), rejected = detect_shifts(log, card)
     assert rejected == ()
     assert shift.kind is ShiftKind.POWER_ON_UP
     assert 0.05 < shift.torque_phase[1] - shift.torque_phase[0] < 0.3
@@ -55,7 +55,10 @@ def test_measured_logs(name: str) -> None:
     assert shift.sigma["inertia_start"] < 5e-3
     # The output torque has its hole before break-away and rises after it.
     torque = log["output_torque"]
-    at = [float(torque.at(np.array([t]))[0]) for t in (shift.before[1], *shift.torque_phase[1:])]
+    at = [
+        float(torque.interpolate(np.array([t]))[0])
+        for t in (shift.before[1], *shift.torque_phase[1:])
+    ]
     assert at[1] < at[0]
     assert shift.quality["torque_hole_depth"] > 0.2 * at[0]
     assert shift.warnings == ()

@@ -10,15 +10,15 @@ import pytest
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.lockup_clutch import (
     LETS_GO,
-    behind_converter,
-    converter_slip,
-    lock_ups,
-    open_spans,
-    require_closed,
-    unseen,
+    compute_mean_slip,
+    detect_lock_ups,
+    find_open_spans,
+    refer_to_turbine,
+    require_locked_converter,
+    warn_unobserved_lockup,
 )
 from drivetwin.simulation.converter_map import Converter
 from tests.shifts.fixtures import Plan, make_card
@@ -47,19 +47,19 @@ def closing(at: float) -> FloatArray:
 
 
 def test_the_flag_tells_when_and_the_speeds_agree() -> None:
-    (found,) = lock_ups(log(closing(2.0), (TIME >= 1.999).astype(np.float64)), CARD)
+    (found,) = detect_lock_ups(log(closing(2.0), (TIME >= 1.999).astype(np.float64)), CARD)
     assert found.time == pytest.approx(2.0, abs=1e-9)
     assert found.sigma == pytest.approx(0.02 / np.sqrt(12.0))
     assert found.warning == ""
 
 
 def test_a_flag_that_lies_is_told() -> None:
-    (found,) = lock_ups(log(closing(9.0), (TIME > 2.0).astype(np.float64)), CARD)
+    (found,) = detect_lock_ups(log(closing(9.0), (TIME > 2.0).astype(np.float64)), CARD)
     assert "differ by 12.0 %" in found.warning
 
 
 def test_without_a_flag_the_speeds_tell() -> None:
-    (found,) = lock_ups(log(closing(2.0)), CARD)
+    (found,) = detect_lock_ups(log(closing(2.0)), CARD)
     assert abs(found.time - 2.0) < 4.0 * found.sigma
     assert found.end > 5.9
 
@@ -68,36 +68,40 @@ def test_a_late_engine_speed_is_no_opening() -> None:
     made = PLAN.log()
     inlet = made["input_speed"]
     late = replace(inlet, role="engine_speed", time=inlet.time + 0.03)
-    assert lock_ups(replace(made, channels={**made.channels, "engine_speed": late}), CARD) == ()
+    assert (
+        detect_lock_ups(replace(made, channels={**made.channels, "engine_speed": late}), CARD) == ()
+    )
 
 
 def test_the_speeds_tell_where_it_is_open() -> None:
-    ((start, end),) = open_spans(log(closing(2.0)), 1.0)
+    ((start, end),) = find_open_spans(log(closing(2.0)), 1.0)
     assert start == pytest.approx(0.0, abs=0.06)
     assert end == pytest.approx(2.0, abs=0.1)
-    assert open_spans(log(INLET), 1.0) == ()
-    assert open_spans(ShiftLog({}, "made", ""), 1.0) == ()
+    assert find_open_spans(log(INLET), 1.0) == ()
+    assert find_open_spans(ShiftLog({}, "made", ""), 1.0) == ()
 
 
 def test_a_late_engine_speed_is_not_open() -> None:
     made = PLAN.log()
     inlet = made["input_speed"]
     late = replace(inlet, role="engine_speed", time=inlet.time + 0.08)
-    assert open_spans(replace(made, channels={**made.channels, "engine_speed": late}), 1.0) == ()
+    assert (
+        find_open_spans(replace(made, channels={**made.channels, "engine_speed": late}), 1.0) == ()
+    )
 
 
 def test_closed_throughout_is_no_event() -> None:
-    assert lock_ups(log(INLET), CARD) == ()
-    assert lock_ups(log(INLET, np.ones(TIME.size)), CARD) == ()
+    assert detect_lock_ups(log(INLET), CARD) == ()
+    assert detect_lock_ups(log(INLET, np.ones(TIME.size)), CARD) == ()
 
 
 def test_mean_slip() -> None:
-    assert converter_slip(log(1.05 * INLET), CARD, (1.0, 3.0)) == pytest.approx(0.05)
-    assert converter_slip(ShiftLog({}, "made", ""), CARD, (1.0, 3.0)) is None
+    assert compute_mean_slip(log(1.05 * INLET), CARD, (1.0, 3.0)) == pytest.approx(0.05)
+    assert compute_mean_slip(ShiftLog({}, "made", ""), CARD, (1.0, 3.0)) is None
 
 
 def test_a_shift_with_an_open_converter_is_refused() -> None:
-    (shift,), _ = find_shifts(PLAN.log(), PLAN.card())
+    (shift,), _ = detect_shifts(PLAN.log(), PLAN.card())
     made = PLAN.log()
     inlet = made["input_speed"]
     for factor, refused in ((1.0, False), (1.05, True)):
@@ -105,22 +109,22 @@ def test_a_shift_with_an_open_converter_is_refused() -> None:
         whole = replace(made, channels={**made.channels, "engine_speed": engine})
         if refused:
             with pytest.raises(IdentificationError, match=r"converter is open.*5\.0 %"):
-                require_closed(whole, PLAN.card(), shift)
+                require_locked_converter(whole, PLAN.card(), shift)
         else:
-            require_closed(whole, PLAN.card(), shift)
+            require_locked_converter(whole, PLAN.card(), shift)
 
 
 def test_with_a_map_the_turbine_stands_for_the_engine() -> None:
     converter = Converter((0.0, 1.0), (0.05, 0.0), (2.0, 1.0))
     card = replace(PLAN.card(), converter=converter)
-    (shift,), _ = find_shifts(PLAN.log(), card)
+    (shift,), _ = detect_shifts(PLAN.log(), card)
     made = PLAN.log()
     inlet = made["input_speed"]
     for factor in (1.25, 1.0):
         engine = replace(inlet, role="engine_speed", values=factor * inlet.values)
         whole = replace(made, channels={**made.channels, "engine_speed": engine})
-        require_closed(whole, card, shift)
-        found = behind_converter(whole, card, shift)
+        require_locked_converter(whole, card, shift)
+        found = refer_to_turbine(whole, card, shift)
         if factor == 1.0:
             assert found is whole
             continue
@@ -128,7 +132,7 @@ def test_with_a_map_the_turbine_stands_for_the_engine() -> None:
         # ν = 0.8: C = 0.01, m = 1.2.
         expected = 1.2 * 0.01 * engine.values**2
         assert found["engine_torque"].values == pytest.approx(expected)
-        assert behind_converter(found, card, shift) is found
+        assert refer_to_turbine(found, card, shift) is found
 
 
 def test_the_turbine_torque_is_told_from_fresh_speeds() -> None:
@@ -139,12 +143,12 @@ def test_the_turbine_torque_is_told_from_fresh_speeds() -> None:
     inlet = made["input_speed"]
     engine = replace(inlet, role="engine_speed", values=1.25 * inlet.values)
     exact = replace(made, channels={**made.channels, "engine_speed": engine})
-    (shift,), _ = find_shifts(exact, card)
+    (shift,), _ = detect_shifts(exact, card)
     stale = np.arange(inlet.time.size) // 20 * 20
     held = {one.role: replace(one, values=one.values[stale], held=True) for one in (engine, inlet)}
-    found = behind_converter(replace(made, channels={**made.channels, **held}), card, shift)
+    found = refer_to_turbine(replace(made, channels={**made.channels, **held}), card, shift)
     torque = found["engine_torque"]
-    expected = behind_converter(exact, card, shift)["engine_torque"].at(torque.time)
+    expected = refer_to_turbine(exact, card, shift)["engine_torque"].interpolate(torque.time)
     assert torque.time.size < inlet.time.size / 10
     assert torque.values == pytest.approx(expected, rel=1e-9)
 
@@ -164,8 +168,8 @@ def behind(slip: FloatArray, flag: FloatArray | None = None) -> ShiftLog:
         )
     card = replace(PLAN.card(), converter=CONVERTER)
     whole = replace(made, channels=channels)
-    (shift,), _ = find_shifts(whole, card)
-    return behind_converter(whole, card, shift)
+    (shift,), _ = detect_shifts(whole, card)
+    return refer_to_turbine(whole, card, shift)
 
 
 def test_where_the_lock_up_clutch_closes_the_map_tells_nothing() -> None:
@@ -191,10 +195,15 @@ def test_a_map_that_ends_short_of_the_shift_is_refused() -> None:
 
 def test_a_converter_that_no_channel_shows_is_told() -> None:
     card = replace(CARD, converter=CONVERTER)
-    assert unseen(log(INLET), card) == ()
+    assert warn_unobserved_lockup(log(INLET), card) == ()
     blind = ShiftLog({"input_speed": log(INLET)["input_speed"]}, "made", "")
-    assert unseen(blind, CARD) == ()
-    (text,) = unseen(blind, card)
+    assert warn_unobserved_lockup(blind, CARD) == ()
+    (text,) = warn_unobserved_lockup(blind, card)
     assert "no engine_speed" in text
     flag = log(INLET, np.ones(TIME.size))["lockup_engaged"]
-    assert unseen(replace(blind, channels={**blind.channels, "lockup_engaged": flag}), card) == ()
+    assert (
+        warn_unobserved_lockup(
+            replace(blind, channels={**blind.channels, "lockup_engaged": flag}), card
+        )
+        == ()
+    )

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.shifts.detect import find_shifts
-from drivetwin.shifts.quality import QUALITY_UNITS, shift_quality
+from drivetwin.shifts.detect import detect_shifts
+from drivetwin.shifts.quality import QUALITY_UNITS, compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
@@ -46,7 +46,7 @@ def _log(output_torque: NDArray[np.float64] | None = None, excess: float = 0.0) 
 
 
 def test_without_torque_only_times_and_speeds() -> None:
-    figures = shift_quality(_log(), _CARD, _SHIFT)
+    figures = compute_shift_quality(_log(), _CARD, _SHIFT)
     assert set(figures) == {
         "shift_time",
         "torque_phase_time",
@@ -61,20 +61,20 @@ def test_without_torque_only_times_and_speeds() -> None:
 
 
 def test_flare_and_undershoot() -> None:
-    clean = shift_quality(_log(), _CARD, _SHIFT)
+    clean = compute_shift_quality(_log(), _CARD, _SHIFT)
     assert clean["flare_speed"] < 0.5
     assert clean["undershoot_speed"] < 0.5
     # 40 rad/s above a ratio that has fallen by 0.125 at that instant.
-    flare = shift_quality(_log(excess=40.0), _CARD, _SHIFT)
+    flare = compute_shift_quality(_log(excess=40.0), _CARD, _SHIFT)
     assert flare["flare_speed"] == pytest.approx(40.0 - 12.5, rel=0.1)
-    under = shift_quality(_log(excess=-60.0), _CARD, _SHIFT)
+    under = compute_shift_quality(_log(excess=-60.0), _CARD, _SHIFT)
     assert under["undershoot_speed"] == pytest.approx(60.0 - 37.5, rel=0.1)
 
 
 def test_torque_hole_and_tie_up() -> None:
     """A triangular hole of 900 N·m over 0.3 s, where a clean hand-over loses a quarter of 2000."""
     hole = np.interp(_TIME, [1.0, 1.2, 1.3], [0.0, 900.0, 0.0])
-    figures = shift_quality(_log(2000.0 - hole), _CARD, _SHIFT)
+    figures = compute_shift_quality(_log(2000.0 - hole), _CARD, _SHIFT)
     assert figures["torque_hole_depth"] == pytest.approx(900.0, rel=0.05)
     assert figures["torque_hole_area"] == pytest.approx(0.5 * 900.0 * 0.3, rel=0.02)
     assert figures["tie_up_torque"] == pytest.approx(900.0 - 500.0, rel=0.12)
@@ -83,7 +83,7 @@ def test_torque_hole_and_tie_up() -> None:
 def test_hole_counts_in_the_direction_of_power() -> None:
     hole = np.interp(_TIME, [1.0, 1.2, 1.3], [0.0, 900.0, 0.0])
     coast = replace(_SHIFT, kind=ShiftKind.POWER_OFF_DOWN)
-    figures = shift_quality(_log(-2000.0 + hole), _CARD, coast)
+    figures = compute_shift_quality(_log(-2000.0 + hole), _CARD, coast)
     assert figures["torque_hole_depth"] == pytest.approx(900.0, rel=0.05)
     assert "tie_up_torque" not in figures
 
@@ -93,7 +93,7 @@ def test_lockup_oscillation_and_jerk() -> None:
     omega = 2.0 * np.pi * 5.0
     ring = np.where(_TIME >= 1.6, 500.0 * np.sin(omega * (_TIME - 1.6)), 0.0)
     J_v = 6000.0
-    figures = shift_quality(_log(2000.0 + ring), _CARD, _SHIFT, J_vehicle=J_v)
+    figures = compute_shift_quality(_log(2000.0 + ring), _CARD, _SHIFT, J_vehicle=J_v)
     gain = _CARD.final_drive / J_v
     assert figures["lockup_oscillation"] == pytest.approx(1000.0, rel=0.02)
     assert figures["torque_rate_max"] == pytest.approx(500.0 * omega, rel=0.03)
@@ -105,8 +105,8 @@ def test_lockup_oscillation_and_jerk() -> None:
 
 def test_friction_work_in_closed_form() -> None:
     """T_c = T_o/iout, slip from Δi·ω_out/ic linearly to zero."""
-    figures = shift_quality(_log(np.full_like(_TIME, 1500.0)), _CARD, _SHIFT)
-    i_c, i_out = _CARD.clutch_ratios("B3")
+    figures = compute_shift_quality(_log(np.full_like(_TIME, 1500.0)), _CARD, _SHIFT)
+    i_c, i_out = _CARD.get_clutch_ratios("B3")
     slip = 0.5 * 100.0 / i_c
     assert figures["friction_work"] == pytest.approx(0.5 * 1500.0 / i_out * slip * 0.4, rel=0.01)
     assert figures["friction_power_max"] == pytest.approx(1500.0 / i_out * slip, rel=0.01)
@@ -116,7 +116,7 @@ def test_friction_work_in_closed_form() -> None:
 def test_friction_work_of_the_reference(name: str) -> None:
     """Eq. 16 leaves out Jo'·ω_out': small on the work of cases without drum inertia."""
     truth = load_reference(name)
-    (shift,), _ = find_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, PriorValue(0.8e5)))
+    (shift,), _ = detect_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, PriorValue(0.8e5)))
     time = truth.columns["time_s"]
     inside = (time >= truth.break_away) & (time <= truth.lock_up)
     power = (truth.columns["T_c3_Nm"] * truth.columns["slip_3_rad_s"])[inside]
@@ -126,7 +126,7 @@ def test_friction_work_of_the_reference(name: str) -> None:
 
 def test_every_figure_has_a_unit_and_is_reached() -> None:
     truth = load_reference("upshift")
-    (shift,), _ = find_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, PriorValue(0.8e5)))
+    (shift,), _ = detect_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, PriorValue(0.8e5)))
     assert set(shift.quality) == set(QUALITY_UNITS)
     assert all(np.isfinite(value) for value in shift.quality.values())
 
@@ -134,7 +134,7 @@ def test_every_figure_has_a_unit_and_is_reached() -> None:
 def test_cut_or_damaged_torque_gives_no_torque_figures() -> None:
     torque = np.full_like(_TIME, 1500.0)
     torque[1100:1500] = np.nan
-    assert "torque_hole_depth" not in shift_quality(_log(torque), _CARD, _SHIFT)
+    assert "torque_hole_depth" not in compute_shift_quality(_log(torque), _CARD, _SHIFT)
 
 
 def test_speeds_too_slow_for_the_inertia_phase_tell_no_flare() -> None:
@@ -142,12 +142,12 @@ def test_speeds_too_slow_for_the_inertia_phase_tell_no_flare() -> None:
     log = _log()
     slow = {role: (one.time[::50], one.values[::50]) for role, one in log.channels.items()}
     between = replace(_SHIFT, inertia_phase=(1.21, 1.24), lockup_time=1.24, after=(1.24, 3.0))
-    figures = shift_quality(make_log(slow), _CARD, between)
+    figures = compute_shift_quality(make_log(slow), _CARD, between)
     assert figures["inertia_phase_time"] == pytest.approx(0.03)
     assert not {"flare_speed", "undershoot_speed"} & set(figures)
 
 
 def test_a_vehicle_of_which_next_to_nothing_is_known_has_its_figures() -> None:
     unknown = replace(_CARD, J_vehicle_range=(0.0, 9000.0))
-    jerk = shift_quality(_log(np.sin(40.0 * _TIME)), unknown, _SHIFT)["wheel_jerk_max"]
+    jerk = compute_shift_quality(_log(np.sin(40.0 * _TIME)), unknown, _SHIFT)["wheel_jerk_max"]
     assert np.isfinite(jerk)

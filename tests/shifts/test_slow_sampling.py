@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from drivetwin.shifts.slow_sampling import begun, ended
+from drivetwin.shifts.slow_sampling import locate_slip_end, locate_slip_start
 
 STEP = 0.02
 
@@ -27,8 +27,8 @@ def test_both_ends_of_a_slip_are_within_a_few_samples(
     noise = 0.2
     ramp = sign * change * np.clip((time - start) / duration, 0.0, 1.0)
     error = noise * np.random.default_rng(seed).normal(size=time.size)
-    left = begun(time, (ramp + error)[time < start + duration], noise)
-    came = ended(time, ramp - sign * change + error, noise)
+    left = locate_slip_start(time, (ramp + error)[time < start + duration], noise)
+    came = locate_slip_end(time, ramp - sign * change + error, noise)
     assert left is not None
     assert came is not None
     # A twentieth of the change counts as begun, so the boundary lies that much late at most.
@@ -42,16 +42,16 @@ def test_small_slip_while_the_gear_is_held_is_no_beginning() -> None:
     time = np.arange(0.0, 2.0, STEP)
     swing = 0.03 * 40.0 * np.sin(2.0 * np.pi * 4.0 * time)
     ramp = -40.0 * np.clip((time - 1.5) / 0.4, 0.0, 1.0)
-    found = begun(time, (ramp + swing)[time < 1.9], 0.2)
+    found = locate_slip_start(time, (ramp + swing)[time < 1.9], 0.2)
     assert found is not None
     assert found.time == pytest.approx(1.52, abs=0.03)
 
 
 def test_a_slip_that_never_moves_or_never_rests_has_no_boundary() -> None:
     time = np.arange(0.0, 1.0, STEP)
-    assert ended(time, np.full(time.size, 20.0), 0.2) is None
-    assert ended(time, np.zeros(time.size), 0.2) is None
-    assert begun(time, np.full(time.size, 20.0), 0.2) is None
+    assert locate_slip_end(time, np.full(time.size, 20.0), 0.2) is None
+    assert locate_slip_end(time, np.zeros(time.size), 0.2) is None
+    assert locate_slip_start(time, np.full(time.size, 20.0), 0.2) is None
 
 
 @given(
@@ -67,7 +67,7 @@ def test_the_uncertainty_of_a_beginning_holds_a_soft_onset(
     time = np.arange(0.0, 3.0, STEP)
     slip = change * np.clip((time - start) / duration, 0.0, 1.0) ** power
     error = 0.1 * np.random.default_rng(seed).normal(size=time.size)
-    found = begun(time, (slip + error)[time < start + duration], 0.1)
+    found = locate_slip_start(time, (slip + error)[time < start + duration], 0.1)
     assert found is not None
     assert abs(found.time - start) < 3.0 * found.sigma
 
@@ -76,7 +76,7 @@ def test_a_slip_that_creeps_for_long_begins_where_it_is_first_seen() -> None:
     time = np.arange(0.0, 3.0, STEP)
     creep = 4.0 * np.clip(time - 1.0, 0.0, None)
     slip = creep + 40.0 * np.clip((time - 1.5) / 0.4, 0.0, 1.0)
-    found = begun(time, slip[time < 1.9], 0.05)
+    found = locate_slip_start(time, slip[time < 1.9], 0.05)
     assert found is not None
     assert found.time == pytest.approx(1.1, abs=0.02)
 
@@ -86,7 +86,7 @@ def test_one_sample_that_swings_after_lock_up_moves_it_little() -> None:
     slip = -40.0 * np.clip((1.2 - time) / 0.4, 0.0, 1.0)
     swinging = slip.copy()
     swinging[62] = 0.8
-    found = [ended(time, one, 0.15) for one in (slip, swinging)]
+    found = [locate_slip_end(time, one, 0.15) for one in (slip, swinging)]
     assert found[0] is not None
     assert found[1] is not None
     assert found[0].time == pytest.approx(1.2, abs=STEP)
@@ -108,7 +108,7 @@ def test_a_slip_that_turns_after_a_flare_began_with_the_flare(
     slip = rise - pace * np.clip(time - start - duration, 0.0, None)
     error = 0.2 * np.random.default_rng(seed).normal(size=time.size)
     end = start + duration + (40.0 + flare) / pace
-    found = begun(time, (slip + error)[time < end], 0.2)
+    found = locate_slip_start(time, (slip + error)[time < end], 0.2)
     assert found is not None
     assert found.time < start + duration
     assert abs(found.time - start) < 3.0 * found.sigma
@@ -123,8 +123,8 @@ def test_whatever_the_slip_a_boundary_is_told_within_it_or_none(
     slip: list[float], noise: float
 ) -> None:
     time = np.linspace(0.0, STEP * (len(slip) - 1), len(slip))
-    for find in (begun, ended):
+    for find in (locate_slip_start, locate_slip_end):
         found = find(time, np.array(slip), noise)
         if found is not None:
-            assert 0.0 <= found.time <= time[-1] + STEP or find is ended
+            assert 0.0 <= found.time <= time[-1] + STEP or find is locate_slip_end
             assert found.sigma > 0.0

@@ -6,7 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.split_gears import apart, divided, own_samples
+from drivetwin.shifts.split_gears import (
+    compute_exclusive_masks,
+    compute_exclusive_spans,
+    split_shared_gears,
+)
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 
@@ -24,8 +28,8 @@ CHAIN = (shift(2.0, 3.0, (0.0, 7.0)), shift(7.0, 8.0, (3.0, 12.0)), shift(12.0, 
 
 
 def test_shifts_apart_share_no_sample() -> None:
-    assert divided(CHAIN) == ((0.0, 5.0), (5.0, 10.0), (10.0, 14.0))
-    one, other, last = apart(CHAIN)
+    assert compute_exclusive_spans(CHAIN) == ((0.0, 5.0), (5.0, 10.0), (10.0, 14.0))
+    one, other, last = split_shared_gears(CHAIN)
     assert one.after[1] == other.before[0] == 5.0
     assert other.after[1] == last.before[0] == 10.0
     assert one.before == CHAIN[0].before
@@ -34,16 +38,16 @@ def test_shifts_apart_share_no_sample() -> None:
 
 def test_each_instant_is_one_shifts_own() -> None:
     times = [np.arange(one.before[0], one.after[1] + 0.25, 0.5) for one in CHAIN]
-    own = own_samples(CHAIN, times)
+    own = compute_exclusive_masks(CHAIN, times)
     left = np.concatenate([time[kept] for time, kept in zip(times, own, strict=True)])
     assert np.array_equal(left, np.arange(0.0, 14.25, 0.5))
 
 
 def test_a_single_shift_keeps_all_samples() -> None:
-    (own,) = own_samples(CHAIN[:1], [np.linspace(-1.0, 20.0, 30)])
+    (own,) = compute_exclusive_masks(CHAIN[:1], [np.linspace(-1.0, 20.0, 30)])
     assert own.all()
 
 
 def test_a_gear_of_which_less_counts_is_not_divided() -> None:
     one, other = shift(2.0, 3.0, (0.0, 6.0)), shift(20.0, 21.0, (12.0, 24.0))
-    assert divided((one, other)) == ((0.0, 6.0), (12.0, 24.0))
+    assert compute_exclusive_spans((one, other)) == ((0.0, 6.0), (12.0, 24.0))

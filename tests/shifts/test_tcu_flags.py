@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
-from drivetwin.shifts.detect import find_shifts
-from drivetwin.shifts.tcu_flags import set_spans
+from drivetwin.shifts.detect import detect_shifts
+from drivetwin.shifts.tcu_flags import find_flag_spans
 from tests.shifts.fixtures import Plan
 
 PLAN = Plan(gears=(("2", 1.91), ("3", 1.43)), break_aways=(1.5,))
@@ -32,7 +32,7 @@ def test_a_single_wrong_frame_is_no_change_of_a_flag() -> None:
     values = flag((1.0, 1.5))
     values[[30, 120, 300]] = 1.0 - values[[30, 120, 300]]
     (channel,) = states(shift_in_process=values).values()
-    (span,) = set_spans(channel)
+    (span,) = find_flag_spans(channel)
     assert span == pytest.approx((1.0, 1.5))
 
 
@@ -42,7 +42,7 @@ def with_states(log: ShiftLog, **values: FloatArray) -> ShiftLog:
 
 def test_spans_of_a_flag() -> None:
     (channel,) = states(shift_in_process=flag((0.0, 0.2), (1.0, 1.5), (3.9, 4.0))).values()
-    assert np.array(set_spans(channel)) == pytest.approx(
+    assert np.array(find_flag_spans(channel)) == pytest.approx(
         np.array([(0.0, 0.2), (1.0, 1.5), (3.9, 3.99)])
     )
 
@@ -51,7 +51,7 @@ def test_agreeing_flags_add_nothing() -> None:
     log = with_states(
         PLAN.log(), shift_in_process=flag((1.1, 2.1)), gear=np.where(TIME < 2.0, 2.0, 3.0)
     )
-    found = find_shifts(log, PLAN.card())
+    found = detect_shifts(log, PLAN.card())
     assert found.rejected == ()
     assert found.shifts[0].warnings == ()
 
@@ -60,7 +60,7 @@ def test_contradictions_are_told() -> None:
     log = with_states(
         PLAN.log(), shift_in_process=flag((2.9, 3.4)), gear=np.where(TIME < 2.0, 4.0, 3.0)
     )
-    (shift,), (empty,) = find_shifts(log, PLAN.card())
+    (shift,), (empty,) = detect_shifts(log, PLAN.card())
     assert "the shift flag is not set during this shift" in shift.warnings
     assert any("tells gear 4" in text and "gear 2" in text for text in shift.warnings)
     assert empty.time == pytest.approx((2.9, 3.4))
@@ -71,7 +71,7 @@ def test_the_flag_bounds_a_torque_phase_that_nothing_else_tells() -> None:
     log = PLAN.log()
     bare = {r: c for r, c in log.channels.items() if not r.startswith(("pressure", "output_t"))}
     log = with_states(replace(log, channels=bare), shift_in_process=flag((1.0, 2.1)))
-    (shift,), _ = find_shifts(log, PLAN.card())
+    (shift,), _ = detect_shifts(log, PLAN.card())
     onset, sigma = shift.torque_phase[0], shift.sigma["torque_start"]
     assert onset == pytest.approx(1.25, abs=0.01)
     assert abs(onset - (1.5 - PLAN.torque_phase)) < 2.0 * sigma
@@ -83,7 +83,7 @@ def test_a_flag_where_a_speed_is_missing_says_which() -> None:
     outlet = log["output_speed"]
     keep = outlet.time < 2.5
     dead = replace(outlet, time=outlet.time[keep], values=outlet.values[keep])
-    _, (empty,) = find_shifts(
+    _, (empty,) = detect_shifts(
         replace(log, channels={**log.channels, "output_speed": dead}), PLAN.card()
     )
     assert f"{outlet.source_name!r} has no samples" in empty.reason

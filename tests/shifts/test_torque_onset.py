@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import card_text
+from drivetwin.dyno.files import format_card
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.shifts.detect import find_shifts
-from drivetwin.shifts.torque_onset import pressure_onset, smoothed, torque_dip_onset
+from drivetwin.shifts.detect import detect_shifts
+from drivetwin.shifts.torque_onset import locate_pressure_onset, locate_torque_dip, smooth_channel
 from drivetwin.vehicle.card import load_card
 
 _TIME = np.arange(0.0, 1.0, 1e-3)
@@ -36,9 +36,9 @@ def _ramp(start: float) -> NDArray[np.float64]:
 
 
 def test_smoothing_keeps_a_ramp_and_tells_the_noise() -> None:
-    clean = smoothed(_channel(_SLOPE * _TIME), _SPAN)
+    clean = smooth_channel(_channel(_SLOPE * _TIME), _SPAN)
     assert clean.values[10:-10] == pytest.approx(_SLOPE * _TIME[10:-10])
-    noisy = smoothed(_channel(np.zeros_like(_TIME), noise=8e3), _SPAN)
+    noisy = smooth_channel(_channel(np.zeros_like(_TIME), noise=8e3), _SPAN)
     assert noisy.noise == pytest.approx(8e3 / np.sqrt(11.0), rel=0.1)
     assert np.std(noisy.values) == pytest.approx(noisy.noise, rel=0.15)
 
@@ -46,7 +46,9 @@ def test_smoothing_keeps_a_ramp_and_tells_the_noise() -> None:
 def test_crossing_within_sigma() -> None:
     scores = []
     for seed in range(30):
-        onset = pressure_onset(smoothed(_channel(_ramp(0.6), 8e3, seed), _SPAN), (_P0, 0.0), 0.8)
+        onset = locate_pressure_onset(
+            smooth_channel(_channel(_ramp(0.6), 8e3, seed), _SPAN), (_P0, 0.0), 0.8
+        )
         assert onset is not None
         scores.append((onset.time - 0.6) / onset.sigma)
     assert np.abs(scores).max() < 4.0
@@ -54,30 +56,32 @@ def test_crossing_within_sigma() -> None:
 
 
 def test_unsure_P0_widens_sigma() -> None:
-    pressure = smoothed(_channel(_ramp(0.6)), _SPAN)
-    onset = pressure_onset(pressure, (_P0, 0.1e5), 0.8)
+    pressure = smooth_channel(_channel(_ramp(0.6)), _SPAN)
+    onset = locate_pressure_onset(pressure, (_P0, 0.1e5), 0.8)
     assert onset is not None
     assert onset.sigma == pytest.approx(0.1e5 / _SLOPE, rel=0.2)
 
 
 def test_filling_pulse_is_no_onset() -> None:
     pulse = np.where(np.abs(_TIME - 0.3) < 0.03, 3e5, 0.0)
-    onset = pressure_onset(smoothed(_channel(_ramp(0.6) + pulse), _SPAN), (_P0, 0.0), 0.8)
+    onset = locate_pressure_onset(
+        smooth_channel(_channel(_ramp(0.6) + pulse), _SPAN), (_P0, 0.0), 0.8
+    )
     assert onset is not None
     assert onset.time == pytest.approx(0.6, abs=1e-3)
 
 
 def test_onset_after_break_away_and_never() -> None:
-    pressure = smoothed(_channel(_ramp(0.6)), _SPAN)
-    onset = pressure_onset(pressure, (_P0, 0.0), 0.5)
+    pressure = smooth_channel(_channel(_ramp(0.6)), _SPAN)
+    onset = locate_pressure_onset(pressure, (_P0, 0.0), 0.5)
     assert onset is not None
     assert onset.time == pytest.approx(0.6, abs=1e-3)
-    assert pressure_onset(pressure, (20e5, 0.0), 0.8) is None
+    assert locate_pressure_onset(pressure, (20e5, 0.0), 0.8) is None
 
 
 def test_torque_dip() -> None:
     dip = 2400.0 - 3e3 * np.clip(_TIME - 0.6, 0.0, None)
-    onset = torque_dip_onset(smoothed(_channel(dip, noise=10.0), _SPAN), 0.8, 0.75)
+    onset = locate_torque_dip(smooth_channel(_channel(dip, noise=10.0), _SPAN), 0.8, 0.75)
     assert onset is not None
     assert abs(onset.time - 0.6) < 3.0 * onset.sigma
     assert onset.sigma < 0.02
@@ -87,13 +91,13 @@ def test_torque_dip() -> None:
 def test_no_clear_dip(course: float) -> None:
     """A steady or a rising torque tells no onset."""
     steady = _channel(2400.0 + course * _TIME, noise=10.0)
-    assert torque_dip_onset(smoothed(steady, _SPAN), 0.8, 0.75) is None
+    assert locate_torque_dip(smooth_channel(steady, _SPAN), 0.8, 0.75) is None
 
 
 def test_a_fall_of_the_engine_torque_before_is_not_taken_for_the_shift() -> None:
     driver = np.where(_TIME < 0.3, 3200.0, 2400.0)
     dip = driver - 3e3 * np.clip(_TIME - 0.6, 0.0, None)
-    onset = torque_dip_onset(smoothed(_channel(dip, noise=10.0), _SPAN), 0.8, 0.75)
+    onset = locate_torque_dip(smooth_channel(_channel(dip, noise=10.0), _SPAN), 0.8, 0.75)
     assert onset is not None
     assert abs(onset.time - 0.6) < 3.0 * onset.sigma
 
@@ -105,10 +109,10 @@ def test_without_pressures_the_output_torque_tells_the_onset(
     name: ScenarioName, tmp_path: Path
 ) -> None:
     bench = run(load_scenario(name), seed=0)
-    (tmp_path / "card.toml").write_text(card_text(bench.scenario))
+    (tmp_path / "card.toml").write_text(format_card(bench.scenario))
     roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
     channels = {one.role: one for one in bench.channels if one.role in roles}
-    found = find_shifts(ShiftLog(channels, "made", ""), load_card(tmp_path / "card.toml"))
+    found = detect_shifts(ShiftLog(channels, "made", ""), load_card(tmp_path / "card.toml"))
     assert len(found.shifts) == len(bench.truth.shifts)
     for shift, true in zip(found.shifts, bench.truth.shifts, strict=True):
         assert true.torque_start is not None

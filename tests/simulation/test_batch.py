@@ -13,7 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.batch import Batch, Keep, Scenario, batch_sensitivities, simulate_batch
+from drivetwin.simulation.batch import (
+    Batch,
+    Keep,
+    Scenario,
+    simulate_batch,
+    simulate_batch_sensitivities,
+)
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     DualClutch,
@@ -25,8 +31,8 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
     Stribeck,
-    sensitivities,
     simulate,
+    simulate_sensitivities,
 )
 
 FRICTION = Stribeck(mu_c=0.12, mu_s=0.145, v_s=6.0, mu_v=1e-4)
@@ -277,7 +283,9 @@ BY = ("eta", "B3.mu_c", "start.twist", "delay.engine torque")
 
 def test_derivatives_are_those_of_each_run_alone() -> None:
     given, values = scenario(), sets(3)
-    found = batch_sensitivities(MODEL, [given], TIME, values, by=BY, outputs=["shaft_torque"])
+    found = simulate_batch_sensitivities(
+        MODEL, [given], TIME, values, by=BY, outputs=["shaft_torque"]
+    )
     assert found.derivatives.shape == (3, len(BY), 1, TIME.size)
     for run in range(3):
         off, on = MODEL.elements
@@ -285,7 +293,9 @@ def test_derivatives_are_those_of_each_run_alone() -> None:
         on = dataclasses.replace(on, gain=values["B3.gain"][run], friction=friction)
         changed = {name: values[name][run] for name in ("eta", "J1", "k_o")}
         model = dataclasses.replace(MODEL, elements=(off, on), **changed)
-        alone = sensitivities(model, given.engine_torque, given.pressures, given.start, TIME, BY)
+        alone = simulate_sensitivities(
+            model, given.engine_torque, given.pressures, given.start, TIME, BY
+        )
         for place, name in enumerate(BY):
             np.testing.assert_array_equal(
                 found.derivatives[run, place, 0], alone.derivatives[name].shaft_torque
@@ -297,7 +307,7 @@ def test_derivatives_are_those_of_each_run_alone() -> None:
 def test_gradients_of_misfits_are_their_slopes() -> None:
     measured = simulate_batch(MODEL, [scenario()], TIME, outputs=["shaft_torque"]).values[0]
     at = {"eta": np.array([0.85 * 1.01]), "k_o": np.array([1.8e5])}
-    found = batch_sensitivities(
+    found = simulate_batch_sensitivities(
         MODEL, [scenario()], TIME, at, by=["eta", "k_o"], keep=[measured[0]]
     )
     for place, name in enumerate(("eta", "k_o")):
@@ -319,18 +329,22 @@ def test_derivatives_by_more_parameters_than_one_pass_takes(delay: tuple[str, ..
         f"{element}.{field}" for element in ("B2", "B3") for field in ("P0", "gain", "v_s", "mu_c")
     ]
     assert len(names) > 16
-    together = batch_sensitivities(MODEL, [scenario()], TIME, by=names, keep=Keep.LAST)
+    together = simulate_batch_sensitivities(MODEL, [scenario()], TIME, by=names, keep=Keep.LAST)
     # Beside a delay every sample starts anew, which leaves another round-off.
     tolerance = 1e-9 if delay else 0.0
     for place in (len(delay), 16):
-        one = batch_sensitivities(MODEL, [scenario()], TIME, by=[names[place]], keep=Keep.LAST)
+        one = simulate_batch_sensitivities(
+            MODEL, [scenario()], TIME, by=[names[place]], keep=Keep.LAST
+        )
         same = together.derivatives[:, place]
         np.testing.assert_allclose(same, one.derivatives[:, 0], rtol=tolerance)
 
 
 def test_a_run_that_fails_has_no_derivatives() -> None:
     values = {"J1": np.array([20.6, -1.0])}
-    found = batch_sensitivities(MODEL, [scenario()], TIME, values, by=["eta"], keep=Keep.LAST)
+    found = simulate_batch_sensitivities(
+        MODEL, [scenario()], TIME, values, by=["eta"], keep=Keep.LAST
+    )
     assert list(found.batch.failed) == [1]
     assert np.isfinite(found.derivatives[0]).all()
     assert np.isnan(found.derivatives[1]).all()
@@ -346,7 +360,7 @@ def test_a_run_that_fails_has_no_derivatives() -> None:
 )
 def test_derivatives_by_nothing_known_are_refused(by: list[str] | str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        batch_sensitivities(MODEL, [scenario()], TIME, by=by)
+        simulate_batch_sensitivities(MODEL, [scenario()], TIME, by=by)
 
 
 def test_a_derivative_by_the_delay_of_a_jump_is_refused() -> None:
@@ -354,11 +368,11 @@ def test_a_derivative_by_the_delay_of_a_jump_is_refused() -> None:
     jump = Signal(np.array([0.0, 0.4, 0.4, 1.0]), np.array([1400.0, 1400.0, 700.0, 700.0]))
     scenarios = [smooth, dataclasses.replace(smooth, engine_torque=jump)]
     with pytest.raises(InputError, match=r"'engine torque' jumps at 0\.4 s"):
-        batch_sensitivities(MODEL, scenarios, TIME, by=["delay.engine torque"])
+        simulate_batch_sensitivities(MODEL, scenarios, TIME, by=["delay.engine torque"])
 
 
 def test_times_too_far_from_zero_are_refused() -> None:
     with pytest.raises(InputError, match="too far for a simulation"):
         simulate_batch(MODEL, [scenario()], TIME + 1e9)
     with pytest.raises(InputError, match="too far for a simulation"):
-        batch_sensitivities(MODEL, [scenario()], TIME + 1e9, by=["eta"])
+        simulate_batch_sensitivities(MODEL, [scenario()], TIME + 1e9, by=["eta"])

@@ -22,9 +22,9 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
     Stribeck,
-    in_series,
-    sensitivities,
+    compute_series_inertia,
     simulate,
+    simulate_sensitivities,
 )
 from tests.export.cases import SHARED, given, paper_model
 
@@ -55,20 +55,20 @@ def test_the_steady_torque_lasts(law: LossLaw, engine_torque: float, speed: floa
     model = replace(paper_model(), loss_law=law, J2e=2.1, load=RoadLoad(2000.0, 3000.0))
     torque, pressures, _ = held_second_gear()
     torque = replace(torque, values=np.full(2, engine_torque))
-    wheel = speed / model.ratio("B2") / model.i_f
-    carried = model.steady_torque(engine_torque, model.ratio("B2"), wheel)
-    start = State(speed, speed / model.ratio("B2"), wheel, carried / model.k_o, ("B2",))
+    wheel = speed / model.get_overall_ratio("B2") / model.i_f
+    carried = model.compute_steady_torque(engine_torque, model.get_overall_ratio("B2"), wheel)
+    start = State(speed, speed / model.get_overall_ratio("B2"), wheel, carried / model.k_o, ("B2",))
     run = simulate(model, torque, pressures, start, np.linspace(0.0, 0.2, 21))
     assert run.shaft_torque == pytest.approx(carried, rel=1e-9)
 
 
 def test_the_sides_of_the_shaft_swing_at_their_inertia_in_series() -> None:
     model = replace(paper_model(), c_o=0.0)
-    before, behind = model.sides(model.ratio("B2"))
+    before, behind = model.compute_side_inertias(model.get_overall_ratio("B2"))
     assert (before, behind) == pytest.approx((20.3 * 0.85 * 1.91**2 + 0.9, 6056.0 / 5.38**2))
-    omega = np.sqrt(model.k_o / in_series(before, behind))
+    omega = np.sqrt(model.k_o / compute_series_inertia(before, behind))
     torque, pressures, start = held_second_gear()
-    steady = model.steady_torque(float(torque.values[0]), 1.91, start.wheel_speed)
+    steady = model.compute_steady_torque(float(torque.values[0]), 1.91, start.wheel_speed)
     time = np.array([0.0, np.pi / omega])
     run = simulate(model, torque, pressures, replace(start, twist=1.1 * steady / model.k_o), time)
     assert run.shaft_torque == pytest.approx([1.1 * steady, 0.9 * steady], rel=1e-9)
@@ -131,7 +131,7 @@ def test_energy_created_by_the_paper_law_is_reported_and_absent_with_the_dissipa
 def test_a_table_and_its_stribeck_law_agree_where_the_table_is_fine() -> None:
     law = Stribeck(0.110, 0.135, 15.0, 1e-4)
     slip = np.linspace(0.0, 150.0, 3001)
-    table = FrictionTable(tuple(slip), tuple(law.at(slip)))
+    table = FrictionTable(tuple(slip), tuple(law.evaluate(slip)))
     torque, _, start = held_second_gear(0.3)
     pressures = {
         "B2": Signal(torque.time, np.zeros(2)),
@@ -280,7 +280,7 @@ def test_derivatives_agree_with_central_differences_through_all_events(name: str
     torque, pressures, start, time = upshift()
     model = paper_model()
     change, step = PARAMETERS[name]
-    found = sensitivities(model, torque, pressures, start, time, [name])
+    found = simulate_sensitivities(model, torque, pressures, start, time, [name])
     up, down = (simulate(change(model, d), torque, pressures, start, time) for d in (step, -step))
     exact = found.derivatives[name].shaft_torque
     difference = (up.shaft_torque - down.shaft_torque) / (2 * step)
@@ -295,7 +295,7 @@ def test_a_start_speed_acts_through_the_lock_and_its_losses(name: str) -> None:
     """The start agrees with the lock; one that does not is brought there by impulses."""
     torque, pressures, start, time = upshift()
     model, time = paper_model(), time[:51]
-    found = sensitivities(model, torque, pressures, start, time, [f"start.{name}"])
+    found = simulate_sensitivities(model, torque, pressures, start, time, [f"start.{name}"])
     value, step = getattr(start, name), 1e-3
     up, down = (
         simulate(model, torque, pressures, replace(start, **{name: value + d}), time)
@@ -311,7 +311,7 @@ def test_what_is_nothing_now_has_a_derivative_all_the_same() -> None:
     plain = paper_model()
     model = replace(plain, c_o=0.0, load=replace(plain.load, aero=0.0, rolling=0.0))
     steps = {"c_o": 1e-2, "load.aero": 1e-3}
-    found = sensitivities(model, torque, pressures, start, time, list(steps))
+    found = simulate_sensitivities(model, torque, pressures, start, time, list(steps))
     exact = Accuracy(exact=True)
     none = simulate(model, torque, pressures, start, time, accuracy=exact)
     for name, step in steps.items():
@@ -333,7 +333,7 @@ def test_what_is_nothing_now_has_a_derivative_all_the_same() -> None:
 def test_a_derivative_by_a_resistance_that_holds_nothing_is_refused() -> None:
     torque, pressures, start, time = upshift()
     with pytest.raises(InputError, match=r"load\.rolling"):
-        sensitivities(paper_model(), torque, pressures, start, time, ["load.rolling"])
+        simulate_sensitivities(paper_model(), torque, pressures, start, time, ["load.rolling"])
 
 
 def test_a_start_that_is_no_number_is_refused_by_name() -> None:
@@ -345,7 +345,7 @@ def test_a_start_that_is_no_number_is_refused_by_name() -> None:
 
 def test_the_derivative_by_a_delay_agrees_with_differences() -> None:
     torque, pressures, start, time = upshift()
-    found = sensitivities(
+    found = simulate_sensitivities(
         paper_model(), torque, pressures, start, time, ["delay.engine torque", "delay.B3"]
     )
     step = 1e-6
@@ -367,8 +367,8 @@ def test_a_derivative_by_the_delay_of_a_jump_is_refused() -> None:
     jump = Signal(np.array([0.0, 0.4, 0.4, 1.0]), np.array([1500.0, 1500.0, 750.0, 750.0]))
     given = (paper_model(), jump, pressures, start, np.linspace(0.0, 1.0, 11))
     with pytest.raises(InputError, match=r"'engine torque' jumps at 0\.4 s"):
-        sensitivities(*given, ["eta", "delay.engine torque"])
-    assert sensitivities(*given, ["eta", "delay.B2"]).run.status == "completed"
+        simulate_sensitivities(*given, ["eta", "delay.engine torque"])
+    assert simulate_sensitivities(*given, ["eta", "delay.B2"]).run.status == "completed"
 
 
 def test_derivatives_by_more_parameters_than_one_pass_takes_stand_under_their_names() -> None:
@@ -379,10 +379,10 @@ def test_derivatives_by_more_parameters_than_one_pass_takes_stand_under_their_na
         *(f"B{i}.{field}" for i in (2, 3) for field in ("P0", "gain", "mu_c", "mu_s")),
     ]
     assert len(names) > 16
-    found = sensitivities(paper_model(), torque, pressures, start, time, names)
+    found = simulate_sensitivities(paper_model(), torque, pressures, start, time, names)
     assert list(found.derivatives) == names == list(found.event_times)
     for name in (names[0], names[15], names[16], names[-1]):
-        alone = sensitivities(paper_model(), torque, pressures, start, time, [name])
+        alone = simulate_sensitivities(paper_model(), torque, pressures, start, time, [name])
         assert len(alone.derivatives) == 1
         one, same = alone.derivatives[name], found.derivatives[name]
         np.testing.assert_allclose(same.shaft_torque, one.shaft_torque, rtol=1e-9, atol=1e-9)
@@ -394,9 +394,9 @@ def test_derivatives_by_more_parameters_than_one_pass_takes_stand_under_their_na
 def test_an_unknown_parameter_of_a_derivative_is_refused() -> None:
     torque, pressures, start, time = upshift()
     with pytest.raises(InputError, match=r"parameter \"B3\.nu\" is unknown"):
-        sensitivities(paper_model(), torque, pressures, start, time, ["B3.nu"])
+        simulate_sensitivities(paper_model(), torque, pressures, start, time, ["B3.nu"])
     with pytest.raises(InputError, match="the text 'eta'"):
-        sensitivities(paper_model(), torque, pressures, start, time, "eta")
+        simulate_sensitivities(paper_model(), torque, pressures, start, time, "eta")
 
 
 def test_times_too_far_from_zero_are_refused() -> None:
@@ -407,4 +407,4 @@ def test_times_too_far_from_zero_are_refused() -> None:
     with pytest.raises(InputError, match=r"time reaches 1.76387e\+09 s from zero"):
         simulate(paper_model(), torque, pressures, start, time + far)
     with pytest.raises(InputError, match="too far for a simulation"):
-        sensitivities(paper_model(), torque, pressures, start, time - far, ["eta"])
+        simulate_sensitivities(paper_model(), torque, pressures, start, time - far, ["eta"])

@@ -19,7 +19,7 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
     Stribeck,
-    in_series,
+    compute_series_inertia,
     simulate,
 )
 from drivetwin.simulation.linearize import Slip, linearise
@@ -51,7 +51,7 @@ def test_the_lock_up_oscillation_has_the_frequency_of_two_inertias_on_a_shaft() 
     inertia = 1 / (1 / gear + MODEL.i_f**2 / MODEL.J_v)
     natural = np.sqrt(MODEL.k_o / inertia)
     damping = MODEL.c_o / (2 * np.sqrt(MODEL.k_o * inertia))
-    (mode,) = linearise(MODEL, ["B3"]).oscillations()
+    (mode,) = linearise(MODEL, ["B3"]).find_oscillations()
     assert mode.damping == pytest.approx(damping, rel=1e-9)
     assert mode.frequency == pytest.approx(
         natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=1e-9
@@ -67,7 +67,7 @@ def test_the_slope_of_friction_is_that_of_its_law(
     model = dataclasses.replace(MODEL, elements=(B2, dataclasses.replace(B3, friction=law)))
     outputs = [("friction_torque", "B3"), ("slip", "B3")]
     system = linearise(model, [], {"B3": Slip(slip, 5e5)}, outputs)
-    before, at, after = law.at(np.array([slip - 1e-4, slip, slip + 1e-4]))
+    before, at, after = law.evaluate(np.array([slip - 1e-4, slip, slip + 1e-4]))
     sign = np.sign(slip)
     slope = sign * B3.gain * (5e5 - B3.P0) * (after - before) / 2e-4
     assert system.C[0] == pytest.approx(slope * system.C[1], rel=1e-6, abs=1e-9)
@@ -86,7 +86,7 @@ def test_the_slope_of_a_bearing_is_that_of_its_table() -> None:
 
 
 def test_the_eigenfrequency_agrees_with_the_ring_down_in_time() -> None:
-    (mode,) = linearise(MODEL, ["B3"]).oscillations()
+    (mode,) = linearise(MODEL, ["B3"]).find_oscillations()
     time = np.arange(0, 1, 1e-3)
     held = Signal(time, np.full_like(time, 1200.0))
     pressures = {"B2": Signal(time, 0 * time), "B3": Signal(time, np.full_like(time, 1.5e6))}
@@ -110,7 +110,7 @@ def test_critical_damping_is_no_oscillation(
         {"type": "inertia", "name": node, "node": node, "inertia": inertia}
         for node, inertia in zip("ab", inertias, strict=True)
     ]
-    critical = 2.0 * math.sqrt(stiffness * in_series(*inertias))
+    critical = 2.0 * math.sqrt(stiffness * compute_series_inertia(*inertias))
     swings = []
     for damping in (critical, critical * (1.0 - 1e-6)):
         shaft: Element = {
@@ -121,7 +121,7 @@ def test_critical_damping_is_no_oscillation(
             "stiffness": stiffness,
             "damping": damping,
         }
-        swings.append(linearise([*elements, shaft], []).oscillations())
+        swings.append(linearise([*elements, shaft], []).find_oscillations())
     assert swings[0] == ()
     (mode,) = swings[1]
     assert mode.damping == pytest.approx(1.0 - 1e-6, abs=1e-9)
@@ -130,7 +130,7 @@ def test_critical_damping_is_no_oscillation(
 def test_the_frequency_response_is_what_a_sine_settles_to() -> None:
     system = linearise(MODEL, [], {"B3": Slip(60.0, 5e5)})
     frequency = 9.0
-    response = system.frequency_response(np.array([frequency]))[0, 0]
+    response = system.compute_frequency_response(np.array([frequency]))[0, 0]
     by_pressure = response[system.inputs.index("B3")]
     time = np.arange(0, 2, 1e-4)
     amplitude = 100.0  # Pa
@@ -142,7 +142,9 @@ def test_the_frequency_response_is_what_a_sine_settles_to() -> None:
     constant = dataclasses.replace(B3, friction=Stribeck(0.12, 0.12, 6.0, 0.0))
     model = dataclasses.replace(MODEL, elements=(B2, constant))
     system = linearise(model, [], {"B3": Slip(60.0, 5e5)})
-    by_pressure = system.frequency_response(np.array([frequency]))[0, 0][system.inputs.index("B3")]
+    by_pressure = system.compute_frequency_response(np.array([frequency]))[0, 0][
+        system.inputs.index("B3")
+    ]
     start = State(400.0, 100.0, 100.0 / 6, 0.02)
     runs = [
         simulate(model, flat, {"B2": idle, "B3": p}, start, time).shaft_torque
@@ -156,8 +158,8 @@ def test_the_frequency_response_is_what_a_sine_settles_to() -> None:
 
 
 def test_a_falling_friction_curve_takes_damping_away() -> None:
-    plain = linearise(MODEL, [], {"B3": Slip(200.0, 8e5)}).oscillations()
-    steep = linearise(MODEL, [], {"B3": Slip(2.0, 8e5)}).oscillations()
+    plain = linearise(MODEL, [], {"B3": Slip(200.0, 8e5)}).find_oscillations()
+    steep = linearise(MODEL, [], {"B3": Slip(2.0, 8e5)}).find_oscillations()
     assert steep[-1].damping < plain[-1].damping
 
 
@@ -177,7 +179,7 @@ def test_a_network_swings_as_the_closed_form_of_its_chain_says() -> None:
     # ω⁴ - p ω² + q = 0 of three inertias in a row, beside the free turning of the whole.
     p, q = k / a + (k + h) / b + h / c, k * h * (a + b + c) / (a * b * c)
     squares = np.sort(np.roots([1.0, -p, q]))
-    found = [mode.frequency for mode in linearise(chain, []).oscillations()]
+    found = [mode.frequency for mode in linearise(chain, []).find_oscillations()]
     assert found == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-9)
 
 
@@ -196,14 +198,14 @@ def test_inputs_of_what_is_held_are_left_out() -> None:
     assert system.inputs == ("torque",)
     assert system.B.shape == (len(system.states), 1)
     assert system.B[system.states.index("a"), 0] == pytest.approx(1.0)
-    assert [mode.frequency for mode in system.oscillations()] == pytest.approx([5.0 / np.pi])
+    assert [mode.frequency for mode in system.find_oscillations()] == pytest.approx([5.0 / np.pi])
 
 
 def test_there_is_no_response_at_an_eigenvalue() -> None:
     system = linearise(MODEL, ["B3"])  # turns freely
-    assert np.isfinite(system.frequency_response(np.array([0.1, 5.0]))).all()
+    assert np.isfinite(system.compute_frequency_response(np.array([0.1, 5.0]))).all()
     with pytest.raises(InputError, match="is an eigenvalue"):
-        system.frequency_response(np.array([0.0, 5.0]))
+        system.compute_frequency_response(np.array([0.0, 5.0]))
 
 
 def test_a_driveline_that_is_held_has_a_static_response() -> None:
@@ -224,13 +226,13 @@ def test_a_driveline_that_is_held_has_a_static_response() -> None:
     ]
     outputs = [("shaft_torque", "soft"), ("twist", "stiff"), ("speed", "a")]
     outputs.append(("friction_torque", "park"))
-    still, slow = linearise(elements, ["park"], outputs=outputs).frequency_response(
+    still, slow = linearise(elements, ["park"], outputs=outputs).compute_frequency_response(
         np.array([0.0, 1e-6])
     )[:, :, 0]
     assert still == pytest.approx([3.0 * 0.4, 3.0 / 1e5, 0.0, 3.0], rel=1e-12, abs=1e-15)
     assert still == pytest.approx(slow, abs=1e-6)
     with pytest.raises(InputError, match="is an eigenvalue"):
-        linearise(elements, [], outputs=outputs).frequency_response(np.array([0.0]))
+        linearise(elements, [], outputs=outputs).compute_frequency_response(np.array([0.0]))
 
 
 def test_unknown_names_are_refused() -> None:

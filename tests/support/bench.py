@@ -9,9 +9,13 @@ import numpy as np
 
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.estimation.data.noise import resolution
-from drivetwin.estimation.data.prepare import sampled
-from drivetwin.estimation.data.shift_data import Coupling, Driveline, ShiftSignals
+from drivetwin.estimation.data.noise import estimate_resolution
+from drivetwin.estimation.data.prepare import prepare_signal
+from drivetwin.estimation.data.shift_data import (
+    KnownDriveline,
+    ShiftElementKinematics,
+    ShiftSignals,
+)
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
@@ -35,7 +39,7 @@ class Bench:
     """Signals and structure of one realisation, with its truth by id."""
 
     signals: ShiftSignals
-    driveline: Driveline
+    driveline: KnownDriveline
     truth: dict[str, float]
     run: DynoRun
 
@@ -54,8 +58,10 @@ def record_bench(scenario: Scenario, seed: int, know: Knowledge, noise: float = 
         P0 = PriorValue(one.P0 + know.P0 * float(rng.standard_normal()), know.P0)
         about = max(0.0, one.drum_inertia + know.drum * float(rng.standard_normal()))
         drum = PriorValue(about, know.drum)
-        couplings[one.name] = Coupling(one.name, 1.0 / one.i_c, one.i_out, one.gain, P0, drum)
-    driveline = Driveline(
+        couplings[one.name] = ShiftElementKinematics(
+            one.name, 1.0 / one.i_c, one.i_out, one.gain, P0, drum
+        )
+    driveline = KnownDriveline(
         model.i_f,
         couplings[scenario.offgoing],
         couplings[scenario.oncoming],
@@ -71,7 +77,7 @@ def _sample_signals(made: DynoRun) -> ShiftSignals:
     assert truth.torque_start is not None
     assert truth.inertia_start is not None
     assert truth.lockup is not None
-    channels = {channel.role: sampled(channel) for channel in made.channels}
+    channels = {channel.role: prepare_signal(channel) for channel in made.channels}
     end = made.scenario.duration
     start = truth.torque_start - 0.02
     shift = Shift(
@@ -95,5 +101,5 @@ def _sample_signals(made: DynoRun) -> ShiftSignals:
         channels["wheel_speed"],
         {n: channels[f"pressure.{n}"] for n in (scenario.offgoing, scenario.oncoming)},
         shift,
-        resolution(channels["engine_torque"].values),
+        estimate_resolution(channels["engine_torque"].values),
     )

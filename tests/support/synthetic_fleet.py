@@ -15,7 +15,7 @@ import numpy as np
 
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import card_text, log_text
+from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.simulation.dual_clutch import Stribeck
@@ -139,7 +139,7 @@ def _make_aged(mu: float, P0: float) -> Scenario:
     (element,) = (each for each in base.model.elements if each.name == ELEMENT)
     law = element.friction
     assert isinstance(law, Stribeck)
-    factor = mu / float(law.at(np.array([SLIP]))[0])
+    factor = mu / float(law.evaluate(np.array([SLIP]))[0])
     aged = replace(
         element,
         P0=P0,
@@ -182,7 +182,7 @@ def plan(count: int, truth: Truth, seed: int = 0) -> list[Made]:
 
 def _write(folder: Path, seed: int, numbered: tuple[int, Made]) -> None:
     number, made = numbered
-    text = log_text(run(_make_aged(made.mu, made.P0), seed + number))
+    text = format_log(run(_make_aged(made.mu, made.P0), seed + number))
     data = DAMAGES[made.damage](text) if made.damage else text.encode()
     path = folder / made.path
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -197,7 +197,7 @@ def make_fleet(folder: Path, count: int, truth: Truth | None = None, seed: int =
     truth = truth or Truth()
     planned = plan(count, truth, seed)
     folder.mkdir(parents=True, exist_ok=True)
-    card = card_text(_make_aged(truth.mu.mean, truth.P0.mean))
+    card = format_card(_make_aged(truth.mu.mean, truth.P0.mean))
     known = f"P0_bar = {truth.P0.mean / 1e5}"
     assert known in card
     (folder / "card.toml").write_text(

@@ -13,7 +13,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import card_text, log_text
+from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.scenario_file import load_scenario
 
 Rows = list[list[str]]
@@ -24,8 +24,8 @@ NAMES = ["time", "EngTrq", "PrsBrk2", "PrsBrk3", "TrqOut", "SpdIn", "SpdOut", "S
 def good() -> tuple[str, str]:
     """Text of a usable log, thinned to 250 Hz for speed, and of its card."""
     bench = run(load_scenario("paper_steps"), seed=1)
-    head, units, *rows = log_text(bench).splitlines()
-    return "\n".join([head, units, *rows[::4]]) + "\n", card_text(bench.scenario)
+    head, units, *rows = format_log(bench).splitlines()
+    return "\n".join([head, units, *rows[::4]]) + "\n", format_card(bench.scenario)
 
 
 def _edit(change: Callable[[Rows], Rows]) -> Callable[[str], bytes]:

@@ -14,7 +14,7 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 
 from drivetwin.cli import main
-from drivetwin.export.compiler import native_platform
+from drivetwin.export.compiler import detect_platform
 
 ROOT = Path(__file__).resolve().parents[2]
 STIMULUS = "extra/org.fmi-standard.fmi-ls-ref/measured_shift-in.csv"
@@ -51,7 +51,7 @@ def same(told: np.ndarray, expected: np.ndarray) -> bool:
     return bool((np.abs(told - expected).max(axis=0) < 1e-9 * largest).all())
 
 
-@pytest.mark.skipif(native_platform() is None, reason="FMI names no platform like this one")
+@pytest.mark.skipif(detect_platform() is None, reason="FMI names no platform like this one")
 def test_fmu_3_with_the_log_as_input_is_simulate_with_held_inputs(
     identified: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -76,7 +76,7 @@ def test_fmu_3_with_the_log_as_input_is_simulate_with_held_inputs(
     assert same(columns, expected)
 
 
-@pytest.mark.skipif(native_platform() is None, reason="FMI names no platform like this one")
+@pytest.mark.skipif(detect_platform() is None, reason="FMI names no platform like this one")
 def test_fmu_2_with_input_rates_is_simulate_with_linear_inputs(
     identified: tuple[Path, Path], tmp_path: Path
 ) -> None:

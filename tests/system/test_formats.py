@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.cli.identify_run import run
+from drivetwin.cli.identify_run import run_identification
 from drivetwin.dyno import dyno
-from drivetwin.dyno.files import card_text, recorded_channels
+from drivetwin.dyno.files import convert_channels, format_card
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
@@ -22,12 +22,12 @@ ROUND_OFF = 1e-9
 def results(folder: Path, method: Method) -> dict[str, Identification]:
     bench = dyno.run(load_scenario("paper_steps"), seed=4)
     card = folder / "card.toml"
-    card.write_text(card_text(bench.scenario))
+    card.write_text(format_card(bench.scenario))
     found = {}
     for suffix in ("csv", "mf4", "mat", "parquet"):
         log = folder / f"log.{suffix}"
-        write_log(log, recorded_channels(bench))
-        found[suffix] = run(log, card, None, method).found
+        write_log(log, convert_channels(bench))
+        found[suffix] = run_identification(log, card, None, method).found
     return found
 
 

@@ -14,7 +14,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import usable_shifts
+from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.build import build_twin
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario
 from tests.support.shared_results import shared
@@ -41,7 +41,7 @@ def hilly() -> ShiftLog:
 @shared
 def found(method: Method) -> Identification:
     log = hilly()
-    return identify(log, card(), usable_shifts(log, card()), method)
+    return identify(log, card(), require_shifts(log, card()), method)
 
 
 @pytest.mark.parametrize("method", [Method.INTEGRAL, Method.LIKELIHOOD])
@@ -63,7 +63,7 @@ def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it(method: M
 def test_each_shift_is_simulated_on_its_own_grade() -> None:
     one, log = found(Method.LIKELIHOOD), hilly()
     twin = build_twin(one, card())
-    own = drivetwin.validated(one, twin, log)
+    own = drivetwin.attach_validation(one, twin, log)
     flat = replace(one, evidence=replace(one.evidence, loads=()))
-    shared = drivetwin.validated(flat, twin, log)
+    shared = drivetwin.attach_validation(flat, twin, log)
     assert own.fit["output_speed"]["all"].rmse < 0.2 * shared.fit["output_speed"]["all"].rmse

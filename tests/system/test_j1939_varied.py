@@ -14,8 +14,8 @@ import pytest
 
 from drivetwin.errors import MappingError, MissingChannelError
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.detect import FoundShifts, find_shifts
-from drivetwin.shifts.lockup_clutch import lock_ups
+from drivetwin.shifts.detect import FoundShifts, detect_shifts
+from drivetwin.shifts.lockup_clutch import detect_lock_ups
 from drivetwin.vehicle.card import load_card
 from tests.shifts.fixtures import ROOT, shared
 
@@ -62,7 +62,7 @@ def recorded() -> tuple[Frame, ...]:
 def found_in(frames: list[Frame], folder: Path) -> FoundShifts:
     path = folder / "bus.log"
     path.write_text("".join(f"{frame.line}\n" for frame in frames))
-    return find_shifts(read_log(path, CARD), CARD)
+    return detect_shifts(read_log(path, CARD), CARD)
 
 
 def other_addresses(frame: Frame) -> Frame:
@@ -158,4 +158,4 @@ def test_a_gateway_to_a_second_bus_is_a_choice(tmp_path: Path) -> None:
 def test_slip_through_shifts_is_no_lock_up(tmp_path: Path) -> None:
     path = tmp_path / "bus.log"
     path.write_text("".join(f"{one.blank(ETC1, 0, 1).line}\n" for one in recorded()))
-    assert lock_ups(read_log(path, CARD), CARD) == ()
+    assert detect_lock_ups(read_log(path, CARD), CARD) == ()

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.cli.identify_run import run
+from drivetwin.cli.identify_run import run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno import dyno
-from drivetwin.dyno.files import card_text
+from drivetwin.dyno.files import format_card
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.dyno.truth import Truth
@@ -31,12 +31,12 @@ def _identified(
 ) -> tuple[Identification, Truth]:
     bench = dyno.run(load_scenario(scenario), seed=11, noise=noise)
     log, card, _ = write_run(folder / "run.csv", bench)
-    return run(log, card, None, method).found, bench.truth
+    return run_identification(log, card, None, method).found, bench.truth
 
 
 def _friction_error(curve: FrictionCurve, law: Stribeck | FrictionTable) -> float:
     """Largest relative error of μ over the slip range seen."""
-    return float(np.abs(curve.mu / law.at(curve.slip) - 1.0).max())
+    return float(np.abs(curve.mu / law.evaluate(curve.slip) - 1.0).max())
 
 
 @pytest.fixture(scope="module", params=MODULATED)
@@ -132,8 +132,8 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Identification:
         folder / "log.csv", rows, fmt="%.12g", delimiter=",", header="\n".join(head), comments=""
     )
     card = folder / "card.toml"
-    card.write_text(card_text(load_scenario(ScenarioName.PAPER)), encoding="utf-8")
-    return run(folder / "log.csv", card, None, Method.INTEGRAL).found
+    card.write_text(format_card(load_scenario(ScenarioName.PAPER)), encoding="utf-8")
+    return run_identification(folder / "log.csv", card, None, Method.INTEGRAL).found
 
 
 @pytest.mark.parametrize("parameter", WITHIN_HALF_A_PERCENT)

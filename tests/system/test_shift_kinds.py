@@ -59,7 +59,7 @@ def test_truth_lies_in_the_intervals(
 
 def _holds(curve: dict[str, list[float]], law: Stribeck | FrictionTable) -> None:
     slip, low, high = (np.array(curve[key]) for key in ("slip", "mu_lo", "mu_hi"))
-    truth = law.at(slip)
+    truth = law.evaluate(slip)
     assert np.mean((truth >= low) & (truth <= high)) > 0.6
     assert slip.max() > 80.0
 

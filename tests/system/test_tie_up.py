@@ -10,14 +10,14 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from drivetwin.gearbox import Gearbox, builtin_gearboxes, load_gearbox, reduce
-from drivetwin.gearbox.compare import WholeGearbox, whole_gearbox
+from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox, reduce
+from drivetwin.gearbox.compare import WholeGearbox, build_whole_gearbox
 from drivetwin.gearbox.maneuver import plan
-from drivetwin.gearbox.network import network_elements
+from drivetwin.gearbox.network import build_network_elements
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.simulation.network import Element, NetworkRun, Output, Start, simulate
 
-BOXES = [name for name in builtin_gearboxes() if not load_gearbox(name).dogs]
+BOXES = [name for name in list_builtin_gearboxes() if not load_gearbox(name).dogs]
 SECOND = np.array([0.0, 1.0])
 RIGID_PLASTIC = {
     "friction": {"slip": [0.0], "mu": [1.0]},
@@ -31,7 +31,7 @@ def elements_of(box: Gearbox) -> list[Element]:
     """The gearbox with capacities equal to its pressures, and a torque on either shaft."""
     plain = [
         {**each, **RIGID_PLASTIC} if each["type"] == "clutch" else each
-        for each in network_elements(box)
+        for each in build_network_elements(box)
     ]
     shafts = {"input": box.input, "output": box.output}
     torques = [
@@ -46,7 +46,7 @@ def limit_load(box: Gearbox, capacities: dict[str, float], drive: float, way: fl
 
     The lower-bound theorem of plastic limit analysis; independent of how the torques are split.
     """
-    elements = network_elements(box)
+    elements = build_network_elements(box)
     ends = ("a", "b", "sun", "ring", "carrier", "node")
     nodes = sorted({each[end] for each in elements for end in ends if end in each} - {"ground"})
     unit = dict(zip(nodes, np.eye(len(nodes)), strict=True)) | {"ground": np.zeros(len(nodes))}
@@ -129,7 +129,7 @@ def under_any_pressures(name: str, rng: np.random.Generator) -> WholeGearbox:
     box = load_gearbox(name)
     assert box.drive is not None
     shift = reduce(box, box.gears[1].name, box.gears[2].name)
-    stated = whole_gearbox(shift, plan(shift, box.drive))
+    stated = build_whole_gearbox(shift, plan(shift, box.drive))
     pressures = [name for name in sorted(stated.inputs) if name != ENGINE_TORQUE]
     high = max(float(stated.inputs[name].values.max()) for name in pressures)
     torque = float(np.abs(stated.inputs[ENGINE_TORQUE].values).max())

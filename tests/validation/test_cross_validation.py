@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.validation import HeldOut, Outcome
-from drivetwin.validation.cross_validation import hold_out
+from drivetwin.validation.cross_validation import predict_held_shifts
 from tests.estimation.asked import by_the_paper
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario, source, together
 
@@ -40,9 +40,9 @@ def test_load_and_age_of_a_log_that_was_not_fitted_are_told_beside() -> None:
 
 def test_a_vehicle_that_changed_is_predicted_worse_than_noise() -> None:
     heavy = source(scenario(payload=1.1), 26)
-    (one,) = hold_out(together().found, card(), heavy.log, heavy.shifts.shifts, 3)
+    (one,) = predict_held_shifts(together().found, card(), heavy.log, heavy.shifts.shifts, 3)
     assert one.outcome is Outcome.WORSE
-    assert Outcome.WORSE in {one.outcome_of(signal) for signal in one.bounds}
+    assert Outcome.WORSE in {one.get_signal_outcome(signal) for signal in one.bounds}
 
 
 def test_one_with_wrong_friction_is_predicted_worse_than_noise() -> None:
@@ -53,7 +53,7 @@ def test_one_with_wrong_friction_is_predicted_worse_than_noise() -> None:
         if curve.stribeck is not None
     }
     wrong = replace(found, friction=friction)
-    (one,) = hold_out(wrong, card(), log.log, log.shifts.shifts, 1)
+    (one,) = predict_held_shifts(wrong, card(), log.log, log.shifts.shifts, 1)
     assert one.outcome is Outcome.WORSE
 
 
@@ -61,7 +61,7 @@ def test_what_cannot_be_predicted_says_why() -> None:
     log = pair()[0]
     channels = {k: v for k, v in log.log.channels.items() if k != "engine_torque"}
     blind = ShiftLog(channels, "blind.csv", "x")
-    (one,) = hold_out(together().found, card(), blind, log.shifts.shifts, 3)
+    (one,) = predict_held_shifts(together().found, card(), blind, log.shifts.shifts, 3)
     assert one.outcome is Outcome.NOT_PREDICTED
     assert one.validation is None
     assert "engine_torque" in one.notes[0]
@@ -71,9 +71,9 @@ def test_what_cannot_be_predicted_says_why() -> None:
 def test_another_method_predicts_its_own_log_without_a_judgement() -> None:
     log = pair()[0]
     found = by_the_paper()
-    (known,) = hold_out(found, card(), log.log, log.shifts.shifts, 0)
+    (known,) = predict_held_shifts(found, card(), log.log, log.shifts.shifts, 0)
     assert known.outcome is Outcome.NOT_JUDGED
-    (foreign,) = hold_out(found, card(), log.log, log.shifts.shifts, 1)
+    (foreign,) = predict_held_shifts(found, card(), log.log, log.shifts.shifts, 1)
     assert foreign.outcome is Outcome.NOT_PREDICTED
     assert "likelihood" in foreign.notes[0]
 
@@ -82,11 +82,11 @@ def test_a_law_of_another_element_is_said_and_not_judged() -> None:
     found: Identification = together().found
     (law,) = found.friction.values()
     log = pair()[0]
-    fit, _ = likelihood_of(found)
+    fit, _ = get_likelihood_fit(found)
     names = tuple(name.replace("B3.", "B9.") for name in fit.point.names)
     unseen = replace(fit, point=replace(fit.point, names=names))
     evidence = replace(found.evidence, likelihood=unseen)
     found = replace(found, friction={"B9": law}, evidence=evidence)
-    (one,) = hold_out(found, card(), log.log, log.shifts.shifts, 1)
+    (one,) = predict_held_shifts(found, card(), log.log, log.shifts.shifts, 1)
     assert one.outcome is Outcome.NOT_JUDGED
     assert "friction law of B9 stands in for it" in one.notes[0]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.validation.initial_state import calm_moment
+from drivetwin.validation.initial_state import find_quiescent_time
 from tests.shifts.fixtures import FloatArray, make_log
 
 _TIME = np.arange(0.0, 4.0, 1e-3)
@@ -20,16 +20,16 @@ def _log(torque: FloatArray, noise: float) -> ShiftLog:
 
 @pytest.mark.parametrize("noise", [0.0, 40.0])
 def test_a_steady_torque_is_calm_at_once(noise: float) -> None:
-    assert calm_moment(_log(np.full_like(_TIME, 2000.0), noise), (0.25, 3.0)) == 0.25
+    assert find_quiescent_time(_log(np.full_like(_TIME, 2000.0), noise), (0.25, 3.0)) == 0.25
 
 
 def test_a_lock_up_oscillation_is_waited_for() -> None:
     ringing = 2000.0 + 3000.0 * np.exp(-5.0 * _TIME) * np.sin(2.0 * np.pi * 12.0 * _TIME)
-    start = calm_moment(_log(ringing, 40.0), (0.05, 3.5))
+    start = find_quiescent_time(_log(ringing, 40.0), (0.05, 3.5))
     assert np.exp(-5.0 * start) < 0.05
     assert start < 1.2
 
 
 def test_without_output_torque_the_span_decides() -> None:
     log = make_log({"input_speed": (_TIME, np.full_like(_TIME, 150.0))})
-    assert calm_moment(log, (0.3, 3.0)) == 0.3
+    assert find_quiescent_time(log, (0.3, 3.0)) == 0.3

@@ -20,7 +20,7 @@ def test_each_log_is_simulated_with_its_own_load() -> None:
     assert several is not None
     for share, load in zip(several.logs, LOADS, strict=True):
         twin = made.twins[share.source]
-        assert twin.value("Tv_over_if", 0.0) == pytest.approx(load, rel=2e-3)
+        assert twin.get_value("Tv_over_if", 0.0) == pytest.approx(load, rel=2e-3)
         assert share.fit["output_torque"]["all"].fit_percent > 90.0
     assert set(made.twins) == {log.source for log in made.fitted}
 

@@ -18,8 +18,14 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
-from drivetwin.validation.initial_state import start_state
-from drivetwin.validation.simulate_log import compared, fit_of, validate, validated, with_fit
+from drivetwin.validation.initial_state import estimate_start_state
+from drivetwin.validation.simulate_log import (
+    attach_fit,
+    attach_validation,
+    compute_fit,
+    replace_run,
+    simulate_shift,
+)
 from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.report.sample import identification
 
@@ -127,7 +133,7 @@ def _curve(clutch: dict[str, float]) -> FrictionCurve:
 
 
 def test_true_parameters_follow_the_reference(twin: Twin, log: ShiftLog, shift: Shift) -> None:
-    result = validate(twin, log, shift)
+    result = simulate_shift(twin, log, shift)
     assert result.status == "completed"
     assert result.warnings == ()
     for signal, phases in result.fit.items():
@@ -139,8 +145,8 @@ def test_true_parameters_follow_the_reference(twin: Twin, log: ShiftLog, shift: 
 
 
 def test_a_wrong_parameter_shows(twin: Twin, log: ShiftLog, shift: Shift) -> None:
-    softer = twin.dual_clutch(shift, overrides={"k_o": 1.6e5})
-    good, bad = validate(twin, log, shift), validate(twin, log, shift, softer)
+    softer = twin.build_dual_clutch(shift, overrides={"k_o": 1.6e5})
+    good, bad = simulate_shift(twin, log, shift), simulate_shift(twin, log, shift, softer)
     after_good, after_bad = (one.fit["output_torque"]["after"] for one in (good, bad))
     assert after_bad.fit_percent < after_good.fit_percent - 10.0
 
@@ -151,42 +157,42 @@ def test_late_engine_torque_is_moved_back(twin: Twin, log: ShiftLog, shift: Shif
     delayed = replace(log, channels={**log.channels, "engine_torque": late})
     told = dict(twin.parameters)
     told["te_delay"] = replace(told["te_delay"], value=0.02)
-    result = validate(replace(twin, parameters=told), delayed, shift)
+    result = simulate_shift(replace(twin, parameters=told), delayed, shift)
     assert result.fit["output_torque"]["all"].fit_percent > 99.8
 
 
 def test_leaving_the_validity_range_warns(twin: Twin, log: ShiftLog, shift: Shift) -> None:
     narrow = replace(twin, validity={"slip": (0.0, 20.0), "speed": (0.0, 300.0)})
-    (warning,) = validate(narrow, log, shift).warnings
+    (warning,) = simulate_shift(narrow, log, shift).warnings
     assert "range of slip" in warning
 
 
 def test_the_slip_of_an_open_element_leaves_no_range(
     twin: Twin, log: ShiftLog, shift: Shift
 ) -> None:
-    run = validate(twin, log, shift).trajectory
+    run = simulate_shift(twin, log, shift).trajectory
     seen = float(np.abs(run.slip[shift.oncoming]).max())
     open_speed = 3.0 * seen
     slip = {name: one.copy() for name, one in run.slip.items()}
     slip[shift.offgoing][run.clutch_torque[shift.offgoing] == 0.0] = open_speed
     assert (slip[shift.offgoing] == open_speed).any()
     covered = replace(twin, validity={"slip": (0.0, seen)})
-    before = validate(covered, log, shift)
-    assert compared(before, covered, log, replace(run, slip=slip)).warnings == ()
+    before = simulate_shift(covered, log, shift)
+    assert replace_run(before, covered, log, replace(run, slip=slip)).warnings == ()
 
 
 def test_the_log_behind_a_twin_leaves_no_range_of_it(
     twin: Twin, log: ShiftLog, shift: Shift
 ) -> None:
     narrow = replace(twin, validity={"slip": (0.0, 20.0)})
-    one = validate(narrow, log, shift)
+    one = simulate_shift(narrow, log, shift)
     assert one.warnings
-    assert with_fit(identification(), [one]).warnings == identification().warnings
+    assert attach_fit(identification(), [one]).warnings == identification().warnings
     failed = replace(one, trajectory=replace(one.trajectory, status="events too dense"))
-    assert "ended early" in with_fit(identification(), [failed]).warnings[-1]
+    assert "ended early" in attach_fit(identification(), [failed]).warnings[-1]
     speed = one.traces["input_speed"]
     astray = {**one.traces, "input_speed": replace(speed, simulated=2.0 * speed.simulated)}
-    told = with_fit(identification(), [replace(one, traces=astray)]).warnings
+    told = attach_fit(identification(), [replace(one, traces=astray)]).warnings
     shift = one.shift
     name = f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s"
     assert told[-1].startswith(f"{name}: the simulated input speed goes from")
@@ -195,15 +201,15 @@ def test_the_log_behind_a_twin_leaves_no_range_of_it(
 def test_start_state_keeps_the_gear_and_the_measured_twist(
     truth: dict[str, Any], twin: Twin, log: ShiftLog, shift: Shift
 ) -> None:
-    model = twin.dual_clutch(shift)
-    state = start_state(model, log, shift, 0.0)
+    model = twin.build_dual_clutch(shift)
+    state = estimate_start_state(model, log, shift, 0.0)
     initial = truth["initial"]
-    assert state.engine_speed / state.output_speed == pytest.approx(twin.gear("2").ratio)
+    assert state.engine_speed / state.output_speed == pytest.approx(twin.get_gear("2").ratio)
     assert state.engine_speed == pytest.approx(initial["omega_e"], abs=5e-3)
     assert state.wheel_speed == pytest.approx(initial["omega_w"], abs=1e-3)
     assert state.twist == pytest.approx(initial["twist"], rel=1e-3)
     without = replace(log, channels={k: c for k, c in log.channels.items() if k != "output_torque"})
-    guessed = start_state(model, without, shift, 0.0)
+    guessed = estimate_start_state(model, without, shift, 0.0)
     assert guessed.twist == pytest.approx(initial["twist"], rel=0.1)
 
 
@@ -220,9 +226,9 @@ def test_a_wheel_speed_that_stopped_before_the_shift_takes_no_part(
 ) -> None:
     late = replace(shift, before=(0.1, shift.before[1]))
     without = replace(log, channels={k: c for k, c in log.channels.items() if k != "wheel_speed"})
-    told = validate(twin, _until(log, "wheel_speed", 0.05), late)
+    told = simulate_shift(twin, _until(log, "wheel_speed", 0.05), late)
     assert np.array_equal(
-        told.trajectory.shaft_torque, validate(twin, without, late).trajectory.shaft_torque
+        told.trajectory.shaft_torque, simulate_shift(twin, without, late).trajectory.shaft_torque
     )
 
 
@@ -231,24 +237,24 @@ def test_a_torque_that_stopped_before_the_shift_is_named(
 ) -> None:
     stopped = _until(log, "output_torque", 0.2)
     with pytest.raises(DamagedChannelError, match=r"'T_o_Nm' .* 0\.000 s to 0\.200 s"):
-        validate(twin, stopped, shift)
-    told = validated(replace(identification(), shifts=(shift,)), twin, stopped)
+        simulate_shift(twin, stopped, shift)
+    told = attach_validation(replace(identification(), shifts=(shift,)), twin, stopped)
     assert told.fit == {}
     assert "no validation: 'T_o_Nm'" in told.warnings[-1]
 
 
 def test_fit_percent_is_measured_against_the_mean_of_the_whole_log() -> None:
     measured = np.array([1.0, 3.0])
-    fit = fit_of(measured, np.array([2.0, 3.0]), mean=0.0)
+    fit = compute_fit(measured, np.array([2.0, 3.0]), mean=0.0)
     assert fit.rmse == pytest.approx(np.sqrt(0.5))
     assert fit.fit_percent == pytest.approx(100.0 * (1.0 - 1.0 / np.sqrt(10.0)))
-    assert np.isnan(fit_of(np.empty(0), np.empty(0), 0.0).rmse)
-    assert np.isnan(fit_of(np.ones(3), np.ones(3), 1.0).fit_percent)
+    assert np.isnan(compute_fit(np.empty(0), np.empty(0), 0.0).rmse)
+    assert np.isnan(compute_fit(np.ones(3), np.ones(3), 1.0).fit_percent)
 
 
 def test_fits_of_several_shifts_are_pooled(twin: Twin, log: ShiftLog, shift: Shift) -> None:
-    one = validate(twin, log, shift)
-    found = with_fit(identification(), [one, one])
+    one = simulate_shift(twin, log, shift)
+    found = attach_fit(identification(), [one, one])
     pooled = found.fit["output_torque"]["inertia"]
     assert pooled.rmse == pytest.approx(one.fit["output_torque"]["inertia"].rmse)
     assert len(found.evidence.validation) == 2
@@ -259,8 +265,8 @@ def test_incomplete_model_leaves_a_warning_and_no_fit(
 ) -> None:
     told = {key: one for key, one in twin.parameters.items() if key != "k_o"}
     found = replace(identification(), shifts=(shift,))
-    incomplete = validated(found, replace(twin, parameters=told), log)
+    incomplete = attach_validation(found, replace(twin, parameters=told), log)
     assert incomplete.fit == {}
     assert "no validation" in incomplete.warnings[-1]
     assert "k_o" in incomplete.warnings[-1]
-    assert validated(found, twin, log).fit["output_torque"]["all"].fit_percent > 99.8
+    assert attach_validation(found, twin, log).fit["output_torque"]["all"].fit_percent > 99.8

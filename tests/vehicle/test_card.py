@@ -53,17 +53,17 @@ def test_values_are_si_and_defaults_stand(tmp_path: Path) -> None:
 
 def test_brake_ratios_follow_from_the_gear(tmp_path: Path) -> None:
     card = load(tmp_path, CARD)
-    i_c, i_out = card.clutch_ratios("B2")
+    i_c, i_out = card.get_clutch_ratios("B2")
     assert i_c == pytest.approx(0.8)
     assert i_out == pytest.approx(1.8 / 0.8)
-    assert i_c * i_out == pytest.approx(card.ratio("2"))
-    assert card.element_of("3") == "B3"
+    assert i_c * i_out == pytest.approx(card.compute_ratio("2"))
+    assert card.get_gear_element("3") == "B3"
 
 
 def test_the_input_gear_multiplies_the_ratio_but_not_the_brake(tmp_path: Path) -> None:
     card = load(tmp_path, "i_in = 1.2\n" + CARD)
-    assert card.ratio("2") == pytest.approx(1.2 * 1.8)
-    assert card.clutch_ratios("B2")[0] == pytest.approx(0.8)
+    assert card.compute_ratio("2") == pytest.approx(1.2 * 1.8)
+    assert card.get_clutch_ratios("B2")[0] == pytest.approx(0.8)
 
 
 def test_gain_from_geometry(tmp_path: Path) -> None:
@@ -181,9 +181,9 @@ def test_files_that_are_no_card(tmp_path: Path) -> None:
 def test_unknown_names_are_told_by_the_card(tmp_path: Path) -> None:
     card = load(tmp_path, CARD)
     with pytest.raises(CardError, match="no gear '5'; it has 2, 3"):
-        card.ratio("5")
+        card.compute_ratio("5")
     with pytest.raises(CardError, match="no element 'K1'; it has B2, B3"):
-        card.clutch_ratios("K1")
+        card.get_clutch_ratios("K1")
 
 
 def test_a_gear_of_two_elements_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
@@ -193,14 +193,14 @@ def test_a_gear_of_two_elements_is_refused_before_anything_is_computed(tmp_path:
     card = load(tmp_path, CARD)
     both = replace(card, gears=tuple(replace(one, elements=("B2", "B3")) for one in card.gears))
     with pytest.raises(CardError, match="gear '2' is held by B2, B3"):
-        both.element_of("2")
+        both.get_gear_element("2")
 
 
 @pytest.mark.parametrize("name", ["truck_a", "truck_b", "truck_c", "paper_like"])
 def test_example_cards_load(name: str) -> None:
     card = load_card(EXAMPLES / f"{name}.toml")
     for gear in card.gears:
-        i_c, i_out = card.clutch_ratios(card.element_of(gear.name))
+        i_c, i_out = card.get_clutch_ratios(card.get_gear_element(gear.name))
         assert i_c * i_out == pytest.approx(gear.ratio, rel=1e-12)
     assert card.J_out is not None
     assert card.sensors == {}
@@ -208,6 +208,6 @@ def test_example_cards_load(name: str) -> None:
 
 def test_the_rotating_clutch_of_truck_b_has_the_ratios_of_its_planetary_set() -> None:
     z3 = 2.51
-    i_c, i_out = load_card(EXAMPLES / "truck_b.toml").clutch_ratios("K2")
+    i_c, i_out = load_card(EXAMPLES / "truck_b.toml").get_clutch_ratios("K2")
     assert i_c == pytest.approx(z3 / (1 + z3), rel=1e-12)
     assert i_out == pytest.approx((1 + z3) / z3, rel=1e-12)

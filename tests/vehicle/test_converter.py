@@ -19,10 +19,10 @@ TABLE: dict[str, Any] = {
 
 
 def test_torques_at_a_thousand_turns_become_a_capacity() -> None:
-    found = ConverterTable(**TABLE, scale=2.0).spec()
+    found = ConverterTable(**TABLE, scale=2.0).to_spec()
     pump = 2000.0 * math.pi / 30.0
-    assert found.pump_torque(pump, 0.8 * pump) == pytest.approx(2.0 * 4.0 * 250.0)
-    assert found.turbine_torque(pump, 0.8 * pump) == pytest.approx(1.1 * 2.0 * 4.0 * 250.0)
+    assert found.compute_pump_torque(pump, 0.8 * pump) == pytest.approx(2.0 * 4.0 * 250.0)
+    assert found.compute_turbine_torque(pump, 0.8 * pump) == pytest.approx(1.1 * 2.0 * 4.0 * 250.0)
 
 
 @pytest.mark.parametrize(
@@ -47,8 +47,8 @@ def test_what_no_converter_can_be_is_refused(key: str, values: Any, message: str
 
 def test_a_measured_map_may_give_a_little_too_much_near_synchronism() -> None:
     near = TABLE | {"speed_ratio": [0.0, 0.92, 1.0, 1.25], "torque_ratio": [1.9, 1.1, 1.0, 1.0]}
-    assert ConverterTable(**near).spec().torque_ratio[1] == 1.1
+    assert ConverterTable(**near).to_spec().torque_ratio[1] == 1.1
     # The pump's torque crosses zero a little early, and in overrun a little is missing.
     table = TABLE | {"speed_ratio": [0.0, 0.8, 0.97, 1.03], "torque_ratio": [1.9, 1.1, 1.0, 0.93]}
     table["pump_torque_at_1000rpm_Nm"] = [400.0, 250.0, -4.0, -20.0]
-    assert ConverterTable(**table).spec().torque_ratio[3] == 0.93
+    assert ConverterTable(**table).to_spec().torque_ratio[3] == 0.93

@@ -30,17 +30,17 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def session(place: Path) -> Iterator[Session]:
     """A session in which nothing is open."""
-    sessions = Sessions(Folder.at(place))
-    yield sessions.get(sessions.new())
+    sessions = Sessions(Folder.from_path(place))
+    yield sessions.get(sessions.create())
     sessions.close()
 
 
 @pytest.fixture(scope="session")
 def identified(place: Path) -> Iterator[Session]:
     """A session that has identified the log by the paper's and the linear method."""
-    sessions = Sessions(Folder.at(place))
-    one = sessions.get(sessions.new())
-    one.open(one.in_folder(LOG), one.in_folder(CARD))
+    sessions = Sessions(Folder.from_path(place))
+    one = sessions.get(sessions.create())
+    one.open(one.get_folder_source(LOG), one.get_folder_source(CARD))
     one.identify([Method.PAPER, Method.INTEGRAL])
     finish(one)
     yield one
@@ -50,5 +50,5 @@ def identified(place: Path) -> Iterator[Session]:
 def finish(session: Session) -> None:
     """Wait for the job of a session."""
     while session.job is not None:
-        session.poll()
+        session.collect_job_results()
         time.sleep(0.02)

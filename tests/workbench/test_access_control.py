@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.workbench.access_control import is_loopback, is_own
+from drivetwin.workbench.access_control import is_loopback, is_own_host
 
 
 @pytest.mark.parametrize(
     "named", ["127.0.0.1:8050", "localhost:8050", "127.0.0.1", "[::1]:8050", "127.1.2.3:1"]
 )
 def test_own_names_on_loopback(named: str) -> None:
-    assert is_own(named, "127.0.0.1")
+    assert is_own_host(named, "127.0.0.1")
 
 
 @pytest.mark.parametrize(
@@ -21,14 +21,14 @@ def test_own_names_on_loopback(named: str) -> None:
      "127.0.0.1.nip.io", "0.0.0.0:8050", "[", "[::1", "127.0.0.1@evil.example", "user@evil:1"],
 )  # fmt: skip
 def test_foreign_names_on_loopback(named: str) -> None:
-    assert not is_own(named, "127.0.0.1")
+    assert not is_own_host(named, "127.0.0.1")
 
 
 def test_on_the_network_addresses_and_the_stated_name_count() -> None:
-    assert is_own("192.168.1.5:8050", "0.0.0.0")
-    assert is_own("bench7:8050", "bench7")
-    assert not is_own("evil.example", "0.0.0.0")
-    assert not is_own("evil.example", "bench7")
+    assert is_own_host("192.168.1.5:8050", "0.0.0.0")
+    assert is_own_host("bench7:8050", "bench7")
+    assert not is_own_host("evil.example", "0.0.0.0")
+    assert not is_own_host("evil.example", "bench7")
 
 
 @pytest.mark.parametrize(

@@ -16,26 +16,26 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
 from drivetwin.export.targets import Target
 from drivetwin.files.twin_conversion import load_twin
-from drivetwin.workbench.exports import Record, produce
+from drivetwin.workbench.exports import Record, make_product
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import Work
+from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views.export import RECORDS, TARGETS
 
 
 @pytest.mark.parametrize("target", [Target(one.value) for one in ParameterFormat])
 def test_parameter_files_are_read_back(identified: Session, tmp_path: Path, target: Target) -> None:
-    product = produce(identified.work, target, tmp_path)
+    product = make_product(identified.work, target, tmp_path)
     path = tmp_path / product.name
     path.write_bytes(product.content)
     assert any(entry.name.startswith("k_o") for entry in read_parameters(path).entries)
 
 
 def test_c_sources_come_as_an_archive(identified: Session, tmp_path: Path) -> None:
-    product = produce(identified.work, Target.C, tmp_path)
+    product = make_product(identified.work, Target.C, tmp_path)
     names = zipfile.ZipFile(io.BytesIO(product.content)).namelist()
     assert {"dt_twin.c", "dt_model.h"} <= set(names)
-    assert produce(identified.work, Target.C, tmp_path) == product
+    assert make_product(identified.work, Target.C, tmp_path) == product
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_c_sources_come_as_an_archive(identified: Session, tmp_path: Path) -> No
 def test_models_of_the_shift(
     identified: Session, tmp_path: Path, target: Target, says: bytes
 ) -> None:
-    assert says in produce(identified.work, target, tmp_path).content
+    assert says in make_product(identified.work, target, tmp_path).content
 
 
 def test_every_form_has_a_button() -> None:
@@ -54,18 +54,18 @@ def test_every_form_has_a_button() -> None:
 
 def test_own_files_are_read_back(identified: Session, tmp_path: Path) -> None:
     twin = tmp_path / "twin.toml"
-    twin.write_bytes(produce(identified.work, Record.TWIN, tmp_path).content)
+    twin.write_bytes(make_product(identified.work, Record.TWIN, tmp_path).content)
     assert load_twin(twin).parameters.keys() == identified.work.require_twin().parameters.keys()
-    result = json.loads(produce(identified.work, Record.RESULT, tmp_path).content)
+    result = json.loads(make_product(identified.work, Record.RESULT, tmp_path).content)
     assert "k_o" in result["parameters"]
     mapping = tmp_path / "m.toml"
-    mapping.write_bytes(produce(identified.work, Record.MAPPING, tmp_path).content)
+    mapping.write_bytes(make_product(identified.work, Record.MAPPING, tmp_path).content)
     survey = identified.work.require_opened().survey
     assert read_mapping(mapping).channels == dict(survey.mapping)
 
 
 def test_the_report_is_a_page(identified: Session, tmp_path: Path) -> None:
-    page = produce(identified.work, Record.REPORT, tmp_path)
+    page = make_product(identified.work, Record.REPORT, tmp_path)
     assert page.content.startswith(b"<!DOCTYPE html>")
     assert page.name == "bench.report.html"
 
@@ -73,7 +73,7 @@ def test_the_report_is_a_page(identified: Session, tmp_path: Path) -> None:
 def test_nothing_to_export_is_told(tmp_path: Path) -> None:
     for wanted in (*Target, *Record):
         with pytest.raises(InputError):
-            produce(Work(), wanted, tmp_path)
+            make_product(SessionState(), wanted, tmp_path)
 
 
 def test_a_twin_from_a_workspace_has_no_report(identified: Session, tmp_path: Path) -> None:
@@ -82,5 +82,5 @@ def test_a_twin_from_a_workspace_has_no_report(identified: Session, tmp_path: Pa
     bare = Outcome(Method.INTEGRAL, identified.work.require_twin())
     work = replace(identified.work, results={Method.INTEGRAL: bare})
     with pytest.raises(InputError, match="identify again"):
-        produce(work, Record.REPORT, tmp_path)
-    assert produce(work, Record.TWIN, tmp_path).content
+        make_product(work, Record.REPORT, tmp_path)
+    assert make_product(work, Record.TWIN, tmp_path).content

@@ -14,7 +14,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.workbench import identifying
 from drivetwin.workbench.identifying import Outcome, Refusal, Task, identify_all
@@ -24,7 +24,7 @@ from tests.workbench.conftest import CARD, LOG
 def test_a_method_that_finds_nothing_says_what_to_do(place: Path) -> None:
     card = load_card(place / CARD)
     log = read_log(place / LOG, card)
-    shifts = find_shifts(log, card).shifts
+    shifts = detect_shifts(log, card).shifts
     bare = {role: one for role, one in log.channels.items() if role != "output_torque"}
     told: list[object] = []
     task = Task(replace(log, channels=bare), card, shifts, [Method.PAPER])
@@ -55,7 +55,7 @@ def test_what_ends_one_method_is_told_beside_what_the_others_find(
     log = read_log(place / LOG, card)
     found: list[object] = []
     methods = [Method.PAPER, Method.INTEGRAL]
-    identify_all(found.append, Task(log, card, find_shifts(log, card).shifts, methods))
+    identify_all(found.append, Task(log, card, detect_shifts(log, card).shifts, methods))
     refusal, outcome = found
     assert isinstance(refusal, Refusal)
     assert told in refusal.text

@@ -8,15 +8,15 @@ import time
 
 import pytest
 
-from drivetwin._util.progress import part, tell
+from drivetwin._util.progress import notify_progress, scale_progress
 from drivetwin.errors import InputError, UnitError, Where
 from drivetwin.workbench.jobs import Emit, Fault, call, start
 
 
 def _two(emit: Emit, first: int) -> None:
     emit(first)
-    with part(0.0, 1.0, "counting"):
-        tell(0.5)
+    with scale_progress(0.0, 1.0, "counting"):
+        notify_progress(0.5)
     emit(first + 1)
 
 
@@ -50,14 +50,14 @@ def _alive(pid: int) -> bool:
 
 
 def test_results_come_in_order_and_the_last_is_the_answer() -> None:
-    assert start(_two, 3).wait(30.0) == [3, 4]
+    assert start(_two, 3).collect_results(30.0) == [3, 4]
     assert call(_two, 1, limit=30.0) == 2
 
 
 def test_progress_is_told() -> None:
     job = start(_two, 3)
     while not job.finished:
-        job.results()
+        job.get_results()
         time.sleep(0.01)
     assert job.text == "counting"
 
@@ -84,7 +84,7 @@ def test_cancelling_ends_the_process() -> None:
     job = start(_sleeping)
     found: list[int] = []
     while not found:
-        found += job.results()
+        found += job.get_results()
         time.sleep(0.01)
     job.cancel()
     assert job.finished
@@ -95,9 +95,9 @@ def test_cancelling_ends_the_process() -> None:
 def test_what_takes_too_long_is_stopped() -> None:
     job = start(_sleeping)
     with pytest.raises(InputError, match="longer than"):
-        job.wait(1.5)
+        job.collect_results(1.5)
     assert job.finished
 
 
 def test_a_fault_is_an_error_with_its_place() -> None:
-    assert "channel 'p'" in str(Fault("a", "b", Where(channel="p")).error())
+    assert "channel 'p'" in str(Fault("a", "b", Where(channel="p")).to_error())

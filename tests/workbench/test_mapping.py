@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.channels.mapping import ChannelSpec
-from drivetwin.channels.units import lookup
+from drivetwin.channels.units import find_unit
 from drivetwin.errors import MappingError, UnitError
 from drivetwin.logs.survey import Survey
-from drivetwin.workbench.mapping import Entry, corrected, roles_of, rows_of, unit_names
+from drivetwin.workbench.mapping import Entry, apply_entries, list_roles, list_rows, list_unit_names
 from drivetwin.workbench.session import Session
 
 
@@ -20,12 +20,12 @@ def _survey(session: Session) -> Survey:
 
 
 def _entries(survey: Survey) -> list[Entry]:
-    return [Entry(one.role, one.unit, one.reversed) for one in rows_of(survey)]
+    return [Entry(one.role, one.unit, one.reversed) for one in list_rows(survey)]
 
 
 def test_the_table_as_it_stands_says_what_was_proposed(identified: Session) -> None:
     survey = _survey(identified)
-    assert corrected(survey, _entries(survey)) == dict(survey.mapping)
+    assert apply_entries(survey, _entries(survey)) == dict(survey.mapping)
 
 
 def test_unit_and_sign_are_taken_over(identified: Session) -> None:
@@ -33,7 +33,7 @@ def test_unit_and_sign_are_taken_over(identified: Session) -> None:
     entries = _entries(survey)
     place = next(k for k, one in enumerate(entries) if one.role == "output_speed")
     entries[place] = replace(entries[place], unit="rad/s", reversed=True)
-    spec = corrected(survey, entries)["output_speed"]
+    spec = apply_entries(survey, entries)["output_speed"]
     assert (spec.unit, spec.sign) == ("rad/s", -1)
 
 
@@ -42,7 +42,7 @@ def test_scale_and_offset_of_the_card_stay(identified: Session) -> None:
     source = survey.mapping["engine_torque"].source
     scaled = ChannelSpec(source, scale=12.5, offset=3.0)
     survey = replace(survey, mapping={**survey.mapping, "engine_torque": scaled})
-    assert corrected(survey, _entries(survey))["engine_torque"] == scaled
+    assert apply_entries(survey, _entries(survey))["engine_torque"] == scaled
 
 
 def test_two_columns_cannot_have_one_role(identified: Session) -> None:
@@ -50,7 +50,7 @@ def test_two_columns_cannot_have_one_role(identified: Session) -> None:
     entries = _entries(survey)
     entries[1] = replace(entries[1], role=entries[0].role)
     with pytest.raises(MappingError, match="both"):
-        corrected(survey, entries)
+        apply_entries(survey, entries)
 
 
 def test_a_unit_of_another_quantity_is_refused_with_those_that_fit(identified: Session) -> None:
@@ -59,7 +59,7 @@ def test_a_unit_of_another_quantity_is_refused_with_those_that_fit(identified: S
     place = next(k for k, one in enumerate(entries) if one.role.startswith("pressure."))
     entries[place] = replace(entries[place], unit="rpm")
     with pytest.raises(UnitError, match="bar"):
-        corrected(survey, entries)
+        apply_entries(survey, entries)
 
 
 def test_a_column_known_by_its_name_cannot_be_set_aside(identified: Session) -> None:
@@ -67,14 +67,14 @@ def test_a_column_known_by_its_name_cannot_be_set_aside(identified: Session) -> 
     entries = _entries(survey)
     entries[0] = replace(entries[0], role="")
     with pytest.raises(MappingError, match="by its name"):
-        corrected(survey, entries)
+        apply_entries(survey, entries)
 
 
 def test_roles_hold_the_elements_of_the_card(identified: Session) -> None:
     card = identified.work.require_card()
-    assert {f"pressure.{name}" for name in card.elements} <= set(roles_of(card))
+    assert {f"pressure.{name}" for name in card.elements} <= set(list_roles(card))
 
 
 def test_offered_units_are_known_units() -> None:
-    assert {"bar", "rpm", "Nm"} <= set(unit_names())
-    assert all(lookup(name) is not None for name in unit_names())
+    assert {"bar", "rpm", "Nm"} <= set(list_unit_names())
+    assert all(find_unit(name) is not None for name in list_unit_names())

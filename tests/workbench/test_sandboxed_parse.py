@@ -14,9 +14,9 @@ from drivetwin.workbench.sandboxed_parse import (
     LONGEST,
     Opened,
     Request,
+    compute_time_limit,
     open_gearbox,
     open_log,
-    time_for,
 )
 from tests.workbench.bad_files import hdf5_bomb, mat_bomb
 from tests.workbench.conftest import CARD, LOG
@@ -108,4 +108,4 @@ def test_a_long_log_gets_more_time_within_bounds(tmp_path: Path) -> None:
     for size, limit in ((1000, LONGEST + 0.002), (160_000_000, LONGEST + 320.0), (10**9, 600.0)):
         with log.open("wb") as file:
             file.truncate(size)
-        assert time_for(log) == pytest.approx(limit)
+        assert compute_time_limit(log) == pytest.approx(limit)

@@ -14,7 +14,7 @@ import pytest
 from flask.testing import FlaskClient
 
 from drivetwin.errors import DrivetwinError
-from drivetwin.workbench.server import SESSION_HEADER, build
+from drivetwin.workbench.server import SESSION_HEADER, build_server
 from drivetwin.workbench.session import Session, Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.page import Start
@@ -53,8 +53,8 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def bench(place: Path) -> Iterator[Bench]:
-    app, sessions = build(Folder.at(place), Start())
-    yield Bench(app.server.test_client(), sessions, sessions.new())
+    app, sessions = build_server(Folder.from_path(place), Start())
+    yield Bench(app.server.test_client(), sessions, sessions.create())
     sessions.close()
 
 
@@ -72,7 +72,7 @@ def test_a_bad_upload_is_refused_with_a_message_and_the_server_stays(
 def _opened(session: Session, key: str) -> str:
     """What opening an upload is answered with."""
     try:
-        session.open(session.uploaded(key), session.in_folder(CARD))
+        session.open(session.get_uploaded(key), session.get_folder_source(CARD))
     except DrivetwinError as error:
         return str(error)
     opened = session.work.require_opened()
@@ -140,7 +140,7 @@ def test_files_of_the_program_are_not_served(bench: Bench, path: str) -> None:
 
 def test_uploads_of_one_session_are_unknown_to_another(bench: Bench) -> None:
     key = bench.upload("log.csv", TABLE).json["key"]
-    other = bench.sessions.get(bench.sessions.new())
-    assert bench.session.uploaded(key).name == "log.csv"
+    other = bench.sessions.get(bench.sessions.create())
+    assert bench.session.get_uploaded(key).name == "log.csv"
     with pytest.raises(DrivetwinError):
-        other.uploaded(key)
+        other.get_uploaded(key)

@@ -12,15 +12,15 @@ from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.result.method import Method
 from drivetwin.workbench import sandboxed_parse
 from drivetwin.workbench.locks import Lock, LockKind
-from drivetwin.workbench.mapping import Entry, rows_of
-from drivetwin.workbench.phases import Boundary, times_of
+from drivetwin.workbench.mapping import Entry, list_rows
+from drivetwin.workbench.phases import Boundary, get_boundary_times
 from drivetwin.workbench.session import MOST_SESSIONS, MOST_UPLOADS, Session, Sessions
 from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG, finish
 
 
 def _open(session: Session) -> None:
-    session.open(session.in_folder(LOG), session.in_folder(CARD))
+    session.open(session.get_folder_source(LOG), session.get_folder_source(CARD))
 
 
 def test_results_of_all_methods_come_in_and_the_best_is_shown(identified: Session) -> None:
@@ -37,7 +37,7 @@ def test_locks_and_phases_reach_the_identification(session: Session) -> None:
     _open(session)
     shift = session.work.require_shift()
     time = shift.torque_phase[0] - 0.004
-    session.move(0, {Boundary.TORQUE: time})
+    session.move_boundaries(0, {Boundary.TORQUE: time})
     session.set_lock("k_o", Lock(LockKind.FIXED, 1.6e5))
     session.identify([Method.INTEGRAL])
     with pytest.raises(InputError, match="running"):
@@ -54,7 +54,7 @@ def test_cancelling_leaves_nothing_running(session: Session) -> None:
     session.identify([Method.INTEGRAL, Method.LIKELIHOOD])
     session.cancel()
     assert session.job is None
-    assert session.poll() is False
+    assert session.collect_job_results() is False
     assert session.work.method is None
 
 
@@ -81,39 +81,39 @@ def test_a_log_is_given_up_after_the_time_for_its_size(
 
 def test_a_correction_reads_the_log_again(session: Session) -> None:
     _open(session)
-    rows = rows_of(session.work.require_opened().survey)
+    rows = list_rows(session.work.require_opened().survey)
     entries = [
         Entry(one.role, "mbar" if one.role.startswith("pressure") else one.unit, one.reversed)
         for one in rows
     ]
-    session.correct(entries)
+    session.correct_mapping(entries)
     assert not session.work.shifts
     with pytest.raises(InputError):
         session.identify([Method.PAPER])
-    session.correct([Entry(one.role, one.unit, one.reversed) for one in rows])
+    session.correct_mapping([Entry(one.role, one.unit, one.reversed) for one in rows])
     assert len(session.work.shifts) == 1
 
 
 def test_phases_go_back_to_what_was_detected(session: Session) -> None:
     _open(session)
-    detected = times_of(session.work.shifts[0])
-    session.move(0, {Boundary.LOCKUP: detected[Boundary.LOCKUP] + 0.01})
-    session.move(0, {Boundary.INERTIA: detected[Boundary.INERTIA] + 0.01})
+    detected = get_boundary_times(session.work.shifts[0])
+    session.move_boundaries(0, {Boundary.LOCKUP: detected[Boundary.LOCKUP] + 0.01})
+    session.move_boundaries(0, {Boundary.INERTIA: detected[Boundary.INERTIA] + 0.01})
     assert set(session.work.moves[0]) == {Boundary.LOCKUP, Boundary.INERTIA}
-    session.move(0, {})
-    assert times_of(session.work.shifts[0]) == detected
+    session.move_boundaries(0, {})
+    assert get_boundary_times(session.work.shifts[0]) == detected
     assert session.work.moves == {}
 
 
 def test_sliders_of_a_session_and_back(identified: Session) -> None:
-    before = identified.simulation().present.fit
-    curves = identified.slide({"k_o": 1.2e5})
+    before = identified.get_simulation().present.fit
+    curves = identified.apply_sliders({"k_o": 1.2e5})
     assert curves
     assert identified.work.changes == {"k_o": 1.2e5}
-    assert identified.simulation().present.fit != before
+    assert identified.get_simulation().present.fit != before
     identified.choose_method(Method.INTEGRAL)
     assert identified.work.changes == {}
-    assert identified.simulation().present.fit == before
+    assert identified.get_simulation().present.fit == before
 
 
 def test_opening_another_log_forgets_the_first(session: Session) -> None:
@@ -127,7 +127,7 @@ def test_a_log_that_cannot_be_opened_leaves_the_work_as_it_was(session: Session)
     _open(session)
     work = session.work
     with pytest.raises(InputError):
-        session.open(session.in_folder(CARD), session.in_folder(LOG))
+        session.open(session.get_folder_source(CARD), session.get_folder_source(LOG))
     assert session.work is work
 
 
@@ -135,9 +135,9 @@ def test_what_cannot_be_read_lets_the_identification_run_on(session: Session) ->
     _open(session)
     session.identify([Method.PAPER])
     with pytest.raises(InputError):
-        session.open(session.in_folder(CARD), session.in_folder(LOG))
+        session.open(session.get_folder_source(CARD), session.get_folder_source(LOG))
     with pytest.raises(InputError):
-        session.correct([Entry("input_speed", "furlong", False)])
+        session.correct_mapping([Entry("input_speed", "furlong", False)])
     finish(session)
     assert list(session.work.results) == [Method.PAPER]
     session.identify([Method.LIKELIHOOD])
@@ -148,9 +148,9 @@ def test_what_cannot_be_read_lets_the_identification_run_on(session: Session) ->
 def test_nothing_is_done_before_a_log_is_open(session: Session) -> None:
     for action in (
         lambda: session.identify([Method.PAPER]),
-        lambda: session.correct([]),
-        lambda: session.move(0, {}),
-        session.simulation,
+        lambda: session.correct_mapping([]),
+        lambda: session.move_boundaries(0, {}),
+        session.get_simulation,
         lambda: session.save("work"),
     ):
         with pytest.raises(InputError):
@@ -158,8 +158,8 @@ def test_nothing_is_done_before_a_log_is_open(session: Session) -> None:
 
 
 def test_sessions_do_not_mix(place: Path) -> None:
-    sessions = Sessions(Folder.at(place))
-    one, other = (sessions.get(sessions.new()) for _ in range(2))
+    sessions = Sessions(Folder.from_path(place))
+    one, other = (sessions.get(sessions.create()) for _ in range(2))
     _open(one)
     assert other.work.opened is None
     assert one.scratch != other.scratch
@@ -168,11 +168,11 @@ def test_sessions_do_not_mix(place: Path) -> None:
 
 
 def test_unknown_keys_are_no_session_and_idle_ones_go(place: Path) -> None:
-    sessions = Sessions(Folder.at(place))
+    sessions = Sessions(Folder.from_path(place))
     for key in (None, "", "x"):
         with pytest.raises(RefusedError):
             sessions.get(key)
-    keys = [sessions.new() for _ in range(MOST_SESSIONS + 1)]
+    keys = [sessions.create() for _ in range(MOST_SESSIONS + 1)]
     assert keys[0] not in sessions
     assert all(key in sessions for key in keys[1:])
     assert len(set(keys)) == len(keys)
@@ -180,10 +180,10 @@ def test_unknown_keys_are_no_session_and_idle_ones_go(place: Path) -> None:
 
 
 def test_old_uploads_are_removed(session: Session) -> None:
-    keys = [session.receive(BytesIO(b"x"), f"{k}.csv", 1, 10) for k in range(MOST_UPLOADS + 2)]
+    keys = [session.store_upload(BytesIO(b"x"), f"{k}.csv", 1, 10) for k in range(MOST_UPLOADS + 2)]
     with pytest.raises(RefusedError):
-        session.uploaded(keys[0])
-    assert session.uploaded(keys[-1]).path.read_bytes() == b"x"
+        session.get_uploaded(keys[0])
+    assert session.get_uploaded(keys[-1]).path.read_bytes() == b"x"
     assert len(list(session.scratch.iterdir())) == MOST_UPLOADS
 
 
@@ -191,13 +191,13 @@ def test_uploads_that_are_open_stay_however_many_come_after(session: Session, pl
     keys = []
     for name in (LOG, CARD):
         with (place / name).open("rb") as stream:
-            keys.append(session.receive(stream, f"own_{name}", None, 10**8))
-    session.open(session.uploaded(keys[0]), session.uploaded(keys[1]))
+            keys.append(session.store_upload(stream, f"own_{name}", None, 10**8))
+    session.open(session.get_uploaded(keys[0]), session.get_uploaded(keys[1]))
     for k in range(MOST_UPLOADS + 2):
-        session.receive(BytesIO(b"x"), f"{k}.csv", 1, 10)
+        session.store_upload(BytesIO(b"x"), f"{k}.csv", 1, 10)
     assert len(session.uploads) == MOST_UPLOADS
     name = session.save("own")
-    session.reopen(session.in_folder(name))
+    session.reopen(session.get_folder_source(name))
     assert len(session.work.shifts) == 1
-    session.receive(BytesIO(b"x"), "last.csv", 1, 10)
+    session.store_upload(BytesIO(b"x"), "last.csv", 1, 10)
     assert keys[0] not in session.uploads

@@ -11,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import RefusedError
-from drivetwin.workbench.uploads import label_of, receive, refuse_formulas
+from drivetwin.workbench.uploads import make_label, refuse_formulas, store_stream
 
 LIMIT = 1000
 TABLE = b"time,n_in\ns,rpm\n0.0,-1.5\n0.1,+2\n0.2,-inf\n0.3,-nan\n"
 
 
 def test_an_upload_stands_whole_under_our_name(tmp_path: Path) -> None:
-    upload = receive(BytesIO(TABLE), "log 1.csv", len(TABLE), tmp_path / "key", LIMIT)
+    upload = store_stream(BytesIO(TABLE), "log 1.csv", len(TABLE), tmp_path / "key", LIMIT)
     assert upload.path.read_bytes() == TABLE
     assert upload.name == "log 1.csv"
 
@@ -32,14 +32,14 @@ def test_sizes_that_do_not_fit_are_refused(
     tmp_path: Path, content: bytes, claimed: int | None, says: str
 ) -> None:
     with pytest.raises(RefusedError, match=says):
-        receive(BytesIO(content), "log.csv", claimed, tmp_path / "key", LIMIT)
+        store_stream(BytesIO(content), "log.csv", claimed, tmp_path / "key", LIMIT)
     assert not (tmp_path / "key").exists()
 
 
 def test_a_claim_is_refused_before_anything_is_read(tmp_path: Path) -> None:
     stream = BytesIO(b"x")
     with pytest.raises(RefusedError):
-        receive(stream, "log.csv", 2 * 10**9, tmp_path / "key", LIMIT)
+        store_stream(stream, "log.csv", 2 * 10**9, tmp_path / "key", LIMIT)
     assert stream.tell() == 0
 
 
@@ -50,13 +50,13 @@ def test_a_claim_is_refused_before_anything_is_read(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_names_that_are_paths_are_refused(name: str) -> None:
     with pytest.raises(RefusedError):
-        label_of(name)
+        make_label(name)
 
 
 @given(st.text())
 def test_an_accepted_name_is_one_part_of_a_path(name: str) -> None:
     try:
-        label = label_of(name)
+        label = make_label(name)
     except RefusedError:
         return
     assert Path(label).name == label

@@ -11,23 +11,23 @@ import pytest
 
 from drivetwin.errors import MissingParameterError
 from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Stribeck
-from drivetwin.validation.simulate_log import validate
+from drivetwin.validation.simulate_log import simulate_shift
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.what_if import (
-    changes_of,
-    display_for,
-    figure_of,
-    first_run,
-    model_of,
-    moved_curves,
-    replay,
-    sliders_of,
+    build_model,
+    collect_changed_curves,
+    collect_changes,
+    get_display,
+    list_sliders,
+    plot_what_if,
+    simulate_changes,
+    simulate_identified,
 )
 
 
 def test_sliders_stand_where_the_log_said(identified: Session) -> None:
     twin, shift = identified.work.require_twin(), identified.work.require_shift()
-    sliders = sliders_of(twin, shift)
+    sliders = list_sliders(twin, shift)
     assert {"eta", "J_out", "J_vehicle", "k_o", "c_o", "te_delay"} <= {one.id for one in sliders}
     for one in sliders:
         assert one.low < one.value < one.high
@@ -35,7 +35,7 @@ def test_sliders_stand_where_the_log_said(identified: Session) -> None:
         if one.id in twin.parameters:
             value = twin.parameters[one.id].value
             assert value is not None
-            assert one.value == pytest.approx(value * display_for(one.id).factor, abs=one.step)
+            assert one.value == pytest.approx(value * get_display(one.id).factor, abs=one.step)
 
 
 @pytest.mark.parametrize("untold", [None, 0.9])
@@ -47,17 +47,17 @@ def test_the_inertia_slider_is_that_of_the_models_gear(
     large = replace(first, value=20.0, std_noise=1.0, std_systematic=None)
     small = replace(second, value=10.0, std_noise=untold, std_systematic=None)
     changed = replace(twin, parameters={**twin.parameters, large.id: large, small.id: small})
-    (told,) = [one.id for one in sliders_of(changed, shift) if one.id.startswith("J_prime")]
+    (told,) = [one.id for one in list_sliders(changed, shift) if one.id.startswith("J_prime")]
     assert told == large.id
-    assert model_of(changed, shift, {told: 20.0}) == model_of(changed, shift, {})
+    assert build_model(changed, shift, {told: 20.0}) == build_model(changed, shift, {})
 
 
 def test_sliders_at_rest_change_nothing(identified: Session) -> None:
     twin, shift = identified.work.require_twin(), identified.work.require_shift()
-    sliders = sliders_of(twin, shift)
-    assert changes_of(sliders, {one.id: one.value for one in sliders}) == {}
+    sliders = list_sliders(twin, shift)
+    assert collect_changes(sliders, {one.id: one.value for one in sliders}) == {}
     moved = {one.id: one.value + 2 * one.step for one in sliders}
-    changes = changes_of(sliders, moved)
+    changes = collect_changes(sliders, moved)
     assert set(changes) == {one.id for one in sliders}
     assert changes["P0." + shift.oncoming] == pytest.approx(1e5 * moved["P0." + shift.oncoming])
 
@@ -65,8 +65,8 @@ def test_sliders_at_rest_change_nothing(identified: Session) -> None:
 def test_nothing_changed_is_the_validation(identified: Session) -> None:
     work = identified.work
     twin, log, shift = work.require_twin(), work.require_log(), work.require_shift()
-    again = replay(first_run(twin, log, shift), twin, log, {})
-    expected = validate(twin, log, shift)
+    again = simulate_changes(simulate_identified(twin, log, shift), twin, log, {})
+    expected = simulate_shift(twin, log, shift)
     assert np.array_equal(
         again.traces["output_torque"].simulated, expected.traces["output_torque"].simulated
     )
@@ -89,9 +89,9 @@ def test_a_parameter_moves_the_run_as_a_new_model_would(
         told = twin.parameters[name].value
         assert told is not None
         value = told * factor
-    before = first_run(twin, log, shift)
-    present = replay(before, twin, log, {name: value})
-    expected = validate(twin, log, shift, model_of(twin, shift, {name: value}))
+    before = simulate_identified(twin, log, shift)
+    present = simulate_changes(before, twin, log, {name: value})
+    expected = simulate_shift(twin, log, shift, build_model(twin, shift, {name: value}))
     assert present.fit == expected.fit
     assert present.fit != before.fit
 
@@ -99,9 +99,9 @@ def test_a_parameter_moves_the_run_as_a_new_model_would(
 def test_the_age_of_the_torque_moves_the_torque(identified: Session) -> None:
     work = identified.work
     twin, log, shift = work.require_twin(), work.require_log(), work.require_shift()
-    before = first_run(twin, log, shift)
-    present = replay(before, twin, log, {"te_delay": 0.02})
-    told = twin.value("te_delay", 0.0)
+    before = simulate_identified(twin, log, shift)
+    present = simulate_changes(before, twin, log, {"te_delay": 0.02})
+    told = twin.get_value("te_delay", 0.0)
     middle = slice(5, -5)
     shifted = before.engine_torque.time[middle] + told - 0.02
     assert np.interp(
@@ -114,12 +114,12 @@ def test_friction_is_scaled_whatever_its_law(identified: Session) -> None:
     name = shift.oncoming
     slip = np.array([0.0, 10.0, 60.0])
     plain, scaled = (
-        next(e for e in model_of(twin, shift, {f"mu.{name}": f}).elements if e.name == name)
+        next(e for e in build_model(twin, shift, {f"mu.{name}": f}).elements if e.name == name)
         for f in (1.0, 1.2)
     )
-    assert scaled.friction.at(slip) == pytest.approx(1.2 * plain.friction.at(slip))
+    assert scaled.friction.evaluate(slip) == pytest.approx(1.2 * plain.friction.evaluate(slip))
     without = {k: replace(c, stribeck=None) for k, c in twin.friction.items()}
-    table = model_of(replace(twin, friction=without), shift, {f"mu.{name}": 1.2})
+    table = build_model(replace(twin, friction=without), shift, {f"mu.{name}": 1.2})
     law = next(e for e in table.elements if e.name == name).friction
     assert isinstance(law, FrictionTable)
     assert isinstance(plain.friction, Stribeck)
@@ -128,10 +128,10 @@ def test_friction_is_scaled_whatever_its_law(identified: Session) -> None:
 def test_the_figure_shows_the_run_and_follows_it(identified: Session) -> None:
     work = identified.work
     twin, log, shift = work.require_twin(), work.require_log(), work.require_shift()
-    before = first_run(twin, log, shift)
-    present = replay(before, twin, log, {"k_o": 1.2e5})
-    moved = moved_curves(figure_of(before, before), present)
-    whole = figure_of(before, present)
+    before = simulate_identified(twin, log, shift)
+    present = simulate_changes(before, twin, log, {"k_o": 1.2e5})
+    moved = collect_changed_curves(plot_what_if(before, before), present)
+    whole = plot_what_if(before, present)
     assert {whole.data[k].name for k in moved} == {"simulated", "measured − simulated"}
     for place, change in moved.items():
         assert np.array_equal(whole.data[place].y, _unpacked(change["y"]))
@@ -146,7 +146,7 @@ def test_what_the_log_could_not_tell_is_named(identified: Session) -> None:
     twin, shift = identified.work.require_twin(), identified.work.require_shift()
     unknown = replace(twin.parameters["k_o"], value=None)
     twin = replace(twin, parameters={**twin.parameters, "k_o": unknown})
-    assert "k_o" not in {one.id for one in sliders_of(twin, shift)}
+    assert "k_o" not in {one.id for one in list_sliders(twin, shift)}
     with pytest.raises(MissingParameterError, match="k_o"):
-        model_of(twin, shift, {})
-    assert model_of(twin, shift, {"k_o": 1.5e5}).k_o == 1.5e5
+        build_model(twin, shift, {})
+    assert build_model(twin, shift, {"k_o": 1.5e5}).k_o == 1.5e5

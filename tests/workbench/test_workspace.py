@@ -15,9 +15,9 @@ import pytest
 
 from drivetwin.errors import RefusedError
 from drivetwin.workbench.locks import Lock, LockKind
-from drivetwin.workbench.phases import Boundary, times_of
+from drivetwin.workbench.phases import Boundary, get_boundary_times
 from drivetwin.workbench.session import Session, Sessions
-from drivetwin.workbench.workspace import load
+from drivetwin.workbench.workspace import load_workspace
 from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG
 
@@ -25,28 +25,30 @@ from tests.workbench.conftest import CARD, LOG
 @pytest.fixture(scope="module")
 def saved(identified: Session) -> Iterator[Path]:
     """A workspace with a moved boundary, a lock and a slider."""
-    times = times_of(identified.work.shifts[0])
-    identified.move(0, {Boundary.INERTIA: times[Boundary.INERTIA] + 0.003})
+    times = get_boundary_times(identified.work.shifts[0])
+    identified.move_boundaries(0, {Boundary.INERTIA: times[Boundary.INERTIA] + 0.003})
     identified.set_lock("k_o", Lock(LockKind.PRIOR, 1.7e5, 2e3))
-    identified.slide({"k_o": 1.5e5, "mu.B3": 1.05})
+    identified.apply_sliders({"k_o": 1.5e5, "mu.B3": 1.05})
     name = identified.save("test")
     yield identified.folder.root / name
-    identified.move(0, {})
+    identified.move_boundaries(0, {})
     identified.set_lock("k_o", Lock(LockKind.FREE))
 
 
 def test_a_reopened_workspace_goes_on_where_it_was(
     identified: Session, session: Session, saved: Path
 ) -> None:
-    session.reopen(session.in_folder(saved.name))
+    session.reopen(session.get_folder_source(saved.name))
     before, after = identified.work, session.work
     assert after.moves == before.moves
     assert after.locks == before.locks
     assert after.changes == {"k_o": 1.5e5, "mu.B3": 1.05}
     assert after.method is before.method
     assert list(after.results) == list(before.results)
-    assert times_of(after.shifts[0]) == times_of(before.shifts[0])
-    fits = [one.simulation().present.fit["output_torque"]["all"] for one in (identified, session)]
+    assert get_boundary_times(after.shifts[0]) == get_boundary_times(before.shifts[0])
+    fits = [
+        one.get_simulation().present.fit["output_torque"]["all"] for one in (identified, session)
+    ]
     assert fits[0].fit_percent == pytest.approx(fits[1].fit_percent, rel=1e-6)
 
 
@@ -88,7 +90,7 @@ def test_a_damaged_key_is_named(
     path = tmp_path / "w.workspace.json"
     path.write_text(json.dumps(content))
     with pytest.raises(RefusedError, match=says):
-        load(path, path.name)
+        load_workspace(path, path.name)
 
 
 class _Runs:
@@ -104,7 +106,7 @@ def test_what_is_no_workspace_is_refused(tmp_path: Path, content: bytes) -> None
     path = tmp_path / "w.workspace.json"
     path.write_bytes(content)
     with pytest.raises(RefusedError):
-        load(path, path.name)
+        load_workspace(path, path.name)
 
 
 @pytest.mark.parametrize("path", ["../bench.csv", "/etc/passwd", "absent.csv"])
@@ -114,7 +116,7 @@ def test_a_workspace_cannot_name_files_outside(session: Session, saved: Path, pa
     crafted = saved.with_name("crafted.workspace.json")
     crafted.write_text(json.dumps(content))
     with pytest.raises(RefusedError):
-        session.reopen(session.in_folder(crafted.name))
+        session.reopen(session.get_folder_source(crafted.name))
     assert session.work.opened is None
 
 
@@ -124,19 +126,19 @@ def test_a_changed_log_is_told(session: Session, saved: Path) -> None:
     crafted = saved.with_name("changed.workspace.json")
     crafted.write_text(json.dumps(content))
     with pytest.raises(RefusedError, match="no longer the file"):
-        session.reopen(session.in_folder(crafted.name))
+        session.reopen(session.get_folder_source(crafted.name))
 
 
 @pytest.fixture
 def uploaded(place: Path, tmp_path: Path) -> Iterator[Session]:
     """A session in an empty folder, with log and card uploaded and open."""
-    sessions = Sessions(Folder.at(tmp_path))
-    one = sessions.get(sessions.new())
+    sessions = Sessions(Folder.from_path(tmp_path))
+    one = sessions.get(sessions.create())
     keys = []
     for name in (LOG, CARD):
         with (place / name).open("rb") as stream:
-            keys.append(one.receive(stream, name, None, 10**8))
-    one.open(one.uploaded(keys[0]), one.uploaded(keys[1]))
+            keys.append(one.store_upload(stream, name, None, 10**8))
+    one.open(one.get_uploaded(keys[0]), one.get_uploaded(keys[1]))
     yield one
     sessions.close()
 
@@ -145,7 +147,7 @@ def test_uploads_are_kept_beside_the_workspace(uploaded: Session, session: Sessi
     folder = uploaded.folder.root
     name = uploaded.save("kept")
     session.folder = uploaded.folder
-    session.reopen(session.in_folder(name))
+    session.reopen(session.get_folder_source(name))
     assert len(session.work.shifts) == 1
     (folder / LOG).write_text("another file")
     with pytest.raises(RefusedError, match="another file has its name"):

@@ -23,19 +23,19 @@ def folder(tmp_path: Path) -> Folder:
     (root / "out.csv").symlink_to(tmp_path / "secret.csv")
     (root / "outer").symlink_to(tmp_path)
     (root / "alias.csv").symlink_to(root / "inner" / "log.csv")
-    return Folder.at(root)
+    return Folder.from_path(root)
 
 
 @pytest.mark.parametrize("name", ["inner/log.csv", " inner/log.csv ", "inner/../inner/log.csv"])
 def test_a_file_of_the_folder_is_found(folder: Folder, name: str) -> None:
-    path = folder.file(name)
+    path = folder.get_file(name)
     assert path.read_text() == "x"
-    assert folder.name_of(path) == "inner/log.csv"
+    assert folder.get_name(path) == "inner/log.csv"
 
 
 def test_links_and_absolute_paths_inside_are_followed(folder: Folder) -> None:
-    assert folder.file("alias.csv") == folder.root / "inner" / "log.csv"
-    assert folder.file(str(folder.root / "inner" / "log.csv")).is_file()
+    assert folder.get_file("alias.csv") == folder.root / "inner" / "log.csv"
+    assert folder.get_file(str(folder.root / "inner" / "log.csv")).is_file()
 
 
 @pytest.mark.parametrize(
@@ -45,28 +45,28 @@ def test_links_and_absolute_paths_inside_are_followed(folder: Folder) -> None:
 )  # fmt: skip
 def test_what_leads_elsewhere_is_refused(folder: Folder, name: str) -> None:
     with pytest.raises(RefusedError):
-        folder.file(name)
+        folder.get_file(name)
 
 
 @given(name=st.text(max_size=60))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_text_is_a_file_inside_or_refused(folder: Folder, name: str) -> None:
     try:
-        path = folder.file(name)
+        path = folder.get_file(name)
     except RefusedError:
         return
     assert path.is_relative_to(folder.root)
 
 
 def test_new_files_stay_inside_and_get_their_ending(folder: Folder) -> None:
-    assert folder.new_file("work", ".workspace.json") == folder.root / "work.workspace.json"
+    assert folder.make_new_path("work", ".workspace.json") == folder.root / "work.workspace.json"
     for name in ("../work", "absent/work", "", ".workspace.json", "outer/work"):
         with pytest.raises(RefusedError):
-            folder.new_file(name, ".workspace.json")
+            folder.make_new_path(name, ".workspace.json")
 
 
 def test_names_for_completion_leave_hidden_and_foreign_files_out(folder: Folder) -> None:
-    names = folder.names((".csv",))
+    names = folder.list_names((".csv",))
     assert "inner/log.csv" in names
     assert all(not Path(name).name.startswith(".") for name in names)
     assert not any(name.startswith("outer/") for name in names)
@@ -74,4 +74,4 @@ def test_names_for_completion_leave_hidden_and_foreign_files_out(folder: Folder)
 
 def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RefusedError):
-        Folder.at(tmp_path / "absent")
+        Folder.from_path(tmp_path / "absent")

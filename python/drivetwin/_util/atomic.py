@@ -21,12 +21,12 @@ _kept: ContextVar[frozenset[_Identity]] = ContextVar("kept", default=frozenset()
 
 
 @contextmanager
-def keeping(files: Iterable[Path]) -> Iterator[None]:
+def protect_files(files: Iterable[Path]) -> Iterator[None]:
     """Protect `files` from being overwritten inside the block.
 
     Paths that are no files are ignored.
     """
-    identities = (_identity(file) for file in files)
+    identities = (_get_identity(file) for file in files)
     token = _kept.set(frozenset(one for one in identities if one is not None))
     try:
         yield
@@ -34,14 +34,14 @@ def keeping(files: Iterable[Path]) -> Iterator[None]:
         _kept.reset(token)
 
 
-def check_kept(path: Path) -> None:
+def refuse_overwrite(path: Path) -> None:
     """Raise InputError where `path` is a file to be kept, also by another path or a link."""
-    if _identity(path) in _kept.get():
+    if _get_identity(path) in _kept.get():
         what = "this file is read by the same command and would be written over"
         raise InputError(what, "give the result another name or folder", Where(file=str(path)))
 
 
-def _identity(path: Path) -> _Identity | None:
+def _get_identity(path: Path) -> _Identity | None:
     with suppress(OSError, ValueError):
         found = path.stat()
         if stat.S_ISREG(found.st_mode):
@@ -50,14 +50,14 @@ def _identity(path: Path) -> _Identity | None:
 
 
 @contextmanager
-def replacing(path: Path | str) -> Iterator[BinaryIO]:
+def open_atomic(path: Path | str) -> Iterator[BinaryIO]:
     """Open a file beside `path` to write into; it is renamed into place when the block succeeds.
 
     A block that fails or is stopped leaves the old file, never half of the new one; several
     machines may write the same file. Raises OSError, and InputError where `path` is to be kept.
     """
     path = Path(path)
-    check_kept(path)
+    refuse_overwrite(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f"{path.name}.{platform.node()}.{os.getpid()}.partial")
     try:
@@ -77,5 +77,5 @@ def write_text(path: Path | str, text: str) -> None:
 
 def write_bytes(path: Path | str, data: bytes) -> None:
     """Write `data` in place of `path`, whole or not at all; raises as `replacing` does."""
-    with replacing(path) as file:
+    with open_atomic(path) as file:
         file.write(data)

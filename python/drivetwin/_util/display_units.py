@@ -19,7 +19,7 @@ class Display:
     label: str
     factor: float = 1.0
 
-    def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_display(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n,) in the display unit."""
         return values * self.factor
 
@@ -50,39 +50,41 @@ _BY_SI = {
 }
 
 
-def display_of(si_unit: str) -> Display:
+def get_display_unit(si_unit: str) -> Display:
     """Display unit of an SI unit from the parameter table; the unit itself where none is set."""
     return _BY_SI.get(si_unit, Display(si_unit))
 
 
-def in_units(value: float, si_unit: str, half_width: float | None = None, digits: int = 4) -> str:
+def format_with_unit(
+    value: float, si_unit: str, half_width: float | None = None, digits: int = 4
+) -> str:
     """A quantity [SI] in a sentence: `0.963 ± 0.074 bar`; one without dimension has no unit.
 
     With a `half_width` [SI] both have its two digits, as in tables; without one, so many `digits`.
     """
-    display = display_of(si_unit)
+    display = get_display_unit(si_unit)
     unit = "" if si_unit == "1" else f" {display.label}"
     if half_width is None:
-        return significant(value * display.factor, digits) + unit
-    number, half = with_uncertainty(value * display.factor, half_width * display.factor)
+        return format_significant(value * display.factor, digits) + unit
+    number, half = format_uncertainty(value * display.factor, half_width * display.factor)
     return (f"{number} ± {half}" if half else number) + unit
 
 
-def with_uncertainty(value: float, half_width: float | None) -> tuple[str, str]:
+def format_uncertainty(value: float, half_width: float | None) -> tuple[str, str]:
     """Value and half width as text, both cut to two digits of the half width.
 
     Without a usable half width the value has four digits and the second text is empty; with a very
     small one the value has six.
     """
     if half_width is None or not math.isfinite(half_width) or half_width <= 0.0:
-        return significant(value), ""
+        return format_significant(value), ""
     digits = 1 - math.floor(math.log10(half_width))
     if half_width < 1e-5 * abs(value) or abs(digits) > 12:
-        return significant(value, 6), significant(half_width, 2)
-    return _rounded(value, digits), _rounded(half_width, digits)
+        return format_significant(value, 6), format_significant(half_width, 2)
+    return _format_digits(value, digits), _format_digits(half_width, digits)
 
 
-def significant(value: float, digits: int = 4) -> str:
+def format_significant(value: float, digits: int = 4) -> str:
     """Text with so many significant digits, never in powers of ten within 1e-6 to 1e9."""
     if not math.isfinite(value):
         return "–"
@@ -91,9 +93,9 @@ def significant(value: float, digits: int = 4) -> str:
     exponent = math.floor(math.log10(abs(value)))
     if not -6 <= exponent < 9:
         return f"{value:.{digits - 1}e}"
-    return _rounded(value, digits - 1 - exponent)
+    return _format_digits(value, digits - 1 - exponent)
 
 
-def _rounded(value: float, digits: int) -> str:
+def _format_digits(value: float, digits: int) -> str:
     text = f"{round(value, digits):,.{max(0, digits)}f}"
     return text.replace(",", "\u202f").replace("-", "−")

@@ -20,7 +20,7 @@ _one_at_a_time = RLock()
 of the process, and threads that change them out of turn would leave them changed."""
 
 
-def require(module: str, extra: str, kind: str, path: Path) -> Any:
+def import_extra(module: str, extra: str, kind: str, path: Path) -> Any:
     """Import a library of an extra; MissingExtraError names the install command.
 
     Its own log lines are silenced: what matters becomes an error or a warning of the reader.
@@ -52,7 +52,7 @@ class _Muted:
 
 
 @contextmanager
-def _unheard() -> Iterator[None]:
+def _mute_thread() -> Iterator[None]:
     """Suppress printed output, warnings and unraisable errors of libraries in this thread."""
     with _one_at_a_time:
         hook = sys.unraisablehook
@@ -66,14 +66,14 @@ def _unheard() -> Iterator[None]:
 
 
 @contextmanager
-def foreign_parser(kind: str, path: Path) -> Iterator[None]:
+def handle_parser_errors(kind: str, path: Path) -> Iterator[None]:
     """Turn whatever a foreign parser raises on damaged bytes into FileFormatError.
 
     Such parsers check little: a flipped bit shows as any exception at all. What they print, warn
     of, and complain about when a half-built object is freed would reach the user without any use.
     Only one thread at a time runs inside the block.
     """
-    with _unheard():
+    with _mute_thread():
         try:
             yield
         except DrivetwinError:

@@ -39,7 +39,7 @@ _present: ContextVar[_Span | None] = ContextVar("drivetwin_progress", default=No
 
 
 @contextmanager
-def listening(listener: Listener) -> Iterator[None]:
+def attach_listener(listener: Listener) -> Iterator[None]:
     """Report the progress of this thread inside the block to `listener`."""
     token = _present.set(_Span(listener, 0.0, 1.0, "", _Highest()))
     try:
@@ -49,7 +49,7 @@ def listening(listener: Listener) -> Iterator[None]:
 
 
 @contextmanager
-def part(start: float, end: float, text: str = "") -> Iterator[None]:
+def scale_progress(start: float, end: float, text: str = "") -> Iterator[None]:
     """Map progress inside the block to `start` to `end` of the current part.
 
     `text` describes the step; empty keeps the previous text.
@@ -67,14 +67,14 @@ def part(start: float, end: float, text: str = "") -> Iterator[None]:
     )
     token = _present.set(inside)
     try:
-        tell(0.0)
+        notify_progress(0.0)
         yield
-        tell(1.0)
+        notify_progress(1.0)
     finally:
         _present.reset(token)
 
 
-def tell(share: float) -> None:
+def notify_progress(share: float) -> None:
     """Report that `share` (0 to 1) of the current part is done."""
     span = _present.get()
     if span is None:

@@ -50,14 +50,17 @@ def read_toml(path: Path | str, error: type[InputError]) -> dict[str, Any]:
         ) from None
 
 
-def schema_faults(document: Mapping[str, Any], model: type[BaseModel]) -> list[Fault]:
+def validate_schema(document: Mapping[str, Any], model: type[BaseModel]) -> list[Fault]:
     """Return every fault that the schema `model` finds in `document`, in file order."""
     try:
         model.model_validate(document)
     except ValidationError as error:
         schema = model.model_json_schema()
         return [
-            Fault(key_path(item["loc"]), _text(item["type"], item["loc"], item["msg"], schema))
+            Fault(
+                format_key_path(item["loc"]),
+                _format_fault(item["type"], item["loc"], item["msg"], schema),
+            )
             for item in error.errors(include_url=False, include_context=False, include_input=False)
         ]
     return []
@@ -73,7 +76,7 @@ def raise_faults(faults: Iterable[Fault], error: type[InputError], file: str, re
         raise error(f"{len(found)} faults{listed}", remedy, Where(file=file))
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str:
+def suggest_spelling(word: str, known: Iterable[str]) -> str:
     """Return `; did you mean 'x'?` for the nearest of the `known` words, else what is known."""
     words = list(known)
     by_folded = {each.casefold(): each for each in words}
@@ -83,7 +86,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"; known here: {', '.join(words)}" if words else ""
 
 
-def key_path(location: Iterable[int | str]) -> str:
+def format_key_path(location: Iterable[int | str]) -> str:
     """Write a location as a key path: `("gears", 1, "ratio")` -> `gears[1].ratio`."""
     path = ""
     for part in location:
@@ -91,26 +94,28 @@ def key_path(location: Iterable[int | str]) -> str:
     return path
 
 
-def _text(kind: str, location: tuple[int | str, ...], message: str, schema: dict[str, Any]) -> str:
+def _format_fault(
+    kind: str, location: tuple[int | str, ...], message: str, schema: dict[str, Any]
+) -> str:
     if kind == "extra_forbidden":
-        known = _keys_at(schema, schema, location[:-1])
-        return f"unknown key{did_you_mean(str(location[-1]), known)}"
+        known = _collect_keys(schema, schema, location[:-1])
+        return f"unknown key{suggest_spelling(str(location[-1]), known)}"
     if kind == "missing":
         return "this key is required and missing"
     return message.removeprefix("Value error, ").replace("Input should", "the value should")
 
 
-def _keys_at(
+def _collect_keys(
     schema: dict[str, Any], node: dict[str, Any], location: tuple[int | str, ...]
 ) -> list[str]:
     """Keys that the JSON Schema `node` allows at `location` below it."""
     if "$ref" in node:
-        return _keys_at(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[-1]], location)
+        return _collect_keys(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[-1]], location)
     for choice in node.get("anyOf", ()):
-        if keys := _keys_at(schema, choice, location):
+        if keys := _collect_keys(schema, choice, location):
             return keys
     if not location:
         return list(node.get("properties", ()))
     step = "items" if isinstance(location[0], int) else "additionalProperties"
     child = node.get("properties", {}).get(location[0], node.get(step))
-    return _keys_at(schema, child, location[1:]) if isinstance(child, dict) else []
+    return _collect_keys(schema, child, location[1:]) if isinstance(child, dict) else []

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from drivetwin._util.toml import did_you_mean
-from drivetwin.channels.pressure_roles import pressed_element, pressure_role
+from drivetwin._util.toml import suggest_spelling
+from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS
 from drivetwin.errors import MappingError, MissingChannelError, Where
@@ -30,7 +30,7 @@ class ChannelSpec:
     time_shift: float = 0.0
     group: str | None = None
 
-    def picks(self, column: Column) -> bool:
+    def matches(self, column: Column) -> bool:
         """Return True if the spec refers to this column."""
         return column.name == self.source and self.group in (None, column.group)
 
@@ -66,17 +66,17 @@ _AFTER = "(ist|act|actual|can|bus|xcp|mess|meas|value|val|mean|avg|mittel|ha|rea
 _STATE = "(ist|act|actual|mess|meas|val|c|avg|mw)*"
 
 
-def _either_order(thing: str, measure: str) -> str:
+def _make_either_order(thing: str, measure: str) -> str:
     return f"{_GEARBOX}(({thing})({measure})|({measure}){_GEARBOX}({thing})){_STATE}"
 
 
 _NAMES: dict[str, str] = {
-    "engine_torque": f"{_either_order(_ENGINE, _TORQUE)}|te|me|engnettorque",
-    "output_torque": f"{_either_order(_OUTPUT, _TORQUE)}|to",
-    "input_speed": _either_order(_INPUT, _SPEED),
-    "engine_speed": f"{_either_order(_ENGINE, _SPEED)}|we|ne|omegae",
-    "output_speed": _either_order(_OUTPUT, _SPEED),
-    "wheel_speed": f"({_either_order(_WHEEL, _SPEED)}|ww)({_SIDE})?",
+    "engine_torque": f"{_make_either_order(_ENGINE, _TORQUE)}|te|me|engnettorque",
+    "output_torque": f"{_make_either_order(_OUTPUT, _TORQUE)}|to",
+    "input_speed": _make_either_order(_INPUT, _SPEED),
+    "engine_speed": f"{_make_either_order(_ENGINE, _SPEED)}|we|ne|omegae",
+    "output_speed": _make_either_order(_OUTPUT, _SPEED),
+    "wheel_speed": f"({_make_either_order(_WHEEL, _SPEED)}|ww)({_SIDE})?",
     "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung|wert)?" + _STATE,
     "gear": "(trans)?(current|act|actual|ist|n)?(gear|gang)(engaged)?" + _STATE,
     "shift_in_process": "(trans|getr)?(shift|schaltung)(inprocess|active|flag|aktiv)" + _STATE,
@@ -93,7 +93,7 @@ _KIND_WORD = {
 }
 
 
-def plain(name: str) -> str:
+def normalise_name(name: str) -> str:
     """Reduce a column name to letters and digits for comparison: `n_Ab [1/min]` -> `nab`."""
     text = re.sub(r"\\.*$|\[[^\]]*\]", "", name.casefold())
     for umlaut, letters in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("ß", "ss"), ("ω", "w")):
@@ -101,7 +101,9 @@ def plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", text)
 
 
-def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, list[Column]]:
+def infer_candidates(
+    columns: Sequence[Column], elements: Mapping[str, str]
+) -> dict[str, list[Column]]:
     """Return the candidate columns of each role; `elements` gives the kind of each by name.
 
     A column without any number, or from a strange sender, is a candidate only where no other is, a
@@ -109,47 +111,47 @@ def guess(columns: Sequence[Column], elements: Mapping[str, str]) -> dict[str, l
     """
     columns = [column for column in columns if not column.silent]
     found = {
-        role: _first(columns, (pattern, f"{_BESIDE}({pattern}){_AFTER}"))
+        role: _select_first_match(columns, (pattern, f"{_BESIDE}({pattern}){_AFTER}"))
         for role, pattern in _NAMES.items()
     }
     for element, kind in elements.items():
-        found[pressure_role(element)] = _pressure_candidates(columns, element, kind)
+        found[make_pressure_role(element)] = _find_pressure_candidates(columns, element, kind)
     return {
-        role: _foremost(_with_numbers(candidates))
+        role: _drop_secondary(_drop_empty(candidates))
         for role, candidates in found.items()
         if candidates
     }
 
 
-def _first(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
+def _select_first_match(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
     """Return the columns that match the first pattern of `forms` that matches any column.
 
     The last part of a name like `log.EngTrq` counts only where no whole name has any.
     """
     forms = tuple(forms)
-    for part in (plain, lambda name: plain(re.split(r"[./]", name)[-1])):
+    for part in (normalise_name, lambda name: normalise_name(re.split(r"[./]", name)[-1])):
         for form in forms:
             if found := [column for column in columns if re.fullmatch(form, part(column.name))]:
                 return found
     return []
 
 
-def _foremost(candidates: list[Column]) -> list[Column]:
+def _drop_secondary(candidates: list[Column]) -> list[Column]:
     return [column for column in candidates if not column.aside] or candidates
 
 
-def _with_numbers(candidates: list[Column]) -> list[Column]:
+def _drop_empty(candidates: list[Column]) -> list[Column]:
     return [column for column in candidates if not column.empty] or candidates
 
 
-def _whole(words: str) -> str:
+def _drop_abbreviations(words: str) -> str:
     """Drop the abbreviations from a pattern of alternatives."""
     return "|".join(word for word in words.split("|") if len(word) > 2)
 
 
-def _pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> list[Column]:
+def _find_pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> list[Column]:
     """Columns for an element: its full name or kind and number first, its bare number last."""
-    label = plain(element)
+    label = normalise_name(element)
     digits = re.sub(r"\D", "", label)
     forms = [f"({_PRESSURE_WORD})({label}){_STATE}|({label})({_PRESSURE_WORD}){_STATE}"]
     if digits:
@@ -158,14 +160,16 @@ def _pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> 
             f"({_PRESSURE_WORD})({numbered}){_STATE}|({numbered})({_PRESSURE_WORD}){_STATE}"
         )
         # Compounds name kind and pressure before number or label, in whole words: no `Kp2`.
-        compound = f"({_whole(_KIND_WORD[kind])})({_whole(_PRESSURE_WORD)})"
+        compound = (
+            f"({_drop_abbreviations(_KIND_WORD[kind])})({_drop_abbreviations(_PRESSURE_WORD)})"
+        )
         forms.append(f"{compound}({label}|0*{digits}){_STATE}")
         forms.append(f"({_PRESSURE_WORD})({_KIND_WORD[kind]})({label}){_STATE}")
         forms.append(f"({_PRESSURE_WORD})0*{digits}{_STATE}")
-    return _first(columns, forms)
+    return _select_first_match(columns, forms)
 
 
-def resolve(
+def resolve_roles(
     columns: Sequence[Column],
     stated: Mapping[str, ChannelSpec],
     elements: Mapping[str, str],
@@ -181,24 +185,24 @@ def resolve(
     """
     needed = frozenset(needed)
     _refuse_unknown_elements(stated, elements, file)
-    channels = {role: _existing(role, spec, columns, file) for role, spec in stated.items()}
-    free = [one for one in columns if not any(spec.picks(one) for spec in stated.values())]
+    channels = {role: _require_column(role, spec, columns, file) for role, spec in stated.items()}
+    free = [one for one in columns if not any(spec.matches(one) for spec in stated.values())]
     warnings: list[str] = []
-    for role, candidates in guess(free, elements).items():
+    for role, candidates in infer_candidates(free, elements).items():
         if role in channels:
             continue
         if len(candidates) == 1:
-            channels[role] = spec_of(candidates[0], columns)
-            warnings += _others(candidates[0], columns)
+            channels[role] = make_spec(candidates[0], columns)
+            warnings += _describe_other_senders(candidates[0], columns)
             continue
         what = f"{role!r} may be any of the columns {', '.join(map(str, candidates))}"
-        if role in needed or role in MEASURED or pressed_element(role) is not None:
-            raise MappingError(what, _choice(role, candidates), Where(file=file))
+        if role in needed or role in MEASURED or get_pressure_element(role) is not None:
+            raise MappingError(what, _suggest_choice(role, candidates), Where(file=file))
         warnings.append(f"{what}; none is used, name one in a channel mapping")
-    _refuse_shared(channels, stated, file)
+    _refuse_double_use(channels, stated, file)
     _refuse_absent(needed, channels, columns, file)
-    order = [*ROLES, *(pressure_role(element) for element in elements)]
-    without = [element for element in elements if pressure_role(element) not in channels]
+    order = [*ROLES, *(make_pressure_role(element) for element in elements)]
+    without = [element for element in elements if make_pressure_role(element) not in channels]
     if without:
         warnings.append(f"no pressure of {', '.join(without)}: nothing that needs it can be told")
     return Mapped(
@@ -206,12 +210,12 @@ def resolve(
     )
 
 
-def _choice(role: str, candidates: Sequence[Column]) -> str:
+def _suggest_choice(role: str, candidates: Sequence[Column]) -> str:
     """Suggest how to choose among the candidates of a role: by name, or by group."""
     if len(set(candidates)) < len(candidates):
         return "rename the repeated column in the file"
     if len({one.name for one in candidates}) > 1:
-        return _remedy(role)
+        return _suggest_remedy(role)
     first = candidates[0]
     return (
         f"choose one in a channel mapping (--channels): channels.{role} = "
@@ -219,7 +223,7 @@ def _choice(role: str, candidates: Sequence[Column]) -> str:
     )
 
 
-def _others(chosen: Column, columns: Sequence[Column]) -> list[str]:
+def _describe_other_senders(chosen: Column, columns: Sequence[Column]) -> list[str]:
     """Return a warning for other senders of the same signal."""
     others = [one for one in columns if one.aside and not one.silent and one.name == chosen.name]
     if not others:
@@ -227,7 +231,7 @@ def _others(chosen: Column, columns: Sequence[Column]) -> list[str]:
     return [f"{chosen} is used; left aside: {', '.join(map(str, others))}"]
 
 
-def spec_of(column: Column, columns: Sequence[Column]) -> ChannelSpec:
+def make_spec(column: Column, columns: Sequence[Column]) -> ChannelSpec:
     """Return the spec that picks a column: with its group where the name alone would not."""
     alike = sum(other.name == column.name for other in columns)
     return ChannelSpec(column.name, group=column.group if alike > 1 else None)
@@ -251,7 +255,7 @@ def _refuse_absent(
             f"no column for {' nor '.join(map(repr, absent))} among "
             f"{', '.join(dict.fromkeys(one.name for one in columns if not one.silent))}"
             + (f"; without a value throughout: {silent}" if silent else ""),
-            _remedy(absent[0]),
+            _suggest_remedy(absent[0]),
             Where(file=file),
         )
 
@@ -260,18 +264,20 @@ def _refuse_unknown_elements(
     stated: Mapping[str, ChannelSpec], elements: Mapping[str, str], file: str
 ) -> None:
     for role in stated:
-        element = pressed_element(role)
+        element = get_pressure_element(role)
         if element is not None and element not in elements:
             raise MappingError(
                 f"the mapping has a pressure of {element!r}, which is no element of the vehicle "
-                f"card{did_you_mean(element, elements)}",
+                f"card{suggest_spelling(element, elements)}",
                 "use the element names of the card: [channels.pressure.<element>]",
                 Where(file=file),
             )
 
 
-def _existing(role: str, spec: ChannelSpec, columns: Sequence[Column], file: str) -> ChannelSpec:
-    found = _with_numbers([column for column in columns if spec.picks(column)])
+def _require_column(
+    role: str, spec: ChannelSpec, columns: Sequence[Column], file: str
+) -> ChannelSpec:
+    found = _drop_empty([column for column in columns if spec.matches(column)])
     if len(found) == 1:
         return spec
     where = Where(file=file)
@@ -293,12 +299,12 @@ def _existing(role: str, spec: ChannelSpec, columns: Sequence[Column], file: str
     names = [column.name for column in columns]
     what = (
         f"the mapping names column {spec.source!r} for {role!r}, which the file does not have"
-        f"{did_you_mean(spec.source, names)}"
+        f"{suggest_spelling(spec.source, names)}"
     )
     raise MappingError(what, "correct `source`, or rename the column in the file", where)
 
 
-def _refuse_shared(
+def _refuse_double_use(
     channels: Mapping[str, ChannelSpec], stated: Mapping[str, ChannelSpec], file: str
 ) -> None:
     """A guessed column must not serve two roles, as with two elements of one number."""
@@ -310,12 +316,12 @@ def _refuse_shared(
         if len(roles) > 1:
             raise MappingError(
                 f"column {source!r} may be {' or '.join(roles)}",
-                _remedy(roles[0]),
+                _suggest_remedy(roles[0]),
                 Where(file=file),
             )
 
 
-def _remedy(role: str) -> str:
+def _suggest_remedy(role: str) -> str:
     return (
         f"name its column in a channel mapping (--channels): channels.{role} = "
         '{ source = "..." }; `drivetwin inspect` lists the columns'

@@ -10,12 +10,12 @@ from typing import Generic, Literal, TypeVar
 import tomlkit
 from pydantic import Field
 
-from drivetwin._util.toml import StrictModel, raise_faults, read_toml, schema_faults
+from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.channels.mapping import ChannelSpec, Mapped
-from drivetwin.channels.pressure_roles import pressed_element, pressure_role
+from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
-from drivetwin.channels.roles import ROLES, quantity_of
-from drivetwin.channels.units import first_spellings
+from drivetwin.channels.roles import ROLES, get_quantity
+from drivetwin.channels.units import list_first_spellings
 from drivetwin.errors import MappingError
 
 Entry = TypeVar("Entry")
@@ -36,14 +36,14 @@ class ByRole(StrictModel, Generic[Entry]):
     lockup_engaged: Entry | None = None
     pressure: dict[str, Entry] = Field(default_factory=dict)
 
-    def items(self) -> Iterator[tuple[str, Entry]]:
+    def iterate_roles(self) -> Iterator[tuple[str, Entry]]:
         """Yield role and entry of all that are given."""
         for role in ROLES:
             entry = getattr(self, role)
             if entry is not None:
                 yield role, entry
         for element, entry in self.pressure.items():
-            yield pressure_role(element), entry
+            yield make_pressure_role(element), entry
 
 
 class ChannelTable(StrictModel):
@@ -57,7 +57,7 @@ class ChannelTable(StrictModel):
     offset: float = 0.0
     time_shift_s: float = 0.0
 
-    def spec(self) -> ChannelSpec:
+    def to_spec(self) -> ChannelSpec:
         """Return the table as the mapping uses it."""
         return ChannelSpec(
             source=self.source,
@@ -97,13 +97,13 @@ def read_mapping(path: Path) -> Mapped:
     """Read a channel mapping file; raises MappingError naming every fault by its key."""
     document = read_toml(path, MappingError)
     raise_faults(
-        schema_faults(document, MappingFile),
+        validate_schema(document, MappingFile),
         MappingError,
         str(path),
         "correct the channel mapping file; `drivetwin inspect --write-mapping` writes a valid one",
     )
     file = MappingFile.model_validate(document)
-    channels = {role: table.spec() for role, table in file.channels.items()}
+    channels = {role: table.to_spec() for role, table in file.channels.iterate_roles()}
     bus = BusOptions(
         tuple(path.parent / name for name in file.bus.dbc), file.bus.reference_torque_Nm
     )
@@ -111,7 +111,7 @@ def read_mapping(path: Path) -> Mapped:
     return Mapped(channels, ReadOptions(time, bus))
 
 
-def mapping_text(
+def format_mapping(
     channels: Mapping[str, ChannelSpec],
     options: ReadOptions | None = None,
     unitless: Collection[str] = (),
@@ -125,14 +125,14 @@ def mapping_text(
     document.add(tomlkit.comment("Channel mapping: which column is what to the driveline."))
     document.add(tomlkit.comment("value = sign * (scale * column + offset), in `unit`;"))
     document.add(tomlkit.comment("time_shift_s is added to the time stamps of the channel."))
-    for name, entries in _options(options or ReadOptions()).items():
+    for name, entries in _format_options(options or ReadOptions()).items():
         if entries:
             document.add(name, tomlkit.item(entries))
     tables = tomlkit.table(is_super_table=True)
     pressures = tomlkit.table(is_super_table=True)
     for role, spec in channels.items():
-        table = _table(spec, role if role in unitless else None)
-        element = pressed_element(role)
+        table = _format_table(spec, role if role in unitless else None)
+        element = get_pressure_element(role)
         if element is None:
             tables.add(role, table)
         else:
@@ -143,7 +143,7 @@ def mapping_text(
     return tomlkit.dumps(document)
 
 
-def _options(options: ReadOptions) -> dict[str, dict[str, object]]:
+def _format_options(options: ReadOptions) -> dict[str, dict[str, object]]:
     """The tables `[time]` and `[bus]`, without what is not stated."""
     time = {
         "source": options.time.source,
@@ -160,7 +160,7 @@ def _options(options: ReadOptions) -> dict[str, dict[str, object]]:
     }
 
 
-def _table(spec: ChannelSpec, unitless: str | None) -> tomlkit.items.Table:
+def _format_table(spec: ChannelSpec, unitless: str | None) -> tomlkit.items.Table:
     """The table of a spec; with a line to fill in where `unitless` is the role it plays."""
     table = tomlkit.table()
     table.add("source", spec.source)
@@ -169,7 +169,7 @@ def _table(spec: ChannelSpec, unitless: str | None) -> tomlkit.items.Table:
     if spec.unit is not None:
         table.add("unit", spec.unit)
     elif unitless is not None:
-        usual = ", ".join(map(repr, first_spellings(quantity_of(unitless))))
+        usual = ", ".join(map(repr, list_first_spellings(get_quantity(unitless))))
         table.add(tomlkit.comment(f'unit = "..."  # the log names none; one of {usual}'))
     table.add("sign", spec.sign)
     table.add("scale", spec.scale)

@@ -6,9 +6,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from drivetwin._util.toml import did_you_mean
+from drivetwin._util.toml import suggest_spelling
 from drivetwin.channels.read_options import TimeColumn
-from drivetwin.channels.units import is_time_unit, is_unit, lookup
+from drivetwin.channels.units import find_unit, is_time_unit, is_unit
 from drivetwin.errors import MappingError, MissingChannelError, Where
 
 _TIME_NAMES = frozenset(
@@ -19,7 +19,7 @@ _TIME_NAMES = frozenset(
 )
 
 
-def name_and_unit(cell: str) -> tuple[str, str | None]:
+def split_name_and_unit(cell: str) -> tuple[str, str | None]:
     """`EngTrq [Nm]` -> name and unit; round brackets count where they hold a unit.
 
     `x[1]` without a blank is an index, part of the name.
@@ -38,12 +38,14 @@ def is_time_name(name: str) -> bool:
     return re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES
 
 
-def may_be_time(unit: str | None) -> bool:
+def can_be_time(unit: str | None) -> bool:
     """Return True if a column of this unit may be a time: none, a time unit or an unknown one."""
-    return unit is None or is_time_unit(unit) or lookup(unit) is None
+    return unit is None or is_time_unit(unit) or find_unit(unit) is None
 
 
-def time_indices(names: Sequence[str], units: Sequence[str | None], time: TimeColumn) -> list[int]:
+def find_time_indices(
+    names: Sequence[str], units: Sequence[str | None], time: TimeColumn
+) -> list[int]:
     """Return the indices of all time columns: as stated, else those with a name for time.
 
     A column of another unit, such as a temperature `T1`, is none.
@@ -53,18 +55,18 @@ def time_indices(names: Sequence[str], units: Sequence[str | None], time: TimeCo
     return [
         index
         for index, (name, unit) in enumerate(zip(names, units, strict=True))
-        if is_time_name(name) and may_be_time(unit)
+        if is_time_name(name) and can_be_time(unit)
     ]
 
 
-def time_index(
+def find_time_index(
     names: Sequence[str], units: Sequence[str | None], time: TimeColumn, file: str
 ) -> int:
-    """Return the index of the one time column, see `time_indices`.
+    """Return the index of the one time column, see `find_time_indices`.
 
     Raises MappingError where there are several, MissingChannelError where there is none.
     """
-    found = time_indices(names, units, time)
+    found = find_time_indices(names, units, time)
     if len(found) == 1:
         return found[0]
     where = Where(file=file)
@@ -73,17 +75,17 @@ def time_index(
         listed = ", ".join(names[index] for index in found)
         raise MappingError(f"several time columns: {listed}", remedy, where)
     if time.source is not None:
-        what = f"no column {time.source!r} for time{did_you_mean(time.source, names)}"
+        what = f"no column {time.source!r} for time{suggest_spelling(time.source, names)}"
     else:
-        what = f"no time column among {', '.join(names)}{_in_another_unit(names, units)}"
+        what = f"no time column among {', '.join(names)}{_describe_other_units(names, units)}"
     raise MissingChannelError(what, remedy, where)
 
 
-def _in_another_unit(names: Sequence[str], units: Sequence[str | None]) -> str:
+def _describe_other_units(names: Sequence[str], units: Sequence[str | None]) -> str:
     """Describe the columns that have a name for time but another unit."""
     told = [
         f"{name!r} is in {unit!r}"
         for name, unit in zip(names, units, strict=True)
-        if is_time_name(name) and not may_be_time(unit)
+        if is_time_name(name) and not can_be_time(unit)
     ]
     return f"; {', '.join(told)}, no unit of time" if told else ""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.channels.pressure_roles import pressed_element
+from drivetwin.channels.pressure_roles import get_pressure_element
 from drivetwin.channels.shiftlog import Quantity
 
 ROLES: dict[str, Quantity] = {
@@ -36,6 +36,6 @@ MEASURED = frozenset(role for role in ROLES if ROLES[role] in (Quantity.TORQUE, 
 """Roles for which two candidate columns are an error even where the role is not needed."""
 
 
-def quantity_of(role: str) -> Quantity:
+def get_quantity(role: str) -> Quantity:
     """Return the quantity of a role; raises KeyError for a role that does not exist."""
-    return ROLES[role] if pressed_element(role) is None else Quantity.PRESSURE
+    return ROLES[role] if get_pressure_element(role) is None else Quantity.PRESSURE

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.rich_display import DisplayMixin
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.update_raster import find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.simulation.dual_clutch import LATEST
@@ -24,24 +24,26 @@ GAP_STEPS = 5.0
 """A pause of more than this many median steps is a gap: nothing is interpolated across it."""
 
 
-def gap_limit(time: FloatArray) -> float:
+def compute_gap_limit(time: FloatArray) -> float:
     """Return the longest pause [s] between samples at `time` (n,) that is not a gap."""
     if time.size < 2:
         return np.inf
     return GAP_STEPS * float(np.median(np.diff(time)))
 
 
-def open_ends(time: FloatArray, span: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+def find_uncovered_ends(
+    time: FloatArray, span: tuple[float, float]
+) -> tuple[tuple[float, float], ...]:
     """Return the parts of `span` [s] outside the samples that are longer than a gap."""
-    limit = gap_limit(time)
+    limit = compute_gap_limit(time)
     first, last = float(time[0]), float(time[-1])
     ends = ((span[0], min(first, span[1])), (max(last, span[0]), span[1]))
     return tuple((low, high) for low, high in ends if high - low > limit)
 
 
-def pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
+def find_pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
     """Gaps between samples at `time` (n,): from the last sample before to the first one after."""
-    wide = np.flatnonzero(np.diff(time) > gap_limit(time))
+    wide = np.flatnonzero(np.diff(time) > compute_gap_limit(time))
     return tuple((float(time[i]), float(time[i + 1])) for i in wide)
 
 
@@ -109,7 +111,7 @@ class Channel:
         time, samples = found
         return replace(self, time=time, values=self.values[samples], held=False)
 
-    def at(self, time: FloatArray) -> FloatArray:
+    def interpolate(self, time: FloatArray) -> FloatArray:
         """Values at `time` (m,): linear between samples, held for states.
 
         NaN outside the span, and for all but states inside a gap (more than GAP_STEPS median steps
@@ -123,13 +125,13 @@ class Channel:
             values = np.interp(time, self.time, self.values)
             after = np.clip(before + 1, None, self.time.size - 1)
             pause = self.time[after] - self.time[before]
-            unknown |= (pause > gap_limit(self.time)) & (time > self.time[before])
+            unknown |= (pause > compute_gap_limit(self.time)) & (time > self.time[before])
         return np.where(unknown, np.nan, values)
 
     @property
     def gaps(self) -> tuple[tuple[float, float], ...]:
         """Spans [s] without samples, from the sample before to the sample after."""
-        return () if self.quantity is Quantity.STATE else pauses(self.time)
+        return () if self.quantity is Quantity.STATE else find_pauses(self.time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +177,6 @@ class ShiftLog(DisplayMixin):
                 Where(file=self.source),
             ) from None
 
-    def pressure(self, element: str) -> Channel:
+    def get_pressure(self, element: str) -> Channel:
         """Pressure of a clutch or brake by its name on the card."""
-        return self[pressure_role(element)]
+        return self[make_pressure_role(element)]

@@ -121,7 +121,7 @@ _TIME = {
 """Seconds of each unit of time; days are what Excel and MATLAB count dates in."""
 
 
-def _normal(spelling: str) -> str:
+def _normalise_spelling(spelling: str) -> str:
     """One form for blanks, superscripts, multiplication signs, minus signs and brackets."""
     text = unicodedata.normalize("NFKC", spelling).strip()
     if re.fullmatch(r"\[.+\]|\(.+\)", text):
@@ -130,31 +130,35 @@ def _normal(spelling: str) -> str:
     return re.sub(r"[\u2219\u22c5\u2022\u00d7\u2217]", "·", text)
 
 
-def _table() -> dict[str, Unit]:
+def _build_unit_table() -> dict[str, Unit]:
     table = {
-        _normal(spelling): Unit(factor, 0.0, quantity)
+        _normalise_spelling(spelling): Unit(factor, 0.0, quantity)
         for quantity, by_factor in _SPELLINGS.items()
         for factor, spellings in by_factor.items()
         for spelling in spellings.split()
     }
     for spelling in _CELSIUS.split():
-        table[_normal(spelling)] = Unit(1.0, 273.15, Quantity.TEMPERATURE)
+        table[_normalise_spelling(spelling)] = Unit(1.0, 273.15, Quantity.TEMPERATURE)
     for spelling in _FAHRENHEIT.split():
-        table[_normal(spelling)] = Unit(5.0 / 9.0, 459.67 * 5.0 / 9.0, Quantity.TEMPERATURE)
+        table[_normalise_spelling(spelling)] = Unit(
+            5.0 / 9.0, 459.67 * 5.0 / 9.0, Quantity.TEMPERATURE
+        )
     return table
 
 
-UNITS: dict[str, Unit] = _table()
+UNITS: dict[str, Unit] = _build_unit_table()
 """Every accepted spelling in its normal form."""
 
-_REASONS = {_normal(each): why for why, all_of in _REFUSED.items() for each in all_of.split()}
+_REASONS = {
+    _normalise_spelling(each): why for why, all_of in _REFUSED.items() for each in all_of.split()
+}
 _BY_FOLDED = {spelling.casefold(): unit for spelling, unit in UNITS.items()}
 _REASONS_FOLDED = {spelling.casefold(): why for spelling, why in _REASONS.items()}
 
 
-def lookup(spelling: str) -> Unit | None:
+def find_unit(spelling: str) -> Unit | None:
     """Return the unit of a spelling, or None. Upper and lower case differ only for mPa and MPa."""
-    text = _normal(spelling)
+    text = _normalise_spelling(spelling)
     if text in UNITS:
         return UNITS[text]
     return None if text.casefold() in _REASONS_FOLDED else _BY_FOLDED.get(text.casefold())
@@ -162,11 +166,11 @@ def lookup(spelling: str) -> Unit | None:
 
 def is_unit(spelling: str) -> bool:
     """Return True if a text is a spelling of any unit, time and refused ones included."""
-    refused = _normal(spelling).casefold() in _REASONS_FOLDED
-    return lookup(spelling) is not None or refused or is_time_unit(spelling)
+    refused = _normalise_spelling(spelling).casefold() in _REASONS_FOLDED
+    return find_unit(spelling) is not None or refused or is_time_unit(spelling)
 
 
-def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit:
+def resolve_channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit:
     """Return the unit of a channel that measures `quantity`.
 
     A state (gear, flag) needs no unit. Raises UnitError where the unit is missing, unknown,
@@ -174,7 +178,7 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
     """
     if quantity is Quantity.STATE:
         return Unit(1.0, 0.0, Quantity.STATE)
-    usual = ", ".join(map(repr, first_spellings(quantity)))
+    usual = ", ".join(map(repr, list_first_spellings(quantity)))
     source = where.channel or "..."
     remedy = (
         f'assert it in the channel mapping: channels.<role> = {{ source = "{source}", '
@@ -182,9 +186,9 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
     )
     if spelling is None or not spelling.strip():
         raise UnitError("the file names no unit for this channel", remedy, where)
-    unit = lookup(spelling)
+    unit = find_unit(spelling)
     if unit is None:
-        reason = _REASONS_FOLDED.get(_normal(spelling).casefold())
+        reason = _REASONS_FOLDED.get(_normalise_spelling(spelling).casefold())
         what = f"unit {spelling!r} cannot stand as it is: {reason}" if reason else None
         raise UnitError(what or f"unknown unit {spelling!r}", remedy, where)
     if unit.quantity is not quantity:
@@ -199,31 +203,31 @@ def channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit
 
 def is_time_unit(spelling: str) -> bool:
     """Return True if a text is a spelling of a unit of time."""
-    return _normal(spelling).casefold() in _TIME
+    return _normalise_spelling(spelling).casefold() in _TIME
 
 
-def time_factor(spelling: str | None, where: Where) -> float:
+def get_time_factor(spelling: str | None, where: Where) -> float:
     """Return the factor to seconds of a time unit; raises UnitError if missing or unknown."""
     remedy = 'assert it in the channel mapping: time = { unit = "s" } (or "ms", "us", "min")'
     if spelling is None or not spelling.strip():
         raise UnitError("the file names no unit for its time column", remedy, where)
     try:
-        return _TIME[_normal(spelling).casefold()]
+        return _TIME[_normalise_spelling(spelling).casefold()]
     except KeyError:
         raise UnitError(f"unknown time unit {spelling!r}", remedy, where) from None
 
 
-def first_spellings(quantity: Quantity) -> list[str]:
+def list_first_spellings(quantity: Quantity) -> list[str]:
     """Return the first spelling of each size of unit of a quantity, SI among them."""
     return [spellings.split()[0] for spellings in _SPELLINGS[quantity].values()]
 
 
-def usual_units(quantity: Quantity, without: str) -> list[tuple[str, float]]:
+def list_usual_units(quantity: Quantity, without: str) -> list[tuple[str, float]]:
     """Return the first spelling of each size of unit with its factor relative to `without`.
 
     Used to propose the unit that numbers would fit; `without` is the present unit and left out.
     """
-    present = lookup(without)
+    present = find_unit(without)
     size = present.factor if present is not None else 1.0
     return [
         (spellings.split()[0], factor / size)

@@ -16,7 +16,7 @@ from drivetwin.cli.export import export
 from drivetwin.cli.fleet import fleet
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
-from drivetwin.cli.inputs import keeping_inputs
+from drivetwin.cli.inputs import protect_inputs
 from drivetwin.cli.inspect import inspect
 from drivetwin.cli.observe import observe
 from drivetwin.cli.output import show_error
@@ -56,10 +56,10 @@ app.command(name="app")(workbench)
 app.add_typer(fleet, name="fleet")
 for entry in (*app.registered_commands, *fleet.registered_commands):
     if entry.callback is not None:
-        entry.callback = keeping_inputs(entry.callback)
+        entry.callback = protect_inputs(entry.callback)
 
 
-def _version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         from drivetwin._util.version import program_version
 
@@ -68,11 +68,11 @@ def _version(wanted: bool) -> None:
 
 
 @app.callback()
-def _options(
+def _handle_options(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", callback=_version, is_eager=True, help="Print the version and stop."
+            "--version", callback=_print_version, is_eager=True, help="Print the version and stop."
         ),
     ] = False,
 ) -> None:

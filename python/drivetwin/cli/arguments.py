@@ -28,7 +28,7 @@ ChannelsFile = Annotated[
 ]
 
 
-def load(log: Path, vehicle: Path, channels: Path | None) -> tuple[ShiftLog, VehicleCard]:
+def load_inputs(log: Path, vehicle: Path, channels: Path | None) -> tuple[ShiftLog, VehicleCard]:
     """Read card, mapping and log; raises the typed errors of their readers."""
     from drivetwin.logs.read import read_log
     from drivetwin.vehicle.card import load_card

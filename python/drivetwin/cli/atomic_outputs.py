@@ -11,11 +11,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin._util.atomic import check_kept
+from drivetwin._util.atomic import refuse_overwrite
 from drivetwin.errors import DrivetwinError, InputError
 
 
-def refuse_alike(files: Sequence[Path], remedy: str) -> None:
+def refuse_same_names(files: Sequence[Path], remedy: str) -> None:
     """Raise InputError where two files have one stem: what is made of them would share a name."""
     twice = [stem for stem, count in Counter(file.stem for file in files).items() if count > 1]
     if twice:
@@ -26,7 +26,7 @@ def refuse_alike(files: Sequence[Path], remedy: str) -> None:
 
 
 @contextmanager
-def staged(folder: Path) -> Iterator[Path]:
+def write_atomically(folder: Path) -> Iterator[Path]:
     """Yield an empty folder to write into; its files move to `folder` when the block succeeds.
 
     When the block fails or is interrupted, `folder` is as it was: not made, nothing added or
@@ -44,20 +44,20 @@ def staged(folder: Path) -> Iterator[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         files = sorted(beside.iterdir())
         for file in files:
-            check_kept(folder / file.name)
+            refuse_overwrite(folder / file.name)
         for file in files:
             file.replace(folder / file.name)
     except DrivetwinError as error:
-        error.where = replace(error.where, file=_told(error.where.file, beside, folder))
+        error.where = replace(error.where, file=_map_to_target(error.where.file, beside, folder))
         raise
     except OSError as error:
-        error.filename = _told(error.filename, beside, folder)
+        error.filename = _map_to_target(error.filename, beside, folder)
         raise
     finally:
         shutil.rmtree(beside, ignore_errors=True)
 
 
-def _told(file: object, beside: Path, folder: Path) -> str | None:
+def _map_to_target(file: object, beside: Path, folder: Path) -> str | None:
     """Map a path in `beside` to its final path in `folder`; return other paths unchanged."""
     if file is None:
         return None

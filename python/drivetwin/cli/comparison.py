@@ -12,7 +12,7 @@ import numpy as np
 from drivetwin.dyno.truth import Truth
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 
 _SLIPS = (10.0, 30.0, 50.0, 80.0)
 """Slips [rad/s] at which friction coefficients are compared."""
@@ -35,7 +35,7 @@ class Row:
     found: Mapping[Method, Found]
     unit: str
 
-    def document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "id": self.id,
@@ -51,26 +51,31 @@ class Row:
 def compare(truth: Truth, found: Mapping[Method, Identification]) -> list[Row]:
     """Rows for all true parameters that some method answers, then friction over slip."""
     rows = [
-        Row(key, value, {m: _estimate(one, key) for m, one in found.items()}, spec_of(key).unit)
+        Row(
+            key,
+            value,
+            {m: _get_estimate(one, key) for m, one in found.items()},
+            get_parameter_spec(key).unit,
+        )
         for key, value in truth.parameters.items()
         if any(key in one.estimates for one in found.values())
     ]
     for element, law in truth.friction.items():
         for slip in _SLIPS:
-            points = {method: _friction(one, element, slip) for method, one in found.items()}
+            points = {method: _get_friction(one, element, slip) for method, one in found.items()}
             if any(point.value is not None for point in points.values()):
                 rows.append(
-                    Row(f"mu.{element} @{slip:g}", float(law.at(np.array(slip))), points, "1")
+                    Row(f"mu.{element} @{slip:g}", float(law.evaluate(np.array(slip))), points, "1")
                 )
     return rows
 
 
-def _estimate(found: Identification, key: str) -> Found:
+def _get_estimate(found: Identification, key: str) -> Found:
     estimate = found.estimates.get(key)
     return Found() if estimate is None else Found(estimate.value, estimate.ci95_total)
 
 
-def _friction(found: Identification, element: str, slip: float) -> Found:
+def _get_friction(found: Identification, element: str, slip: float) -> Found:
     """The curve of an element at one slip; nothing outside the slip range seen."""
     curve = found.friction.get(element)
     if curve is None or not curve.slip[0] <= slip <= curve.slip[-1]:

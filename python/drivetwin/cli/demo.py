@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+)
 from drivetwin.cli.synth import NoiseOption, ScenarioOption, SeedOption
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
@@ -32,33 +39,37 @@ def demo(
 ) -> None:
     """Make a log with the paper's numbers, identify it both ways, compare with the truth."""
     from drivetwin.cli.comparison import compare
-    from drivetwin.cli.identify_run import REPORT, run, write
+    from drivetwin.cli.identify_run import REPORT, run_identification, write_outcome
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run as run_dyno
     from drivetwin.dyno.scenario_file import load_scenario
 
     bench = run_dyno(load_scenario(scenario), seed, noise=noise)
     log, card, _ = write_run(output / f"{scenario}.csv", bench)
-    outcomes = {method: run(log, card, None, method) for method in _METHODS}
+    outcomes = {method: run_identification(log, card, None, method) for method in _METHODS}
     for method, outcome in outcomes.items():
-        write(outcome, output / method)
+        write_outcome(outcome, output / method)
     found = {method: outcome.found for method, outcome in outcomes.items()}
     rows = compare(bench.truth, found)
     report = output / DEFAULT_METHOD / REPORT
     if as_json:
-        print_json({"parameters": [row.document() for row in rows], "log": log, "report": report})
+        print_json(
+            {"parameters": [row.to_document() for row in rows], "log": log, "report": report}
+        )
         return
-    show(_table(rows, scenario))
-    note("± is the half width of the 95 % interval; the paper's method states none for its grids.")
-    say(f"log, card and truth: {log.parent}")
-    say(f"report: {report}")
+    print_table(_build_table(rows, scenario))
+    print_paragraph(
+        "± is the half width of the 95 % interval; the paper's method states none for its grids."
+    )
+    print_line(f"log, card and truth: {log.parent}")
+    print_line(f"report: {report}")
 
 
-def _table(rows: list[Row], scenario: ScenarioName) -> Table:
+def _build_table(rows: list[Row], scenario: ScenarioName) -> Table:
     """Truth, and value, interval and deviation of both methods."""
-    from drivetwin.cli.numbers import deviation, shown
+    from drivetwin.cli.numbers import format_deviation, format_estimate
 
-    table = table_of(
+    table = make_table(
         f"Scenario {scenario}: truth and what the log tells",
         "parameter", "truth", "paper", "off %",
         DEFAULT_METHOD, "95 %", "off %", "unit",
@@ -66,15 +77,15 @@ def _table(rows: list[Row], scenario: ScenarioName) -> Table:
     )  # fmt: skip
     for row in rows:
         paper, default = row.found[Method.PAPER], row.found[DEFAULT_METHOD]
-        value, interval, unit = shown(default.value, default.interval, row.unit)
+        value, interval, unit = format_estimate(default.value, default.interval, row.unit)
         table.add_row(
             row.id,
-            shown(row.truth, None, row.unit)[0],
-            shown(paper.value, None, row.unit)[0],
-            deviation(paper.value, row.truth),
+            format_estimate(row.truth, None, row.unit)[0],
+            format_estimate(paper.value, None, row.unit)[0],
+            format_deviation(paper.value, row.truth),
             value,
             interval,
-            deviation(default.value, row.truth),
+            format_deviation(default.value, row.truth),
             unit,
         )
     return table

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step, table_of
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_step,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -55,42 +63,52 @@ def drive(
     of the off-going and the on-coming element, lowest and highest torque of the output shaft; and
     where the energy went.
     """
-    from drivetwin.drive import all_kinds, launch, load_powertrain, run, suited_powertrain
+    from drivetwin.drive import (
+        load_powertrain,
+        plan_all_shift_kinds,
+        plan_launch,
+        run,
+        select_powertrain,
+    )
     from drivetwin.gearbox import load_gearbox
 
     box = load_gearbox(card)
-    chosen = load_powertrain(powertrain or suited_powertrain(box))
-    plan = {Course.LAUNCH: launch, Course.ALL_KINDS: all_kinds}[course](box, chosen.control)
-    with step(f"driving {box.name}"):
+    chosen = load_powertrain(powertrain or select_powertrain(box))
+    plan = {Course.LAUNCH: plan_launch, Course.ALL_KINDS: plan_all_shift_kinds}[course](
+        box, chosen.control
+    )
+    with show_step(f"driving {box.name}"):
         motion = run(box, chosen, plan)
-        files = () if output is None else _write(output, motion, f"{box.name}, {chosen.name}")
+        files = (
+            () if output is None else _write_outputs(output, motion, f"{box.name}, {chosen.name}")
+        )
     if as_json:
-        print_json(_document(motion) | {"gearbox": box.name, "powertrain": chosen.name})
+        print_json(_to_document(motion) | {"gearbox": box.name, "powertrain": chosen.name})
         return
-    show(_shifts(motion, f"{box.name}, {chosen.name}"))
-    show(_energy(motion))
+    print_table(_build_shift_table(motion, f"{box.name}, {chosen.name}"))
+    print_table(_build_energy_table(motion))
     for warning in motion.warnings:
-        note(f"warning: {warning}")
+        print_paragraph(f"warning: {warning}")
     for file in files:
-        say(f"wrote {file}")
+        print_line(f"wrote {file}")
 
 
-def _write(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
+def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
     """Write figure and traces, both or none."""
-    from drivetwin.cli.atomic_outputs import staged
-    from drivetwin.report.drive import render_drive, traces_text
+    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.report.drive import format_traces, render_drive
 
-    texts = {FIGURE: render_drive(motion, title), TRACES: traces_text(motion)}
-    with staged(folder) as place:
+    texts = {FIGURE: render_drive(motion, title), TRACES: format_traces(motion)}
+    with write_atomically(folder) as place:
         for name, text in texts.items():
             (place / name).write_text(text, encoding="utf-8", newline="\n")
     return tuple(folder / name for name in texts)
 
 
-def _shifts(motion: DriveRun, title: str) -> Table:
+def _build_shift_table(motion: DriveRun, title: str) -> Table:
     """One row a shift; work and peak power of the off-going, then of the on-coming element."""
     numbers = ("at s", "slip s", "kJ", "kW", "shaft Nm")
-    table = table_of(title, "shift", "kind", "off on", *numbers, right=numbers)
+    table = make_table(title, "shift", "kind", "off on", *numbers, right=numbers)
     for each in motion.maneuvers:
         low, high = each.shaft_torque
         table.add_row(
@@ -98,7 +116,7 @@ def _shifts(motion: DriveRun, title: str) -> Table:
             each.action.kind,
             " ".join(work.element for work in each.work),
             f"{each.action.start:.1f}",
-            _slip_time(each),
+            _format_slip_time(each),
             " ".join(f"{abs(work.work) / 1e3:.1f}" for work in each.work),
             " ".join(f"{work.peak_power / 1e3:.0f}" for work in each.work),
             f"{low:.0f}..{high:.0f}",
@@ -106,21 +124,21 @@ def _shifts(motion: DriveRun, title: str) -> Table:
     return table
 
 
-def _slip_time(maneuver: Maneuver) -> str:
+def _format_slip_time(maneuver: Maneuver) -> str:
     """Format the duration of the inertia phase, if the shift has one."""
     if maneuver.break_away is None or maneuver.lock is None:
         return ""
     return f"{maneuver.lock - maneuver.break_away:.2f}"
 
 
-def _energy(motion: DriveRun) -> Table:
-    table = table_of("Energy over the drive", "part", "kJ", right=("kJ",))
-    for part, value in _balance(motion).items():
+def _build_energy_table(motion: DriveRun) -> Table:
+    table = make_table("Energy over the drive", "part", "kJ", right=("kJ",))
+    for part, value in _compute_balance(motion).items():
         table.add_row(part, f"{value / 1e3:z.3f}")
     return table
 
 
-def _balance(motion: DriveRun) -> dict[str, float]:
+def _compute_balance(motion: DriveRun) -> dict[str, float]:
     """The audit, with the friction of shift elements apart from that of brake and rolling."""
     audit = motion.audit
     elements = sum(motion.work.values())
@@ -136,7 +154,7 @@ def _balance(motion: DriveRun) -> dict[str, float]:
     }
 
 
-def _document(motion: DriveRun) -> dict[str, Any]:
+def _to_document(motion: DriveRun) -> dict[str, Any]:
     return {
         "duration": float(motion.time[-1]),
         "shifts": [

@@ -12,10 +12,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile
-from drivetwin.cli.numbers import around, shown
-from drivetwin.cli.output import JsonFlag, print_json, say, show, step, table_of
-from drivetwin.estimation.analysis.friction_shape_prior import Shape
-from drivetwin.parameters import spec_of
+from drivetwin.cli.numbers import format_estimate, format_half_width
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_json,
+    print_line,
+    print_table,
+    show_step,
+)
+from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
+from drivetwin.parameters import get_parameter_spec
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -44,7 +51,7 @@ def examine(
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap's noise.")] = 0,
     friction: Annotated[
-        Shape | None,
+        FrictionShape | None,
         typer.Option(help="Friction over slip as a curve of this shape, in place of Stribeck's."),
     ] = None,
     departures: Annotated[
@@ -66,22 +73,22 @@ def examine(
     profile likelihood, which needs no linearity, parametric bootstrap, friction of free or monotone
     shape (with a twin that has it), and what departs from the friction law.
     """
-    from drivetwin.cli.identify_run import run
+    from drivetwin.cli.identify_run import run_identification
     from drivetwin.estimation.result.method import Method
 
     for name in profile or ():
-        spec_of(name)
+        get_parameter_spec(name)
     asked = Asked(tuple(profile or ()), bootstrap, seed, friction, departures)
-    outcome = run(log, vehicle, channels, Method.LIKELIHOOD)
-    answers = list(_answers(outcome, asked))
-    files = () if output is None else _write(output, answers)
+    outcome = run_identification(log, vehicle, channels, Method.LIKELIHOOD)
+    answers = list(_iterate_answers(outcome, asked))
+    files = () if output is None else _write_outputs(output, answers)
     if as_json:
         print_json({one.file: json.loads(one.text) for one in answers})
         return
     for one in answers:
-        show(one.table)
+        print_table(one.table)
     for file in files:
-        say(f"wrote {file}")
+        print_line(f"wrote {file}")
 
 
 @dataclass(frozen=True)
@@ -91,7 +98,7 @@ class Asked:
     profiles: tuple[str, ...]
     bootstrap: int
     seed: int
-    friction: Shape | None
+    friction: FrictionShape | None
     departures: bool
 
 
@@ -105,64 +112,74 @@ class Answer:
     twin: Twin | None = None
 
 
-def _answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
+def _iterate_answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
     """Every answer, in the order in which they are printed."""
-    from drivetwin.cli.tables import suggestion_table
+    from drivetwin.cli.tables import build_suggestion_table
     from drivetwin.estimation.analysis.bootstrap import bootstrap
-    from drivetwin.estimation.analysis.experiment_design import suggest
-    from drivetwin.estimation.analysis.friction_dependence import departures
-    from drivetwin.estimation.analysis.profile_likelihood import profile
+    from drivetwin.estimation.analysis.experiment_design import compute_rankings
+    from drivetwin.estimation.analysis.friction_dependence import estimate_departures
+    from drivetwin.estimation.analysis.profile_likelihood import compute_profile
     from drivetwin.files import analysis_files
 
     found = outcome.found
-    with step("comparing experiments"):
-        suggestions = found.evidence.suggestions or suggest(found)
+    with show_step("comparing experiments"):
+        suggestions = found.evidence.suggestions or compute_rankings(found)
     yield Answer(
         SUGGESTIONS,
-        analysis_files.suggestions_text(suggestions),
-        suggestion_table(suggestions, found.estimates),
+        analysis_files.format_suggestions(suggestions),
+        build_suggestion_table(suggestions, found.estimates),
     )
     for name in asked.profiles:
-        with step(f"profile likelihood of {name}"):
-            one = profile(found, name)
-        yield Answer(f"profile.{name}.json", analysis_files.profile_text(one), _profile(one, found))
+        with show_step(f"profile likelihood of {name}"):
+            one = compute_profile(found, name)
+        yield Answer(
+            f"profile.{name}.json",
+            analysis_files.format_profile(one),
+            _build_profile_table(one, found),
+        )
     if asked.bootstrap:
-        with step(f"bootstrap of {asked.bootstrap} fits"):
+        with show_step(f"bootstrap of {asked.bootstrap} fits"):
             refits = bootstrap(found, asked.bootstrap, asked.seed)
-        yield Answer(BOOTSTRAP, analysis_files.bootstrap_text(refits), _bootstrap(refits, found))
+        yield Answer(
+            BOOTSTRAP,
+            analysis_files.format_bootstrap(refits),
+            _build_bootstrap_table(refits, found),
+        )
     if asked.friction is not None:
-        yield _friction(outcome, asked.friction)
+        yield _identify_friction(outcome, asked.friction)
     if asked.departures:
-        with step("looking for what departs from the friction law"):
-            seen = departures(found)
-        yield Answer(DEPARTURES, analysis_files.departures_text(seen), _departures(seen))
+        with show_step("looking for what departs from the friction law"):
+            seen = estimate_departures(found)
+        yield Answer(
+            DEPARTURES, analysis_files.format_departures(seen), _build_departure_table(seen)
+        )
 
 
-def _friction(outcome: Outcome, shape: Shape) -> Answer:
+def _identify_friction(outcome: Outcome, shape: FrictionShape) -> Answer:
     """Friction of a shape, with the twin that has it."""
-    from drivetwin.cli.tables import friction_table
-    from drivetwin.estimation.analysis.friction_shape import shaped_friction
-    from drivetwin.estimation.data.prepare import tolerances_of
-    from drivetwin.files.analysis_files import friction_text
+    from drivetwin.cli.tables import build_friction_table
+    from drivetwin.estimation.analysis.friction_shape import fit_friction_shape
+    from drivetwin.estimation.data.prepare import collect_tolerances
+    from drivetwin.files.analysis_files import format_friction
     from drivetwin.twin.build import build_twin
 
     found = outcome.found
-    with step(f"fitting {shape} friction"):
-        tolerances = tolerances_of(outcome.log, outcome.card, found.shifts[0])
-        one = shaped_friction(found, shape, tolerances)
+    with show_step(f"fitting {shape} friction"):
+        tolerances = collect_tolerances(outcome.log, outcome.card, found.shifts[0])
+        one = fit_friction_shape(found, shape, tolerances)
     shaped = replace(found, friction={**found.friction, **one.curves})
     twin = build_twin(shaped, outcome.card)
-    return Answer(FRICTION, friction_text(one), friction_table(one.curves), twin)
+    return Answer(FRICTION, format_friction(one), build_friction_table(one.curves), twin)
 
 
-def _write(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
+def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     """Write all files or none."""
-    from drivetwin.cli.atomic_outputs import staged
+    from drivetwin.cli.atomic_outputs import write_atomically
     from drivetwin.cli.identify_run import TWIN
     from drivetwin.files.twin_conversion import save_twin
 
     names: list[str] = []
-    with staged(folder) as beside:
+    with write_atomically(folder) as beside:
         for one in answers:
             (beside / one.file).write_text(one.text, encoding="utf-8", newline="\n")
             names.append(one.file)
@@ -172,25 +189,27 @@ def _write(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     return tuple(folder / name for name in names)
 
 
-def _profile(one: Profile, found: Identification) -> Table:
+def _build_profile_table(one: Profile, found: Identification) -> Table:
     unit = found.estimates[one.parameter].unit
-    table = table_of(
+    table = make_table(
         f"Profile likelihood of {one.parameter}", "interval (noise)", "from", "to", "unit",
         right=("from", "to"),
     )  # fmt: skip
     half = 0.5 * (one.linear[1] - one.linear[0])
     for name, ends in (("by profile", one.interval), ("by covariance", one.linear)):
-        low, high = (shown(end, (end - half / 20, end + half / 20), unit)[0] for end in ends)
-        table.add_row(name, low, high, shown(None, None, unit)[2])
+        low, high = (
+            format_estimate(end, (end - half / 20, end + half / 20), unit)[0] for end in ends
+        )
+        table.add_row(name, low, high, format_estimate(None, None, unit)[2])
     return table
 
 
-def _bootstrap(one: Bootstrap, found: Identification) -> Table:
+def _build_bootstrap_table(one: Bootstrap, found: Identification) -> Table:
     from drivetwin.estimation.result.estimate import Z95
 
     title = f"Bootstrap: {len(one.values)} fits, {one.failed} failed"
     numbers = ("by covariance", "by bootstrap", "bias")
-    table = table_of(title, "parameter", *numbers, "unit", right=numbers)
+    table = make_table(title, "parameter", *numbers, "unit", right=numbers)
     for k, name in enumerate(one.ids):
         estimate = found.estimates[name]
         if one.std[k] == 0.0:
@@ -198,19 +217,19 @@ def _bootstrap(one: Bootstrap, found: Identification) -> Table:
         linear = Z95 * (estimate.std_noise or float("inf"))
         table.add_row(
             name,
-            around(estimate.value, linear, estimate.unit),
-            around(estimate.value, Z95 * float(one.std[k]), estimate.unit),
+            format_half_width(estimate.value, linear, estimate.unit),
+            format_half_width(estimate.value, Z95 * float(one.std[k]), estimate.unit),
             f"{one.bias[k] / one.std[k]:+.2f} σ",
-            shown(None, None, estimate.unit)[2],
+            format_estimate(None, None, estimate.unit)[2],
         )
     return table
 
 
-def _departures(found: tuple[Departure, ...]) -> Table:
+def _build_departure_table(found: tuple[Departure, ...]) -> Table:
     from drivetwin.estimation.analysis.friction_dependence import UNITS
     from drivetwin.estimation.result.estimate import Z95
 
-    table = table_of(
+    table = make_table(
         "Departures from the friction law", "element", "departure", "value", "± (95 %)", "unit", "",
         right=("value", "± (95 %)"),
     )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile
-from drivetwin.cli.output import JsonFlag, note, print_json, say, step
+from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
 from drivetwin.errors import InputError
 from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.names import Names
@@ -83,63 +83,63 @@ def export(
 
     model = load_twin(twin)
     path = output or Path(f"{twin.stem}.{to.ending}")
-    with step(f"writing {path.name}"):
+    with show_step(f"writing {path.name}"):
         match to:
             case Target.C:
                 from drivetwin.export.c import write_c
 
-                write_c(_subject(model, shift, log, channels)[0], path)
+                write_c(_load_subject(model, shift, log, channels)[0], path)
                 listed: dict[str, object] = {}
             case Target.FMU:
                 from drivetwin.export.fmu.build import BuildOptions, build_fmu
 
-                subject, experiment = _subject(model, shift, log, channels)
+                subject, experiment = _load_subject(model, shift, log, channels)
                 build_fmu(subject, path, BuildOptions(fmi, tuple(platforms or ()), experiment))
                 listed = {"fmi": fmi.value}
             case Target.MODELICA:
                 from drivetwin.export.modelica.dual_clutch import write_modelica
 
-                write_modelica(*_subject(model, shift, log, channels), path)
+                write_modelica(*_load_subject(model, shift, log, channels), path)
                 listed = {}
             case _:
-                content = _write_parameters(model, path, to, (names, _converter(powertrain)))
+                content = _write_parameters(model, path, to, (names, _load_converter(powertrain)))
                 listed = {"parameters": [one.name for one in content.entries]}
                 if not as_json:
                     for line in content.notes:
-                        note(line)
+                        print_paragraph(line)
     if as_json:
         print_json({"file": str(path), **listed})
     else:
-        say(f"wrote {path}")
+        print_line(f"wrote {path}")
 
 
 def _write_parameters(
     twin: Twin, path: Path, to: Target, options: tuple[Names, Converter | None]
 ) -> ParameterSet:
     from drivetwin.export.parameters.files import ParameterFormat, write_parameters
-    from drivetwin.export.parameters.of_twin import parameters_of
+    from drivetwin.export.parameters.of_twin import collect_parameters
 
-    content = parameters_of(twin, *options)
+    content = collect_parameters(twin, *options)
     write_parameters(content, path, ParameterFormat(to.value))
     return content
 
 
-def _subject(
+def _load_subject(
     twin: Twin, shift: str | None, log: Path | None, channels: Path | None
 ) -> tuple[Subject, Experiment | None]:
     """Load the model, and the initial state from the shift of the log if one is given."""
-    from drivetwin.export.subject import subject_of
+    from drivetwin.export.subject import build_subject
 
-    gears = _gears(shift)
+    gears = _parse_gears(shift)
     if log is None:
-        return subject_of(twin, gears), None
-    from drivetwin.export.fmu.measured import measured_subject
+        return build_subject(twin, gears), None
+    from drivetwin.export.fmu.measured import build_measured_subject
     from drivetwin.logs.read import read_log
 
-    return measured_subject(twin, read_log(log, twin.card(), channels), gears)
+    return build_measured_subject(twin, read_log(log, twin.build_card(), channels), gears)
 
 
-def _gears(text: str | None) -> tuple[str, str] | None:
+def _parse_gears(text: str | None) -> tuple[str, str] | None:
     if text is None:
         return None
     old, dash, new = text.partition("-")
@@ -148,7 +148,7 @@ def _gears(text: str | None) -> tuple[str, str] | None:
     return old, new
 
 
-def _converter(powertrain: str | None) -> Converter | None:
+def _load_converter(powertrain: str | None) -> Converter | None:
     if powertrain is None:
         return None
     from drivetwin.drive import load_powertrain

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step, table_of
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_step,
+)
 from drivetwin.errors import INTERRUPTED
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 
@@ -98,9 +106,9 @@ def run(
 
     Whatever ends a run, the same command goes on from there; nothing is computed twice.
     """
-    from drivetwin.cli.fleet_view import watching
+    from drivetwin.cli.fleet_view import show_progress
     from drivetwin.errors import InputError
-    from drivetwin.fleet.coordinator import Wishes
+    from drivetwin.fleet.coordinator import RunOptions
     from drivetwin.fleet.rules import read_rules
     from drivetwin.fleet.run import FleetRun, run_fleet
     from drivetwin.fleet.sources import Sources
@@ -116,11 +124,11 @@ def run(
         workers,
         scheduler,
         WorkerSpec(limits=Limits(time_limit, memory_limit * 2**20)),
-        Wishes(attempts, retry, reports, traces),
+        RunOptions(attempts, retry, reports, traces),
     )
-    before = signal.signal(signal.SIGTERM, _as_interrupt)
+    before = signal.signal(signal.SIGTERM, _raise_interrupt)
     try:
-        with watching(as_json=as_json) as tell:
+        with show_progress(as_json=as_json) as tell:
             summary = run_fleet(request, tell)
     finally:
         signal.signal(signal.SIGTERM, before)
@@ -130,13 +138,13 @@ def run(
         raise typer.Exit(INTERRUPTED)
 
 
-def _as_interrupt(_number: int, _frame: object) -> None:
+def _raise_interrupt(_number: int, _frame: object) -> None:
     """A scheduler's or a shell's wish to end is that of the keyboard."""
     raise KeyboardInterrupt
 
 
 def _print_summary(summary: Summary, output: Path) -> None:
-    table = table_of(f"Fleet in {output}", "logs", "", right=("",))
+    table = make_table(f"Fleet in {output}", "logs", "", right=("",))
     rows = {
         "identified": summary.done,
         "bad": summary.bad,
@@ -146,13 +154,13 @@ def _print_summary(summary: Summary, output: Path) -> None:
     }
     for name, count in rows.items():
         table.add_row(name, str(count))
-    show(table)
+    print_table(table)
     for name, count in summary.failures.items():
-        note(f"{count} {name}")
+        print_paragraph(f"{count} {name}")
     if not summary.complete:
-        say("interrupted; the same command goes on from here")
+        print_line("interrupted; the same command goes on from here")
     elif summary.failures:
-        say(f"reasons: drivetwin fleet query {output} \"SELECT path, what FROM files "
+        print_line(f"reasons: drivetwin fleet query {output} \"SELECT path, what FROM files "
             "JOIN logs USING (log) WHERE error <> ''\"")  # fmt: skip
 
 
@@ -172,12 +180,12 @@ def report(
     from drivetwin.fleet.store import Store
 
     page = store / PAGE if output is None else output
-    with step("estimating over the fleet"), Store(store) as opened:
+    with show_step("estimating over the fleet"), Store(store) as opened:
         save_fleet_report(opened, page)
     if as_json:
         print_json({"report": page})
         return
-    say(f"wrote {page}")
+    print_line(f"wrote {page}")
 
 
 @fleet.command()
@@ -190,91 +198,91 @@ def estimate(
     as_json: JsonFlag = False,
 ) -> None:
     """Estimate over all logs: shared values, spread over units, ageing, changes, outliers."""
-    from drivetwin.fleet.mixed_model.estimate import joint_estimates, untold
+    from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
     from drivetwin.fleet.store import Store
 
-    with step("estimating over the fleet"), Store(store) as opened:
-        found = joint_estimates(opened, parameter or ())
-        missing = untold(opened, found, parameter or ())
+    with show_step("estimating over the fleet"), Store(store) as opened:
+        found = estimate_fleet(opened, parameter or ())
+        missing = list_missing_estimates(opened, found, parameter or ())
     if as_json:
-        print_json({"estimates": [one.document() for one in found], "untold": missing})
+        print_json({"estimates": [one.to_document() for one in found], "untold": missing})
         return
     _print_estimates(found)
     if missing:
-        note(f"too few logs tell a value of their own: {', '.join(missing)}")
+        print_paragraph(f"too few logs tell a value of their own: {', '.join(missing)}")
 
 
 def _print_estimates(found: list[JointEstimate]) -> None:
-    from drivetwin._util.display_units import display_of, significant
-    from drivetwin.cli.numbers import shown
+    from drivetwin._util.display_units import format_significant, get_display_unit
+    from drivetwin.cli.numbers import format_estimate
 
     rules = {one.rule for one in found}
-    table = table_of(
+    table = make_table(
         "Fleet", *(("rule",) if len(rules) > 1 else ()), "parameter", "value", "95 %", "unit",
         "spread", "drift", "95 % of it", "per",
         right=("value", "95 %", "spread", "drift", "95 % of it"),
     )  # fmt: skip
     for one in found:
         whose = (one.rule,) if len(rules) > 1 else ()
-        value, interval, unit = shown(one.value, one.ci95, one.si_unit)
-        factor = display_of(one.si_unit).factor
-        spread = "" if one.spread is None else significant(one.spread * factor, 2)
-        table.add_row(*whose, one.parameter, value, interval, unit, spread, *_drift(one))
-    show(table)
+        value, interval, unit = format_estimate(one.value, one.ci95, one.si_unit)
+        factor = get_display_unit(one.si_unit).factor
+        spread = "" if one.spread is None else format_significant(one.spread * factor, 2)
+        table.add_row(*whose, one.parameter, value, interval, unit, spread, *_describe_drift(one))
+    print_table(table)
     for text in dict.fromkeys(text for one in found for text in one.notes):
         names = dict.fromkeys(one.parameter for one in found if text in one.notes)
-        note(text if len(names) == len({one.parameter for one in found}) else
+        print_paragraph(text if len(names) == len({one.parameter for one in found}) else
              f"{', '.join(names)}: {text}")  # fmt: skip
     for one in found:
         for change in one.changes:
-            note(_change(one, change))
+            print_paragraph(_describe_change(one, change))
         for member in one.units:
             if member.odd:
-                note(_odd(one, member))
+                print_paragraph(_describe_outlier(one, member))
         for outlier in one.outliers:
-            note(f"{one.parameter}: {Path(outlier.path).name}: {outlier.reason}")
+            print_paragraph(f"{one.parameter}: {Path(outlier.path).name}: {outlier.reason}")
 
 
-def _change(one: JointEstimate, change: Change) -> str:
+def _describe_change(one: JointEstimate, change: Change) -> str:
     """Describe the change of a unit."""
-    from drivetwin.fleet.readings import span_text
+    from drivetwin.fleet.readings import format_span
 
-    step = _with_error(one, change.size, change.std)
-    where = span_text(change.field, change.before, change.after)
+    step = _format_deviation(one, change.size, change.std)
+    where = format_span(change.field, change.before, change.after)
     return f"{one.parameter}: unit {change.unit} changed by {step} between {where}"
 
 
-def _odd(one: JointEstimate, unit: UnitValue) -> str:
+def _describe_outlier(one: JointEstimate, unit: UnitValue) -> str:
     """Describe the deviation of a unit from the others."""
-    from drivetwin.fleet.figures import unit_label
+    from drivetwin.fleet.figures import format_unit
 
     return (
-        f"{one.parameter}: unit {unit_label(one, unit)} is "
-        f"{_with_error(one, unit.deviation, unit.std)} off, {abs(unit.score or 0.0):.1f} standard "
+        f"{one.parameter}: unit {format_unit(one, unit)} is "
+        f"{_format_deviation(one, unit.deviation, unit.std)} off, {abs(unit.score or 0.0):.1f} standard "
         "deviations of the units; it counts in value and spread"
     )
 
 
-def _with_error(one: JointEstimate, size: float, std: float) -> str:
+def _format_deviation(one: JointEstimate, size: float, std: float) -> str:
     """A difference with its 95 % interval and unit."""
-    from drivetwin.cli.numbers import shown
+    from drivetwin.cli.numbers import format_estimate
     from drivetwin.estimation.result.estimate import Z95
 
     ends = (size - Z95 * std, size + Z95 * std)
-    return " ".join(shown(size, ends, one.si_unit)).removesuffix(" –")
+    return " ".join(format_estimate(size, ends, one.si_unit)).removesuffix(" –")
 
 
-def _drift(one: JointEstimate) -> tuple[str, str, str]:
+def _describe_drift(one: JointEstimate) -> tuple[str, str, str]:
     """Drift over the first field, its interval, and per what it is."""
-    from drivetwin.cli.numbers import shown
-    from drivetwin.fleet.readings import drift_unit
+    from drivetwin.cli.numbers import format_estimate
+    from drivetwin.fleet.readings import get_drift_unit
 
     if not one.drifts:
         return "", "", ""
     drift = one.drifts[0]
-    factor, per = drift_unit(drift.field)
+    factor, per = get_drift_unit(drift.field)
     ends = (drift.ci95[0] * factor, drift.ci95[1] * factor)
-    return *shown(drift.slope * factor, ends, one.si_unit)[:2], per
+    return *format_estimate(drift.slope * factor, ends, one.si_unit)[:2], per
 
 
 @fleet.command()
@@ -291,11 +299,11 @@ def query(
 
     Tables: parameters, frictions, fits, qualities, warnings, rows, files, logs, shifts, settings.
     """
-    from drivetwin.fleet.query import ask, save_answer
+    from drivetwin.fleet.query import query_store, save_answer
     from drivetwin.fleet.store import Store
 
-    with step("asking"), Store(store) as opened:
-        answer = ask(opened, sql)
+    with show_step("asking"), Store(store) as opened:
+        answer = query_store(opened, sql)
     if output is not None:
         save_answer(answer, output)
     if as_json:
@@ -303,20 +311,20 @@ def query(
         print_json({"rows": rows})
         return
     if output is not None:
-        say(f"wrote {output}")
+        print_line(f"wrote {output}")
         return
     numbers = {
         name
         for name, column in zip(answer.columns, zip(*answer.rows, strict=True), strict=False)
         if all(isinstance(cell, int | float | None) for cell in column)
     }
-    table = table_of("", *answer.columns, right=tuple(numbers))
+    table = make_table("", *answer.columns, right=tuple(numbers))
     for row in answer.rows:
-        table.add_row(*map(_cell, row))
-    show(table)
+        table.add_row(*map(_format_cell, row))
+    print_table(table)
 
 
-def _cell(value: object) -> str:
+def _format_cell(value: object) -> str:
     """A value of an answer as a person reads it; `-o` and `--json` give all digits."""
     if value is None:
         return ""

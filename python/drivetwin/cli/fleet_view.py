@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.output import console, say
+from drivetwin.cli.output import make_console, print_line
 from drivetwin.fleet.events import (
     Event,
     Listener,
@@ -20,7 +20,7 @@ from drivetwin.fleet.events import (
     Settled,
     Started,
     Summary,
-    document,
+    to_document,
 )
 from drivetwin.fleet.task import State
 
@@ -52,7 +52,7 @@ class Tally:
         """Files that have their outcome."""
         return self.states.total()
 
-    def hear(self, event: Event) -> None:
+    def update(self, event: Event) -> None:
         """Update the totals with an event of the run."""
         if isinstance(event, Started):
             self.files, self.dashboard = event.files, event.dashboard
@@ -68,23 +68,23 @@ class Tally:
         while self._settled[0][0] < monotonic() - _RATE_SPAN:
             self._settled.popleft()
 
-    def rate(self) -> float:
+    def compute_rate(self) -> float:
         """Compute the recent rate [files/s]; 0 without enough events."""
         if len(self._settled) < 2:
             return 0.0
         (start, before), (end, after) = self._settled[0], self._settled[-1]
         return (after - before) / (end - start) if end > start else 0.0
 
-    def line(self) -> str:
+    def format_line(self) -> str:
         """Format the totals as one line."""
-        rate = self.rate()
-        left = f", {_span((self.files - self.settled) / rate)} left" if rate > 0.0 else ""
+        rate = self.compute_rate()
+        left = f", {_format_span((self.files - self.settled) / rate)} left" if rate > 0.0 else ""
         failed = "".join(f", {count} {name}" for name, count in self.failures.most_common())
         lost = f", {self.retries} retries" if self.retries else ""
         return f"{self.settled} of {self.files} logs, {rate:.1f}/s{left}{failed}{lost}"
 
 
-def _span(seconds: float) -> str:
+def _format_span(seconds: float) -> str:
     """Format a duration in its largest units."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
@@ -92,26 +92,26 @@ def _span(seconds: float) -> str:
 
 
 @contextmanager
-def watching(*, as_json: bool) -> Iterator[Listener]:
+def show_progress(*, as_json: bool) -> Iterator[Listener]:
     """Yield the listener that shows a run; see the module's text."""
     if as_json:
         yield _print_event
         return
-    tally, shown = Tally(), console(stderr=True)
+    tally, shown = Tally(), make_console(stderr=True)
     if not shown.is_terminal:
-        yield _Lines(tally).hear
+        yield _Lines(tally).handle
         return
     from rich.live import Live
 
     with Live(
-        get_renderable=lambda: _picture(tally), console=shown, transient=True,
+        get_renderable=lambda: _render_tally(tally), console=shown, transient=True,
         refresh_per_second=1.0 / _REFRESH,
     ):  # fmt: skip
-        yield tally.hear
+        yield tally.update
 
 
 def _print_event(event: Event) -> None:
-    sys.stdout.write(json.dumps(document(event), ensure_ascii=False) + "\n")
+    sys.stdout.write(json.dumps(to_document(event), ensure_ascii=False) + "\n")
     sys.stdout.flush()
 
 
@@ -122,19 +122,19 @@ class _Lines:
         self._tally = tally
         self._next = monotonic() + _LINE_EVERY
 
-    def hear(self, event: Event) -> None:
+    def handle(self, event: Event) -> None:
         """Handle an event of the run; print a line at regular intervals."""
-        self._tally.hear(event)
+        self._tally.update(event)
         if isinstance(event, Started) and event.dashboard:
-            say(f"dashboard: {event.dashboard}")
+            print_line(f"dashboard: {event.dashboard}")
         elif isinstance(event, Noted):
-            say(event.text)
+            print_line(event.text)
         elif monotonic() >= self._next and not isinstance(event, Summary):
-            say(self._tally.line())
+            print_line(self._tally.format_line())
             self._next = monotonic() + _LINE_EVERY
 
 
-def _picture(tally: Tally) -> RenderableType:
+def _render_tally(tally: Tally) -> RenderableType:
     """Render the live view: bar, rate and time left, failures by reason, messages."""
     from rich.console import Group
     from rich.progress_bar import ProgressBar
@@ -142,8 +142,8 @@ def _picture(tally: Tally) -> RenderableType:
     from rich.text import Text
 
     head = Table.grid(padding=(0, 2))
-    rate = tally.rate()
-    left = _span((tally.files - tally.settled) / rate) if rate > 0.0 else "–"
+    rate = tally.compute_rate()
+    left = _format_span((tally.files - tally.settled) / rate) if rate > 0.0 else "–"
     head.add_row(
         ProgressBar(max(tally.files, 1), tally.settled, width=40),
         f"{tally.settled}/{tally.files}", f"{rate:.1f} logs/s", f"{left} left",

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -36,48 +43,55 @@ def gearbox(
     With --gear: speed of every member per input speed, torque of every element on every member per
     input torque, and the power that flows there.
     """
-    from drivetwin.gearbox import builtin_gearboxes, gear_statics, load_gearbox, ratio_remarks
+    from drivetwin.gearbox import (
+        describe_ratio_differences,
+        list_builtin_gearboxes,
+        load_gearbox,
+        solve_gear,
+    )
 
     if card is None:
-        names = builtin_gearboxes()
+        names = list_builtin_gearboxes()
         if as_json:
             print_json({"builtin": list(names)})
         else:
-            say("\n".join(names))
+            print_line("\n".join(names))
         return
     box = load_gearbox(card)
     if modelica is not None:
         _write_modelica(box, modelica)
     names = (gear,) if gear is not None else tuple(each.name for each in box.gears)
-    gears = [gear_statics(box, name) for name in names]
-    warnings = ratio_remarks(box, {each.gear: each.ratio for each in gears})
+    gears = [solve_gear(box, name) for name in names]
+    warnings = describe_ratio_differences(box, {each.gear: each.ratio for each in gears})
     if as_json:
-        documents = [_document(box, each) for each in gears]
+        documents = [_to_document(box, each) for each in gears]
         print_json({"gearbox": box.name, "gears": documents, "warnings": warnings})
         return
-    show(_ratios(box, gears))
+    print_table(_build_ratio_table(box, gears))
     for warning in warnings:
-        note(f"warning: {warning}")
+        print_paragraph(f"warning: {warning}")
     if gear is not None:
-        show(_speeds(gears[0]))
-        show(_torques(gears[0]))
-        say(f"Powers sum to zero within {gears[0].power_error:.1e} of the input power.")
+        print_table(_build_speed_table(gears[0]))
+        print_table(_build_torque_table(gears[0]))
+        print_line(f"Powers sum to zero within {gears[0].power_error:.1e} of the input power.")
 
 
 def _write_modelica(box: Gearbox, path: Path) -> None:
     from drivetwin._util.atomic import write_text
-    from drivetwin.export.modelica.model import package_text
-    from drivetwin.gearbox import network_elements
+    from drivetwin.export.modelica.model import format_package
+    from drivetwin.gearbox import build_network_elements
 
     ends = (box.input, box.output)
-    write_text(path, package_text(box.name, network_elements(box), note=box.name, ends=ends))
+    write_text(
+        path, format_package(box.name, build_network_elements(box), note=box.name, ends=ends)
+    )
 
 
-def _ratios(box: Gearbox, gears: list[GearStatics]) -> Table:
+def _build_ratio_table(box: Gearbox, gears: list[GearStatics]) -> Table:
     numbers = ("ratio", "published", "difference %")
-    table = table_of(box.name, "gear", "engaged", *numbers, right=numbers)
+    table = make_table(box.name, "gear", "engaged", *numbers, right=numbers)
     for each in gears:
-        published = box.gear(each.gear).published
+        published = box.get_gear(each.gear).published
         table.add_row(
             each.gear,
             " ".join(each.elements),
@@ -88,22 +102,22 @@ def _ratios(box: Gearbox, gears: list[GearStatics]) -> Table:
     return table
 
 
-def _speeds(gear: GearStatics) -> Table:
-    table = table_of("Speeds over the input speed", "member", "speed", right=("speed",))
+def _build_speed_table(gear: GearStatics) -> Table:
+    table = make_table("Speeds over the input speed", "member", "speed", right=("speed",))
     for member, speed in gear.speeds.items():
         table.add_row(member, "idle" if speed is None else f"{speed:z.4f}")
     return table
 
 
-def _torques(gear: GearStatics) -> Table:
+def _build_torque_table(gear: GearStatics) -> Table:
     numbers = ("torque", "power")
     title = "Torques on the members over the input torque, and powers into them"
-    table = table_of(title, "element", "member", *numbers, right=numbers)
+    table = make_table(title, "element", "member", *numbers, right=numbers)
     for flange in gear.flanges:
         power = flange.torque * (gear.speeds[flange.member] or 0.0)
         table.add_row(flange.element, flange.member, f"{flange.torque:z.4f}", f"{power:z.4f}")
     return table
 
 
-def _document(box: Gearbox, gear: GearStatics) -> dict[str, Any]:
-    return asdict(gear) | {"published": box.gear(gear.gear).published}
+def _to_document(box: Gearbox, gear: GearStatics) -> dict[str, Any]:
+    return asdict(gear) | {"published": box.get_gear(gear.gear).published}

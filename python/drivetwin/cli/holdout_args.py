@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from drivetwin.shifts.detect import FoundShifts
 
 
-def held_numbers(
+def parse_holdouts(
     wanted: Sequence[str], logs: Sequence[Path], shifts: Sequence[FoundShifts]
 ) -> list[frozenset[int]]:
     """Numbers of the shifts to predict, log by log, counted from 1.
@@ -23,19 +23,19 @@ def held_numbers(
     """
     held: list[set[int]] = [set() for _ in logs]
     for text in wanted:
-        place, number = _named(text, logs)
+        place, number = _parse_shift(text, logs)
         every = range(1, len(shifts[place].shifts) + 1)
         held[place] |= set(every) if number is None else {number}
     return [frozenset(one) for one in held]
 
 
-def _named(text: str, logs: Sequence[Path]) -> tuple[int, int | None]:
+def _parse_shift(text: str, logs: Sequence[Path]) -> tuple[int, int | None]:
     """Place of the log, and number of the shift; None for all of them."""
-    whole = _places(text, logs)
+    whole = _find_logs(text, logs)
     if len(whole) == 1:
         return whole[0], None
     name, _, number = text.rpartition(":")
-    places = _places(name, logs) if name else list(range(len(logs)))
+    places = _find_logs(name, logs) if name else list(range(len(logs)))
     if not number.isdecimal() or len(places) != 1:
         raise InputError(
             f"{text!r} names no shift or log of {', '.join(log.name for log in logs)}",
@@ -45,5 +45,5 @@ def _named(text: str, logs: Sequence[Path]) -> tuple[int, int | None]:
     return places[0], int(number)
 
 
-def _places(name: str, logs: Sequence[Path]) -> list[int]:
+def _find_logs(name: str, logs: Sequence[Path]) -> list[int]:
     return [k for k, log in enumerate(logs) if name in (str(log), log.name, log.stem)]

@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, VehicleFile
-from drivetwin.cli.atomic_outputs import refuse_alike
-from drivetwin.cli.output import JsonFlag, error_document, note, print_json, say, show, show_error
+from drivetwin.cli.atomic_outputs import refuse_same_names
+from drivetwin.cli.output import (
+    JsonFlag,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_error,
+    to_error_document,
+)
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 
@@ -55,19 +63,21 @@ def identify(
     simulated with what the others tell, and compared. It implies --together.
     """
     if together or hold_out:
-        _together(logs, (vehicle, channels, method), hold_out or [], output, as_json)
+        _identify_joint(logs, (vehicle, channels, method), hold_out or [], output, as_json)
         return
-    folders = _folders(logs, output)
+    folders = _choose_folders(logs, output)
     results: list[dict[str, Any]] = []
     failed: DrivetwinError | None = None
     for log in logs:
         try:
-            results.append(_one(log, (vehicle, channels, method), folders.get(log), as_json))
+            results.append(
+                _identify_log(log, (vehicle, channels, method), folders.get(log), as_json)
+            )
         except DrivetwinError as error:
             error.where = replace(error.where, file=error.where.file or str(log))
             if len(logs) == 1 or error.where.file in (str(vehicle), str(channels)):
                 raise
-            results.append(error_document(error))
+            results.append(to_error_document(error))
             failed = error
             if not as_json:
                 show_error(error, as_json=False)
@@ -77,22 +87,22 @@ def identify(
         raise typer.Exit(failed.exit_code)
 
 
-def _one(
+def _identify_log(
     log: Path, how: tuple[Path, Path | None, Method], folder: Path | None, as_json: bool
 ) -> dict[str, Any]:
     """Identify a log, write and print what was found; `how` are card, mapping and method."""
-    from drivetwin.cli.identify_run import run, write
+    from drivetwin.cli.identify_run import run_identification, write_outcome
 
-    outcome = run(log, *how)
-    files = () if folder is None else write(outcome, folder)
+    outcome = run_identification(log, *how)
+    files = () if folder is None else write_outcome(outcome, folder)
     if not as_json:
-        _print(outcome.found, {log.name: outcome.found.shifts})
+        _print_result(outcome.found, {log.name: outcome.found.shifts})
         for file in files:
-            say(f"wrote {file}")
-    return _document(outcome.found, files)
+            print_line(f"wrote {file}")
+    return _to_document(outcome.found, files)
 
 
-def _together(
+def _identify_joint(
     logs: list[Path],
     how: tuple[Path, Path | None, Method],
     hold_out: list[str],
@@ -100,30 +110,30 @@ def _together(
     as_json: bool,
 ) -> None:
     """Fit all logs as one and predict what is held out; `how` are card, mapping and method."""
-    from drivetwin.cli.identify_joint import print_together, run, write
+    from drivetwin.cli.identify_joint import identify_logs, print_joint, write_joint
 
-    outcome = run(logs, *how, hold_out)
-    files = write(outcome, output) if output is not None else ()
+    outcome = identify_logs(logs, *how, hold_out)
+    files = write_joint(outcome, output) if output is not None else ()
     if as_json:
-        print_json(_document(outcome.found, files))
+        print_json(_to_document(outcome.found, files))
         return
-    _print(outcome.found, outcome.shifts)
-    print_together(outcome.found)
+    _print_result(outcome.found, outcome.shifts)
+    print_joint(outcome.found)
     for file in files:
-        say(f"wrote {file}")
+        print_line(f"wrote {file}")
 
 
-def _folders(logs: list[Path], output: Path | None) -> dict[Path, Path]:
+def _choose_folders(logs: list[Path], output: Path | None) -> dict[Path, Path]:
     """Output folder of each log; empty where nothing is to be written."""
     if output is None:
         return {}
     if len(logs) == 1:
         return {logs[0]: output}
-    refuse_alike(logs, "identify them in separate runs with different -o")
+    refuse_same_names(logs, "identify them in separate runs with different -o")
     return {log: output / log.stem for log in logs}
 
 
-def _document(found: Identification, files: tuple[Path, ...]) -> dict[str, Any]:
+def _to_document(found: Identification, files: tuple[Path, ...]) -> dict[str, Any]:
     """The content of result.json, with the files that were written."""
     import json
 
@@ -133,32 +143,32 @@ def _document(found: Identification, files: tuple[Path, ...]) -> dict[str, Any]:
     return {**document, "files": [str(file) for file in files]}
 
 
-def _print(found: Identification, shifts: Mapping[str, Sequence[Shift]]) -> None:
+def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) -> None:
     from drivetwin.cli.tables import (
-        fit_table,
-        friction_table,
-        parameter_table,
-        remarks,
-        shift_table,
-        suggestion_table,
+        build_fit_table,
+        build_friction_table,
+        build_parameter_table,
+        build_shift_table,
+        build_suggestion_table,
+        list_remarks,
     )
 
     for source, own in shifts.items():
-        show(shift_table(own, source))
-    show(parameter_table(found.estimates, f"Parameters ({found.method} method)"))
-    for line in (lines := remarks(found.estimates)):
-        note(line)
+        print_table(build_shift_table(own, source))
+    print_table(build_parameter_table(found.estimates, f"Parameters ({found.method} method)"))
+    for line in (lines := list_remarks(found.estimates)):
+        print_paragraph(line)
     if lines:
-        say("")
+        print_line("")
     if found.friction:
-        show(friction_table(found.friction))
+        print_table(build_friction_table(found.friction))
     suggestions = found.evidence.suggestions
     if suggestions:
-        show(suggestion_table(suggestions, found.estimates))
+        print_table(build_suggestion_table(suggestions, found.estimates))
     if found.fit:
-        show(fit_table(found.fit, "Simulation over measurement"))
+        print_table(build_fit_table(found.fit, "Simulation over measurement"))
     for shift in found.shifts:
         for text in (each for each in shift.warnings if each not in found.warnings):
-            note(f"{shift.start_gear}→{shift.end_gear}: {text}")
+            print_paragraph(f"{shift.start_gear}→{shift.end_gear}: {text}")
     for warning in found.warnings:
-        note(f"warning: {warning}")
+        print_paragraph(f"warning: {warning}")

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.atomic_outputs import refuse_alike, staged
-from drivetwin.cli.holdout_args import held_numbers
+from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
+from drivetwin.cli.holdout_args import parse_holdouts
 from drivetwin.cli.identify_run import REPORT, RESULT, TWIN
-from drivetwin.cli.numbers import percent, quantity
-from drivetwin.cli.output import note, say, show, step, table_of
-from drivetwin.report.labels import channel_unit
+from drivetwin.cli.numbers import format_percent, format_quantity
+from drivetwin.cli.output import make_table, print_line, print_paragraph, print_table, show_step
+from drivetwin.report.labels import get_channel_unit
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.result.multi_log import Several
     from drivetwin.estimation.result.validation import HeldOut
     from drivetwin.shifts.shift import Shift
-    from drivetwin.validation.multi_log import Together
+    from drivetwin.validation.multi_log import JointIdentification
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Joined:
     """Result of a joint identification: fitted and held-out logs, and the identification."""
 
     logs: tuple[ShiftLog, ...]
-    made: Together
+    made: JointIdentification
 
     @property
     def found(self) -> Identification:
@@ -48,7 +48,7 @@ class Joined:
         return {Path(one.source).name: one.shifts for one in several.logs}
 
 
-def run(
+def identify_logs(
     logs: Sequence[Path],
     vehicle: Path,
     channels: Path | None,
@@ -59,78 +59,78 @@ def run(
 
     Raises the typed errors of each stage.
     """
-    from drivetwin.estimation.analysis.experiment_design import examined
+    from drivetwin.estimation.analysis.experiment_design import rank_experiments
     from drivetwin.logs.read import read_log
-    from drivetwin.shifts.detect import usable_shifts
+    from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.multi_log import Source, identify_together
     from drivetwin.vehicle.card import load_card
 
-    refuse_alike(logs, "rename one of them")
+    refuse_same_names(logs, "rename one of them")
     card = load_card(vehicle)
-    with step(f"reading {len(logs)} logs"):
+    with show_step(f"reading {len(logs)} logs"):
         read = tuple(read_log(log, card, channels) for log in logs)
-        shifts = [usable_shifts(log, card) for log in read]
-    held = held_numbers(wanted, logs, shifts)
+        shifts = [require_shifts(log, card) for log in read]
+    held = parse_holdouts(wanted, logs, shifts)
     sources = [
         Source(log, found, each) for log, found, each in zip(read, shifts, held, strict=True)
     ]
-    with step(f"identifying by the {method} method"):
+    with show_step(f"identifying by the {method} method"):
         made = identify_together(sources, card, method)
-    with step("comparing experiments"):
-        found = examined(made.found)
+    with show_step("comparing experiments"):
+        found = rank_experiments(made.found)
     return Joined(read, replace(made, found=found))
 
 
-def write(outcome: Joined, folder: Path) -> tuple[Path, ...]:
+def write_joint(outcome: Joined, folder: Path) -> tuple[Path, ...]:
     """Write result, report and twins into `folder`, all or none; returns their paths.
 
     `twin.toml` is that of the first log; of several each has `NAME-OF-LOG.twin.toml` besides.
     """
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_conversion import save_twin
-    from drivetwin.report.together import save_together
+    from drivetwin.report.together import save_joint_report
 
     twins = list(outcome.made.twins.items())
     named = {TWIN: twins[0][1]}
     if len(twins) > 1:
         named |= {f"{Path(source).stem}.{TWIN}": twin for source, twin in twins}
-    with step("writing the report"), staged(folder) as beside:
+    with show_step("writing the report"), write_atomically(folder) as beside:
         save_result(beside / RESULT, outcome.found)
         for name, twin in named.items():
             save_twin(beside / name, twin)
-        save_together(beside / REPORT, outcome.found, outcome.made.fitted)
+        save_joint_report(beside / REPORT, outcome.found, outcome.made.fitted)
     return tuple(folder / name for name in (RESULT, *named, REPORT))
 
 
-def print_together(found: Identification) -> None:
+def print_joint(found: Identification) -> None:
     """Print the joint estimates and the prediction of the held-out shifts."""
     several = found.evidence.several
     if several is not None:
-        show(_log_table(several))
-        note(several.consistency.text)
-        say("")
+        print_table(_build_log_table(several))
+        print_paragraph(several.consistency.text)
+        print_line("")
     held = found.evidence.held_out
     if held:
-        show(_held_table(held, found))
+        print_table(_build_holdout_table(held, found))
     for one in held:
         for text in one.notes:
-            note(f"{one.name}: {text}")
+            print_paragraph(f"{one.name}: {text}")
 
 
-def _log_table(several: Several) -> Table:
+def _build_log_table(several: Several) -> Table:
     """Each log with its number, as in parameter ids, and the fit of the common model."""
-    table = table_of("Logs fitted together", "log", "file", "shifts", "fit %", right=("fit %",))
+    table = make_table("Logs fitted together", "log", "file", "shifts", "fit %", right=("fit %",))
     for one in several.logs:
         shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in one.shifts)
         fit = one.fit.get("output_torque", {}).get("all")
-        shown = percent(None if fit is None else fit.fit_percent)
+        shown = format_percent(None if fit is None else fit.fit_percent)
         table.add_row(str(one.number), Path(one.source).name, shifts, shown)
     return table
 
 
-def _held_table(held: Sequence[HeldOut], found: Identification) -> Table:
+def _build_holdout_table(held: Sequence[HeldOut], found: Identification) -> Table:
     """Tabulate the fit in % of predictions, of the fitted shifts, and of the noise limit."""
-    table = table_of(
+    table = make_table(
         "Held out: predicted, not fitted",
         "shift", "signal", "fit %", "fitted %", "rmse", "allowed", "verdict",
         right=("fit %", "fitted %", "rmse", "allowed"),
@@ -142,14 +142,14 @@ def _held_table(held: Sequence[HeldOut], found: Identification) -> Table:
         for place, (signal, phases) in enumerate(one.validation.fit.items()):
             fitted = found.fit.get(signal, {}).get("all")
             bound = one.bounds.get(signal)
-            unit = channel_unit(signal)
+            unit = get_channel_unit(signal)
             table.add_row(
                 one.name if place == 0 else "",
                 signal.replace("_", " "),
-                percent(phases["all"].fit_percent),
-                percent(None if fitted is None else fitted.fit_percent),
-                quantity(phases["all"].rmse, unit),
-                "" if bound is None else quantity(bound.largest, unit),
-                one.outcome_of(signal).value,
+                format_percent(phases["all"].fit_percent),
+                format_percent(None if fitted is None else fitted.fit_percent),
+                format_quantity(phases["all"].rmse, unit),
+                "" if bound is None else format_quantity(bound.largest, unit),
+                one.get_signal_outcome(signal).value,
             )
     return table

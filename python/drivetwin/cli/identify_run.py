@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.arguments import load
-from drivetwin.cli.atomic_outputs import staged
-from drivetwin.cli.output import step
+from drivetwin.cli.arguments import load_inputs
+from drivetwin.cli.atomic_outputs import write_atomically
+from drivetwin.cli.output import show_step
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
@@ -31,37 +31,37 @@ class Outcome:
     twin: Twin
 
 
-def run(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outcome:
+def run_identification(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outcome:
     """Read, find shifts, identify, and validate by simulation.
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
-    from drivetwin.estimation.analysis.experiment_design import examined
+    from drivetwin.estimation.analysis.experiment_design import rank_experiments
     from drivetwin.pipeline import identify
-    from drivetwin.shifts.detect import usable_shifts
+    from drivetwin.shifts.detect import require_shifts
     from drivetwin.twin.build import build_twin
-    from drivetwin.validation.simulate_log import validated
+    from drivetwin.validation.simulate_log import attach_validation
 
-    with step(f"reading {log.name}"):
-        recording, card = load(log, vehicle, channels)
-        shifts = usable_shifts(recording, card)
-    with step(f"identifying by the {method} method"):
+    with show_step(f"reading {log.name}"):
+        recording, card = load_inputs(log, vehicle, channels)
+        shifts = require_shifts(recording, card)
+    with show_step(f"identifying by the {method} method"):
         found = identify(recording, card, shifts, method)
         twin = build_twin(found, card)
-    with step("simulating the shifts"):
-        found = validated(found, twin, recording)
-    with step("comparing experiments"):
-        found = examined(found)
+    with show_step("simulating the shifts"):
+        found = attach_validation(found, twin, recording)
+    with show_step("comparing experiments"):
+        found = rank_experiments(found)
     return Outcome(recording, card, found, twin)
 
 
-def write(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
+def write_outcome(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
     """Write result, twin and report into `folder`, all or none; returns their paths."""
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_conversion import save_twin
     from drivetwin.report.html import save_report
 
-    with step("writing the report"), staged(folder) as beside:
+    with show_step("writing the report"), write_atomically(folder) as beside:
         save_result(beside / RESULT, outcome.found)
         save_twin(beside / TWIN, outcome.twin)
         save_report(beside / REPORT, outcome.found, outcome.log)

@@ -8,28 +8,28 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.atomic import check_kept, keeping
+from drivetwin._util.atomic import protect_files, refuse_overwrite
 
 _OUTPUTS = frozenset(("output", "figure", "write_mapping", "modelica"))
 """Parameters of commands that name what is written; files that all others name are read."""
 
 
-def keeping_inputs(command: Callable[..., None]) -> Callable[..., None]:
+def protect_inputs(command: Callable[..., None]) -> Callable[..., None]:
     """Wrap a command: it raises InputError instead of overwriting a file that it reads."""
 
     @wraps(command)
     def careful(**given: Any) -> None:
         read = (value for name, value in given.items() if name not in _OUTPUTS)
-        with keeping(path for value in read for path in _paths(value)):
+        with protect_files(path for value in read for path in _collect_paths(value)):
             for name in _OUTPUTS & given.keys():
-                for path in _paths(given[name]):
-                    check_kept(path)  # at once, not after the computation
+                for path in _collect_paths(given[name]):
+                    refuse_overwrite(path)  # at once, not after the computation
             command(**given)
 
     return careful
 
 
-def _paths(value: object) -> Iterator[Path]:
+def _collect_paths(value: object) -> Iterator[Path]:
     """Collect the paths in a parameter's value, which may also name a built-in."""
     for one in value if isinstance(value, list) else [value]:
         if isinstance(one, Path | str):

@@ -11,13 +11,13 @@ import typer
 from drivetwin.cli.arguments import ChannelsFile, LogFile
 from drivetwin.cli.output import (
     JsonFlag,
-    error_document,
-    note,
+    make_table,
     print_json,
-    say,
-    show,
-    step,
-    table_of,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_step,
+    to_error_document,
 )
 from drivetwin.errors import DrivetwinError
 
@@ -50,37 +50,39 @@ def inspect(
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.channels.mapping import Mapped
-    from drivetwin.channels.mapping_file import mapping_text, read_mapping
+    from drivetwin.channels.mapping_file import format_mapping, read_mapping
     from drivetwin.logs.formats.detect import open_recording
-    from drivetwin.logs.survey import survey
+    from drivetwin.logs.survey import survey_recording
     from drivetwin.vehicle.card import load_card
 
     card = None if vehicle is None else load_card(vehicle)
     stated = Mapped({}) if channels is None else read_mapping(channels)
-    with step(f"reading {log.name}"), open_recording(log, stated.options) as recording:
-        found = survey(recording, str(log), card, stated)
-        warnings, refusal = _as_read(recording, log, card, stated)
+    with show_step(f"reading {log.name}"), open_recording(log, stated.options) as recording:
+        found = survey_recording(recording, str(log), card, stated)
+        warnings, refusal = _read_as_mapped_log(recording, log, card, stated)
     if write_mapping is not None:
-        write_text(write_mapping, mapping_text(found.mapping, found.options, found.unitless))
+        write_text(write_mapping, format_mapping(found.mapping, found.options, found.unitless))
     if as_json:
-        error = None if refusal is None else error_document(refusal)["error"]
-        print_json({**found.document(), "warnings": warnings, "refusal": error})
+        error = None if refusal is None else to_error_document(refusal)["error"]
+        print_json({**found.to_document(), "warnings": warnings, "refusal": error})
         return
-    show(_table([column.document() for column in found.columns], log.name))
+    print_table(_build_table([column.to_document() for column in found.columns], log.name))
     for text in found.notes:
-        note(text)
+        print_paragraph(text)
     if found.unitless:
-        note(f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping")
+        print_paragraph(
+            f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping"
+        )
     for text in warnings:
         if text not in found.notes:
-            note(f"warning: {text}")
+            print_paragraph(f"warning: {text}")
     if refusal is not None:
-        note(f"shifts and identify refuse this log: {refusal}")
+        print_paragraph(f"shifts and identify refuse this log: {refusal}")
     if write_mapping is not None:
-        say(f"wrote {write_mapping}")
+        print_line(f"wrote {write_mapping}")
 
 
-def _as_read(
+def _read_as_mapped_log(
     recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped
 ) -> tuple[tuple[str, ...], DrivetwinError | None]:
     """Read a log as for use, missing roles allowed; return the warnings or the error."""
@@ -92,8 +94,8 @@ def _as_read(
         return (), fault
 
 
-def _table(columns: list[dict[str, Any]], source: str) -> Table:
-    table = table_of(
+def _build_table(columns: list[dict[str, Any]], source: str) -> Table:
+    table = make_table(
         f"Columns of {source}", "column", "group", "unit", "Hz", "min", "max", "gaps", "role",
         right=("Hz", "min", "max", "gaps"),
     )  # fmt: skip
@@ -103,14 +105,14 @@ def _table(columns: list[dict[str, Any]], source: str) -> Table:
             column["name"],
             column["group"],
             column["unit"] or "none",
-            _cell(column["rate"]),
-            _cell(low),
-            _cell(high),
+            _format_cell(column["rate"]),
+            _format_cell(low),
+            _format_cell(high),
             str(column["gaps"]),
             ", ".join(column["roles"]) or "-",
         )
     return table
 
 
-def _cell(value: float | None) -> str:
+def _format_cell(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g}"

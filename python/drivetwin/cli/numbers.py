@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from drivetwin._util.display_units import display_of, significant, with_uncertainty
+from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
 
 Interval = tuple[float, float]
 
@@ -13,38 +13,40 @@ _EXACT = 1e-5
 """Relative half width below which a value is printed as exact."""
 
 
-def shown(value: float | None, interval: Interval | None, si_unit: str) -> tuple[str, str, str]:
+def format_estimate(
+    value: float | None, interval: Interval | None, si_unit: str
+) -> tuple[str, str, str]:
     """Value, `± half width` of its interval, and the unit they are in; a dash for None."""
-    display = display_of(si_unit)
+    display = get_display_unit(si_unit)
     if value is None:
         return "-", "", display.label
     half = None if interval is None else (interval[1] - interval[0]) / 2.0 * display.factor
     if half is not None and half < _EXACT * abs(value * display.factor):
         half = None
-    number, width = with_uncertainty(value * display.factor, half)
+    number, width = format_uncertainty(value * display.factor, half)
     return number, f"± {width}" if width else "", display.label
 
 
-def quantity(value: float | None, si_unit: str) -> str:
+def format_quantity(value: float | None, si_unit: str) -> str:
     """A value with its unit to three digits; a dash for None."""
     if value is None:
         return "-"
-    display = display_of(si_unit)
-    return f"{significant(value * display.factor, 3)} {display.label}".rstrip()
+    display = get_display_unit(si_unit)
+    return f"{format_significant(value * display.factor, 3)} {display.label}".rstrip()
 
 
-def around(value: float | None, half: float, si_unit: str) -> str:
+def format_half_width(value: float | None, half: float, si_unit: str) -> str:
     """`± half width` of an interval about a value in display units; `open` where infinite."""
     if half == float("inf"):
         return "open"
-    return shown(value or half, (-half, half), si_unit)[1]
+    return format_estimate(value or half, (-half, half), si_unit)[1]
 
 
-def percent(value: float | None) -> str:
+def format_percent(value: float | None) -> str:
     """A share in percent with one decimal; a dash for None or NaN."""
     return "-" if value is None or not isfinite(value) else f"{value:.1f}"
 
 
-def deviation(value: float | None, truth: float) -> str:
+def format_deviation(value: float | None, truth: float) -> str:
     """Format the deviation from the true value in percent; empty if undefined."""
     return "" if value is None or truth == 0.0 else f"{100.0 * (value / truth - 1.0):+.2f}"

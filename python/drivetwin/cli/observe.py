@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step, table_of
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_step,
+)
 from drivetwin.errors import DamagedChannelError
 from drivetwin.observer.kind import Observer
 
@@ -54,37 +62,39 @@ def observe(
     from drivetwin._util.atomic import write_text
     from drivetwin.files.twin_conversion import load_twin
     from drivetwin.logs.read import read_log
-    from drivetwin.observer.observe import observed
+    from drivetwin.observer.observe import estimate_torques
     from drivetwin.report.observer import render_observations
-    from drivetwin.shifts.detect import usable_shifts
+    from drivetwin.shifts.detect import require_shifts
     from drivetwin.vehicle.card import load_card
 
     model = load_twin(twin)
-    with step(f"reading {log.name}"):
-        card = model.card() if vehicle is None else load_card(vehicle)
+    with show_step(f"reading {log.name}"):
+        card = model.build_card() if vehicle is None else load_card(vehicle)
         recording = read_log(log, card, channels)
-        shifts = usable_shifts(recording, card)
-    found, left_out = _each(shifts.shifts, lambda shift: observed(model, recording, shift, by), by)
+        shifts = require_shifts(recording, card)
+    found, left_out = _observe_shifts(
+        shifts.shifts, lambda shift: estimate_torques(model, recording, shift, by), by
+    )
     if output is not None:
-        _write(output, found)
+        _write_observations(output, found)
     if figure is not None:
         write_text(figure, render_observations(found, recording))
     if as_json:
-        shown = [_document(one) for one in found]
+        shown = [_to_document(one) for one in found]
         print_json({"observer": by, "shifts": shown, "left_out": left_out})
         return
     for one in found:
-        show(_table(one))
+        print_table(_build_table(one))
         for text in one.notes:
-            note(text)
+            print_paragraph(text)
     for name, reason in left_out.items():
-        note(f"shift {name} is left out: {reason}")
+        print_paragraph(f"shift {name} is left out: {reason}")
     for file in (output, figure):
         if file is not None:
-            say(f"wrote {file}")
+            print_line(f"wrote {file}")
 
 
-def _each(
+def _observe_shifts(
     shifts: Sequence[Shift], look: Callable[[Shift], Observation], by: Observer
 ) -> tuple[list[Observation], dict[str, str]]:
     """Observe each shift; return the observations, and the skip reason by shift name."""
@@ -93,7 +103,7 @@ def _each(
     for shift in shifts:
         name = f"{shift.start_gear}-{shift.end_gear}"
         try:
-            with step(f"observing shift {name} by {by}"):
+            with show_step(f"observing shift {name} by {by}"):
                 found.append(look(shift))
         except DamagedChannelError as refusal:
             left_out[f"{name} at {shift.torque_phase[0]:.3f} s"] = refusal.what
@@ -102,19 +112,19 @@ def _each(
     return found, left_out
 
 
-def _write(path: Path, found: Sequence[Observation]) -> None:
-    from drivetwin.cli.atomic_outputs import staged
-    from drivetwin.export.parameters.spelling import flat_name
+def _write_observations(path: Path, found: Sequence[Observation]) -> None:
+    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.export.parameters.spelling import to_flat_name
     from drivetwin.logs.write import write_log
 
-    channels = observed_channels(found)
+    channels = collect_channels(found)
     if path.suffix.casefold() == ".mat":
-        channels = tuple(replace(one, name=flat_name(one.name)) for one in channels)
-    with staged(path.parent) as folder:
+        channels = tuple(replace(one, name=to_flat_name(one.name)) for one in channels)
+    with write_atomically(path.parent) as folder:
         write_log(folder / path.name, channels)
 
 
-def observed_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
+def collect_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
     """Each torque with its standard deviation, N·m, one shift after the other.
 
     A gear that is held between two shifts is divided in its middle: time increases throughout.
@@ -122,9 +132,9 @@ def observed_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
     import numpy as np
 
     from drivetwin.logs.raw import RawChannel
-    from drivetwin.shifts.split_gears import own_samples
+    from drivetwin.shifts.split_gears import compute_exclusive_masks
 
-    own = own_samples([one.shift for one in found], [one.time for one in found])
+    own = compute_exclusive_masks([one.shift for one in found], [one.time for one in found])
     parts: dict[str, list[tuple[Any, Any]]] = {}
     for one, kept in zip(found, own, strict=True):
         for name, band in one.bands.items():
@@ -141,10 +151,10 @@ def observed_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
     )
 
 
-def _table(one: Observation) -> Table:
+def _build_table(one: Observation) -> Table:
     numbers = ("lowest Nm", "highest Nm", "± Nm (mean)", "± Nm (largest)")
     shift = one.shift
-    table = table_of(
+    table = make_table(
         f"Shift {shift.start_gear}→{shift.end_gear} by {one.observer}", "torque", *numbers,
         right=numbers,
     )  # fmt: skip
@@ -160,7 +170,7 @@ def _table(one: Observation) -> Table:
     return table
 
 
-def _document(one: Observation) -> dict[str, Any]:
+def _to_document(one: Observation) -> dict[str, Any]:
     return {
         "from": one.shift.start_gear,
         "to": one.shift.end_gear,

@@ -22,7 +22,7 @@ JsonFlag = Annotated[
 ]
 
 
-def console(*, stderr: bool = False) -> Console:
+def make_console(*, stderr: bool = False) -> Console:
     """Create a console; without a terminal it has no colours and 80 columns.
 
     Texts are shown as they are: a unit in brackets, `[/min]`, is no markup and `:on:` no picture.
@@ -32,31 +32,31 @@ def console(*, stderr: bool = False) -> Console:
     return Console(stderr=stderr, highlight=False, markup=False, emoji=False)
 
 
-def say(text: str) -> None:
+def print_line(text: str) -> None:
     """Print a line of plain text on stdout; a long one is left to the terminal to wrap."""
-    console().print(text, soft_wrap=True)
+    make_console().print(text, soft_wrap=True)
 
 
-def note(text: str) -> None:
+def print_paragraph(text: str) -> None:
     """Print a paragraph on stdout, indented and wrapped to the width at hand."""
     from rich.padding import Padding
     from rich.text import Text
 
-    console().print(Padding(Text(text), (0, 0, 0, 2)))
+    make_console().print(Padding(Text(text), (0, 0, 0, 2)))
 
 
-def show(table: Table) -> None:
+def print_table(table: Table) -> None:
     """Print a table on stdout; its title is wrapped to the terminal, not to a narrow table."""
     from rich.text import Text
 
-    out, title = console(), table.title
+    out, title = make_console(), table.title
     table.title = None
     if title:
         out.print(Text(str(title), style="table.title"))
     out.print(table)
 
 
-def table_of(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
+def make_table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
     """Empty table in the program's one style; columns in `right` hold numbers.
 
     Where the terminal is narrow texts are folded; a number stays whole as long as it can.
@@ -87,22 +87,22 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def step(text: str) -> Iterator[None]:
+def show_step(text: str) -> Iterator[None]:
     """Display a step on stderr while it runs, if stderr is a terminal.
 
     The text contains share and time left if the computation reports them, else the elapsed time.
     """
     from rich.progress import Progress, SpinnerColumn, TextColumn
 
-    from drivetwin._util.progress import listening
+    from drivetwin._util.progress import attach_listener
     from drivetwin.cli.time_left import Remaining
 
     clock = Remaining(text)
     columns = (SpinnerColumn(), TextColumn("{task.fields[clock]}", markup=False))
-    shown = console(stderr=True)
+    shown = make_console(stderr=True)
     with Progress(*columns, console=shown, transient=True, disable=not shown.is_terminal) as live:
         live.add_task("", total=None, clock=clock)
-        with listening(clock.hear):
+        with attach_listener(clock.update):
             yield
 
 
@@ -112,12 +112,12 @@ def show_error(error: DrivetwinError, *, as_json: bool) -> None:
         from rich.text import Text
 
         message = Text.assemble(("error: ", "bold red"), str(error))
-        console(stderr=True).print(message, soft_wrap=True)
+        make_console(stderr=True).print(message, soft_wrap=True)
         return
-    print_json(error_document(error))
+    print_json(to_error_document(error))
 
 
-def error_document(error: DrivetwinError) -> dict[str, Any]:
+def to_error_document(error: DrivetwinError) -> dict[str, Any]:
     """An error as JSON: type, what, where and remedy under `error`."""
     place = {key: part for key, part in vars(error.where).items() if part is not None}
     fault = {

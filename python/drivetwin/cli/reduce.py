@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show, table_of
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+)
 from drivetwin.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
@@ -33,7 +40,7 @@ def reduce(
     Ratios of both elements, mass matrix, condition (1) with the members that violate it, the error
     of leaving their coupling out: estimated first, then simulated.
     """
-    from drivetwin.gearbox import load_gearbox, ratio_remarks
+    from drivetwin.gearbox import describe_ratio_differences, load_gearbox
     from drivetwin.gearbox import reduce as reduce_shift
 
     old, dash, new = shift.rpartition("-")
@@ -42,23 +49,23 @@ def reduce(
     box = load_gearbox(card)
     reduction = reduce_shift(box, old, new)
     ratios = {old: reduction.off_going.ratio, new: reduction.on_coming.ratio}
-    warnings = ratio_remarks(box, ratios)
-    errors = _errors(reduction)
+    warnings = describe_ratio_differences(box, ratios)
+    errors = _compute_errors(reduction)
     if as_json:
-        print_json(_document(reduction, errors) | {"warnings": warnings})
+        print_json(_to_document(reduction, errors) | {"warnings": warnings})
         return
-    show(_elements(reduction))
+    print_table(_build_element_table(reduction))
     for warning in warnings:
-        note(f"warning: {warning}")
-    say("slip = ω_in/i_c - i_out·ω_out (eq. 15)")
-    say("")
-    show(_matrix(reduction))
-    say(reduction.condition())
-    say("")
+        print_paragraph(f"warning: {warning}")
+    print_line("slip = ω_in/i_c - i_out·ω_out (eq. 15)")
+    print_line("")
+    print_table(_build_matrix_table(reduction))
+    print_line(reduction.describe_condition())
+    print_line("")
     if errors.reason is not None:
-        say(f"No error of leaving M12 out is told: {errors.reason}")
+        print_line(f"No error of leaving M12 out is told: {errors.reason}")
     else:
-        show(_error_table(errors))
+        print_table(_build_error_table(errors))
 
 
 @dataclass(frozen=True)
@@ -70,7 +77,7 @@ class _Errors:
     reason: str | None = None
 
 
-def _errors(reduction: Reduction) -> _Errors:
+def _compute_errors(reduction: Reduction) -> _Errors:
     from drivetwin.gearbox import compare, estimate
 
     try:
@@ -79,10 +86,10 @@ def _errors(reduction: Reduction) -> _Errors:
         return _Errors(reason=error.what)
 
 
-def _elements(reduction: Reduction) -> Table:
+def _build_element_table(reduction: Reduction) -> Table:
     title = f"{reduction.gearbox.name}, shift {reduction.from_gear}-{reduction.to_gear}"
     numbers = ("i_c", "i_out", "i_c·i_out")
-    table = table_of(title, "element", "", *numbers, "own slip", right=numbers)
+    table = make_table(title, "element", "", *numbers, "own slip", right=numbers)
     for role, each in (("off-going", reduction.off_going), ("on-coming", reduction.on_coming)):
         row = [f"{value:.4f}" for value in (each.i_c, each.i_out, each.ratio)]
         table.add_row(each.element, role, *row, "slip" if each.sense > 0 else "-slip")
@@ -91,18 +98,18 @@ def _elements(reduction: Reduction) -> Table:
     return table
 
 
-def _matrix(reduction: Reduction) -> Table:
+def _build_matrix_table(reduction: Reduction) -> Table:
     title = "Mass matrix of the gearbox over (ω_in, ω_out), kg·m²"
-    table = table_of(title, "", "ω_in", "ω_out", right=("ω_in", "ω_out"))
+    table = make_table(title, "", "ω_in", "ω_out", right=("ω_in", "ω_out"))
     table.add_row("ω_in", f"{reduction.M11:.4g}", f"{reduction.M12:.4g}")
     table.add_row("ω_out", f"{reduction.M12:.4g}", f"{reduction.M22:.4g}")
     return table
 
 
-def _error_table(errors: _Errors) -> Table:
+def _build_error_table(errors: _Errors) -> Table:
     title = "Largest error over the reference shift of the card without M12"
     columns = ("estimated before", "simulated")
-    table = table_of(title, "signal", *columns, "", right=columns)
+    table = make_table(title, "signal", *columns, "", right=columns)
     for label, field, unit in (
         ("shaft torque", "shaft_torque", "N·m"),
         ("input speed", "input_speed", "rad/s"),
@@ -113,7 +120,7 @@ def _error_table(errors: _Errors) -> Table:
     return table
 
 
-def _document(reduction: Reduction, errors: _Errors) -> dict[str, Any]:
+def _to_document(reduction: Reduction, errors: _Errors) -> dict[str, Any]:
     def error(of: CouplingError | None) -> dict[str, float] | None:
         return None if of is None else asdict(of)
 
@@ -127,7 +134,7 @@ def _document(reduction: Reduction, errors: _Errors) -> dict[str, Any]:
         "mass": [[reduction.M11, reduction.M12], [reduction.M12, reduction.M22]],
         "coupling_ratio": reduction.coupling_ratio,
         "exact": reduction.exact,
-        "condition": reduction.condition(),
+        "condition": reduction.describe_condition(),
         "members": [asdict(each) | {"coupling": each.coupling} for each in reduction.members],
         "violations": [each.member for each in reduction.violations],
         "error_estimate": error(errors.estimate),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile
-from drivetwin.cli.output import JsonFlag, print_json, say, step
+from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
 from drivetwin.errors import InputError, ResultFileError, Where
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ def report(
     One folder or result.json: the path of its report. Several, or a twin and logs: a page that
     compares their parameters and friction, and the simulation of each log by each twin.
     """
-    made = [source for source in sources if _is_made(source)]
-    logs = [source for source in sources if not _is_made(source)]
+    made = [source for source in sources if _is_identification(source)]
+    logs = [source for source in sources if not _is_identification(source)]
     if not made:
         raise InputError(
             f"{sources[0].name} is no result of an identification",
@@ -52,21 +52,21 @@ def report(
                 "name further twins, or logs that it shall simulate",
                 Where(file=str(made[0])),
             )
-        _name_page(made[0], as_json=as_json)
+        _print_page_name(made[0], as_json=as_json)
         return
-    _compare(made, logs, channels, output)
+    _write_comparison(made, logs, channels, output)
     if as_json:
         print_json({"report": output, "compared": made, "logs": logs})
         return
-    say(f"wrote {output}")
+    print_line(f"wrote {output}")
 
 
-def _is_made(source: Path) -> bool:
+def _is_identification(source: Path) -> bool:
     """Return True if a source was written by an identification; all others are read as logs."""
     return source.is_dir() or source.suffix in (".json", ".toml")
 
 
-def _name_page(source: Path, *, as_json: bool) -> None:
+def _print_page_name(source: Path, *, as_json: bool) -> None:
     from drivetwin.cli.identify_run import REPORT, RESULT
     from drivetwin.files.result_file import load_result
 
@@ -82,24 +82,24 @@ def _name_page(source: Path, *, as_json: bool) -> None:
     if as_json:
         print_json({"report": page, "result": result, "inputs": content.inputs})
         return
-    say(str(page))
+    print_line(str(page))
 
 
-def _compare(
+def _write_comparison(
     made: Sequence[Path], logs: Sequence[Path], channels: Path | None, output: Path
 ) -> None:
     from drivetwin.report.comparison import save_comparison
 
-    names = _names(made)
-    with step("reading"):
-        candidates = [_candidate(name, source) for name, source in names.items()]
-        twins = {name: _twin(source) for name, source in names.items()} if logs else {}
-    trials = [trial for log in logs for trial in _trials(twins, log, channels)]
-    with step(f"writing {output.name}"):
+    names = _assign_names(made)
+    with show_step("reading"):
+        candidates = [_load_candidate(name, source) for name, source in names.items()]
+        twins = {name: _load_twin(source) for name, source in names.items()} if logs else {}
+    trials = [trial for log in logs for trial in _simulate_trials(twins, log, channels)]
+    with show_step(f"writing {output.name}"):
         save_comparison(output, candidates, trials)
 
 
-def _names(made: Sequence[Path]) -> dict[str, Path]:
+def _assign_names(made: Sequence[Path]) -> dict[str, Path]:
     """Name each source by its folder or file; number the names that occur twice."""
     plain = [
         (source if source.is_dir() or source.stem not in ("result", "twin") else source.parent)
@@ -116,18 +116,18 @@ def _names(made: Sequence[Path]) -> dict[str, Path]:
     return names
 
 
-def _candidate(name: str, source: Path) -> Candidate:
+def _load_candidate(name: str, source: Path) -> Candidate:
     from drivetwin.cli.identify_run import RESULT
     from drivetwin.files.result_file import load_result
     from drivetwin.files.twin_conversion import load_twin
     from drivetwin.report.find_reports import Candidate
 
     if source.suffix == ".toml":
-        return Candidate.of_twin(name, load_twin(source))
-    return Candidate.of_result(name, load_result(source / RESULT if source.is_dir() else source))
+        return Candidate.from_twin(name, load_twin(source))
+    return Candidate.from_result(name, load_result(source / RESULT if source.is_dir() else source))
 
 
-def _twin(source: Path) -> Twin:
+def _load_twin(source: Path) -> Twin:
     """Load the twin of a source: the file itself, or the twin file next to its result."""
     from drivetwin.cli.identify_run import TWIN
     from drivetwin.files.twin_conversion import load_twin
@@ -137,13 +137,13 @@ def _twin(source: Path) -> Twin:
     return load_twin(source / TWIN if source.is_dir() else source.with_name(TWIN))
 
 
-def _trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list[Trial]:
+def _simulate_trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list[Trial]:
     """Every shift of a log by every twin; shifts are found with the ratios of the first."""
     from drivetwin.logs.read import read_log
-    from drivetwin.report.comparison import trials_of
-    from drivetwin.shifts.detect import usable_shifts
+    from drivetwin.report.comparison import simulate_trials
+    from drivetwin.shifts.detect import require_shifts
 
-    card = next(iter(twins.values())).card()
-    with step(f"simulating {log.name}"):
+    card = next(iter(twins.values())).build_card()
+    with show_step(f"simulating {log.name}"):
         recording = read_log(log, card, channels)
-        return trials_of(twins, recording, usable_shifts(recording, card).shifts, log.name)
+        return simulate_trials(twins, recording, require_shifts(recording, card).shifts, log.name)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from drivetwin.cli.output import JsonFlag, print_json, say
-from drivetwin.files.schemas import FileKind, json_schema
+from drivetwin.cli.output import JsonFlag, print_json, print_line
+from drivetwin.files.schemas import FileKind, build_json_schema
 
 
 def schema(
@@ -20,8 +20,8 @@ def schema(
 ) -> None:
     """Print the JSON Schema of a kind of file, for editors; without KIND, list the kinds."""
     if kind is not None:
-        print_json(json_schema(kind))
+        print_json(build_json_schema(kind))
     elif as_json:
         print_json({"kinds": list(FileKind)})
     else:
-        say("\n".join(FileKind))
+        print_line("\n".join(FileKind))

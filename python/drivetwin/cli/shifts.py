@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load
-from drivetwin.cli.output import JsonFlag, note, print_json, show, step
+from drivetwin._util.display_units import format_uncertainty
+from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load_inputs
+from drivetwin.cli.output import JsonFlag, print_json, print_paragraph, print_table, show_step
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -30,115 +31,125 @@ def shifts(
     For a log without output torque also the driveline's resonance after each shift and the total
     inertia over η in each gear held, where the log carries them.
     """
-    from drivetwin.cli.tables import shift_table
-    from drivetwin.shifts.detect import find_shifts, held_spans
-    from drivetwin.shifts.lockup_clutch import lock_ups
+    from drivetwin.cli.tables import build_shift_table
+    from drivetwin.shifts.detect import detect_shifts, find_gear_spans
+    from drivetwin.shifts.lockup_clutch import detect_lock_ups
 
-    with step(f"reading {log.name}"):
-        recording, card = load(log, vehicle, channels)
-        found = find_shifts(recording, card)
-    closings = lock_ups(recording, card)
-    seen = _from_speeds(recording, card, found.shifts)
+    with show_step(f"reading {log.name}"):
+        recording, card = load_inputs(log, vehicle, channels)
+        found = detect_shifts(recording, card)
+    closings = detect_lock_ups(recording, card)
+    seen = _estimate_from_speeds(recording, card, found.shifts)
     if as_json:
-        print_json(_document(found, closings, seen) | {"warnings": recording.warnings})
+        print_json(_to_document(found, closings, seen) | {"warnings": recording.warnings})
         return
     if found.shifts:
-        show(shift_table(found.shifts, log.name))
+        print_table(build_shift_table(found.shifts, log.name))
     else:
-        held = ", ".join(dict.fromkeys(gear for gear, _ in held_spans(recording, card)))
-        note(f"no gear shift; gear held: {held or 'none'}")
-    _tell(found, closings, seen)
+        held = ", ".join(dict.fromkeys(gear for gear, _ in find_gear_spans(recording, card)))
+        print_paragraph(f"no gear shift; gear held: {held or 'none'}")
+    _print_details(found, closings, seen)
     for warning in recording.warnings:
-        note(f"warning: {warning}")
+        print_paragraph(f"warning: {warning}")
 
 
-class _Seen(NamedTuple):
+class _SpeedResults(NamedTuple):
     """Quantities computed from the speeds of a log without output torque; empty for other logs."""
 
     gears: tuple[HeldGear, ...] = ()
     swings: tuple[tuple[Shift, Resonance | str], ...] = ()
 
 
-def _from_speeds(log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]) -> _Seen:
+def _estimate_from_speeds(
+    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
+) -> _SpeedResults:
     from drivetwin.estimation.data.prepare_gears import prepare_gears, prepare_input_speed
-    from drivetwin.estimation.linear.inertia_in_gear import held_gears
-    from drivetwin.estimation.linear.resonance import after_shift
+    from drivetwin.estimation.linear.inertia_in_gear import estimate_gear_inertias
+    from drivetwin.estimation.linear.resonance import find_shift_resonance
 
     if "output_torque" in log:
-        return _Seen()
-    with step("looking at the gears held"):
-        gears = held_gears(prepare_gears(log, card, shifts))
+        return _SpeedResults()
+    with show_step("looking at the gears held"):
+        gears = estimate_gear_inertias(prepare_gears(log, card, shifts))
         if not shifts:
-            return _Seen(gears)
+            return _SpeedResults(gears)
         speed = prepare_input_speed(log)
-        return _Seen(gears, tuple((shift, after_shift(speed, shift)) for shift in shifts))
+        return _SpeedResults(
+            gears, tuple((shift, find_shift_resonance(speed, shift)) for shift in shifts)
+        )
 
 
-def _document(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> dict[str, Any]:
+def _to_document(
+    found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults
+) -> dict[str, Any]:
     from drivetwin.files.result_file import RejectedRecord, ShiftRecord
 
     return {
         "shifts": [ShiftRecord.from_result(one).model_dump(by_alias=True) for one in found.shifts],
         "rejected": [RejectedRecord.from_result(one).model_dump() for one in found.rejected],
         "lock_ups": [asdict(one) for one in closings],
-        "resonances": [_swing(*pair) for pair in seen.swings],
+        "resonances": [_convert_resonance(*pair) for pair in seen.swings],
         "held_gears": [asdict(one) for one in seen.gears],
     }
 
 
-def _tell(found: FoundShifts, closings: Sequence[LockUp], seen: _Seen) -> None:
+def _print_details(found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults) -> None:
     """Print the details below the table of the shifts: text and further tables."""
-    from drivetwin.cli.tables import quality_tables
+    from drivetwin.cli.tables import build_quality_tables
 
-    for table in quality_tables(found.shifts):
-        show(table)
+    for table in build_quality_tables(found.shifts):
+        print_table(table)
     for closing in closings:
         text = f"; {closing.warning}" if closing.warning else ""
-        note(f"converter lock-up at {_spread(closing.time, closing.sigma)} s (95 %){text}")
+        print_paragraph(
+            f"converter lock-up at {_format_spread(closing.time, closing.sigma)} s (95 %){text}"
+        )
     if seen.gears:
-        show(_gear_table(seen.gears))
+        print_table(_build_gear_table(seen.gears))
     for gear in seen.gears:
         if gear.reason:
-            note(f"gear {gear.gear}: {gear.reason}")
+            print_paragraph(f"gear {gear.gear}: {gear.reason}")
     for shift, swing in seen.swings:
-        note(f"{_name(shift)}: {_said(swing)}")
+        print_paragraph(f"{_format_name(shift)}: {_describe_resonance(swing)}")
     for shift in found.shifts:
         for warning in shift.warnings:
-            note(f"{_name(shift)}: {warning}")
+            print_paragraph(f"{_format_name(shift)}: {warning}")
     for candidate in found.rejected:
         start, end = candidate.time
-        note(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}")
+        print_paragraph(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}")
 
 
-def _name(shift: Shift) -> str:
+def _format_name(shift: Shift) -> str:
     return f"{shift.start_gear}→{shift.end_gear}"
 
 
-def _said(swing: Resonance | str) -> str:
+def _describe_resonance(swing: Resonance | str) -> str:
     if isinstance(swing, str):
         return swing
-    frequency, damping = _spread(swing.f_d, swing.f_d_std), _spread(swing.zeta, swing.zeta_std)
+    frequency, damping = (
+        _format_spread(swing.f_d, swing.f_d_std),
+        _format_spread(swing.zeta, swing.zeta_std),
+    )
     return f"resonance at {frequency} Hz, damping ratio {damping} (95 %)"
 
 
-def _spread(value: float, std: float) -> str:
+def _format_spread(value: float, std: float) -> str:
     """A value ± the half width of its 95 % interval."""
-    from drivetwin._util.display_units import with_uncertainty
     from drivetwin.estimation.result.estimate import Z95
 
-    return " ± ".join(filter(None, with_uncertainty(value, Z95 * std)))
+    return " ± ".join(filter(None, format_uncertainty(value, Z95 * std)))
 
 
-def _swing(shift: Shift, swing: Resonance | str) -> dict[str, Any]:
+def _convert_resonance(shift: Shift, swing: Resonance | str) -> dict[str, Any]:
     found = {"reason": swing} if isinstance(swing, str) else asdict(swing)
     return {"from": shift.start_gear, "to": shift.end_gear, **found}
 
 
-def _gear_table(gears: tuple[HeldGear, ...]) -> Table:
-    from drivetwin.cli.numbers import shown
-    from drivetwin.cli.output import table_of
+def _build_gear_table(gears: tuple[HeldGear, ...]) -> Table:
+    from drivetwin.cli.numbers import format_estimate
+    from drivetwin.cli.output import make_table
 
-    table = table_of(
+    table = make_table(
         "Total inertia over η at the output shaft", "gear", "from s", "to s", "value", "95 %",
         "unit", "verdict", right=("from s", "to s", "value", "95 %"),
     )  # fmt: skip
@@ -146,7 +157,7 @@ def _gear_table(gears: tuple[HeldGear, ...]) -> Table:
         interval = None
         if one.value is not None and one.half is not None:
             interval = (one.value - one.half, one.value + one.half)
-        value, spread, unit = shown(one.value, interval, "kg*m^2")
+        value, spread, unit = format_estimate(one.value, interval, "kg*m^2")
         start, end = one.span
         table.add_row(
             one.gear, f"{start:.2f}", f"{end:.2f}", value, spread, unit, one.verdict.value

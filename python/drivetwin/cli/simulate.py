@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
-from drivetwin.cli.output import JsonFlag, note, print_json, say, show, step
+from drivetwin.cli.output import (
+    JsonFlag,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_step,
+)
 from drivetwin.export.fixed_step import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
@@ -55,43 +62,49 @@ def simulate(
     Ratios and shift elements are the twin's own, so no vehicle card is needed.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.cli.tables import fit_table
-    from drivetwin.export.fixed_step import Stepping, stepped_again
+    from drivetwin.cli.tables import build_fit_table
+    from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
     from drivetwin.files.twin_conversion import load_twin
     from drivetwin.logs.read import read_log
-    from drivetwin.shifts.detect import usable_shifts
-    from drivetwin.validation.simulate_log import validate
+    from drivetwin.shifts.detect import require_shifts
+    from drivetwin.validation.simulate_log import simulate_shift
     from drivetwin.vehicle.card import load_card
 
-    model = load_twin(twin) if parameters is None else _edited(load_twin(twin), parameters)
-    with step(f"simulating {log.name}"):
-        card = model.card() if vehicle is None else load_card(vehicle)
+    model = (
+        load_twin(twin) if parameters is None else _apply_parameters(load_twin(twin), parameters)
+    )
+    with show_step(f"simulating {log.name}"):
+        card = model.build_card() if vehicle is None else load_card(vehicle)
         recording = read_log(log, card, channels)
-        shifts = usable_shifts(recording, card)
-        runs = [validate(model, recording, shift) for shift in shifts.shifts]
+        shifts = require_shifts(recording, card)
+        runs = [simulate_shift(model, recording, shift) for shift in shifts.shifts]
         if step_size is not None or input_kind is InputKind.HOLD:
             stepping = Stepping(DEFAULT_STEP if step_size is None else step_size, input_kind)
-            runs = [stepped_again(run, model, recording, stepping) for run in runs]
+            runs = [rerun_fixed_step(run, model, recording, stepping) for run in runs]
     if output is not None:
-        write_text(output, traces_text(runs))
+        write_text(output, format_traces(runs))
     if as_json:
-        print_json({"shifts": [_document(run) for run in runs]})
+        print_json({"shifts": [_to_document(run) for run in runs]})
         return
     for run in runs:
-        show(fit_table(run.fit, f"Shift {run.shift.start_gear}→{run.shift.end_gear}: {run.status}"))
+        print_table(
+            build_fit_table(
+                run.fit, f"Shift {run.shift.start_gear}→{run.shift.end_gear}: {run.status}"
+            )
+        )
         for warning in run.warnings:
-            note(f"warning: {warning}")
+            print_paragraph(f"warning: {warning}")
     if output is not None:
-        say(f"wrote {output}")
+        print_line(f"wrote {output}")
 
 
-def _edited(twin: Twin, parameters: Path) -> Twin:
+def _apply_parameters(twin: Twin, parameters: Path) -> Twin:
     """The twin with the values of a parameter file, and what that changed on stderr."""
     from drivetwin.export.parameters.files import read_parameters
-    from drivetwin.export.parameters.to_twin import updated
+    from drivetwin.export.parameters.to_twin import update_twin
 
     content = read_parameters(parameters)
-    update = updated(twin, content)
+    update = update_twin(twin, content)
     typer.echo(f"{parameters.name} changes {', '.join(update.changed) or 'nothing'}", err=True)
     if update.idle:
         typer.echo(f"no simulation depends on {', '.join(update.idle)}", err=True)
@@ -102,7 +115,7 @@ def _edited(twin: Twin, parameters: Path) -> Twin:
     return update.twin
 
 
-def _document(run: Validation) -> dict[str, object]:
+def _to_document(run: Validation) -> dict[str, object]:
     return {
         "from": run.shift.start_gear,
         "to": run.shift.end_gear,
@@ -115,21 +128,23 @@ def _document(run: Validation) -> dict[str, object]:
     }
 
 
-def traces_text(runs: Sequence[Validation]) -> str:
+def format_traces(runs: Sequence[Validation]) -> str:
     """CSV with a unit row: time and the simulated signals, SI, one shift after the other.
 
     A gear that is held between two shifts is divided in its middle: time increases throughout.
     """
     import numpy as np
 
-    from drivetwin.report.labels import channel_unit
-    from drivetwin.shifts.split_gears import own_samples
-    from drivetwin.validation.simulate_log import SIGNALS, simulated_signals
+    from drivetwin.report.labels import get_channel_unit
+    from drivetwin.shifts.split_gears import compute_exclusive_masks
+    from drivetwin.validation.simulate_log import SIGNALS, compute_run_signals
 
-    own = own_samples([run.shift for run in runs], [run.trajectory.time for run in runs])
-    lines = [",".join(["time", *SIGNALS]), ",".join(["s", *map(channel_unit, SIGNALS)])]
+    own = compute_exclusive_masks(
+        [run.shift for run in runs], [run.trajectory.time for run in runs]
+    )
+    lines = [",".join(["time", *SIGNALS]), ",".join(["s", *map(get_channel_unit, SIGNALS)])]
     for run, kept in zip(runs, own, strict=True):
-        simulated = simulated_signals(run.model, run.trajectory)
+        simulated = compute_run_signals(run.model, run.trajectory)
         columns = (run.trajectory.time, *(simulated[name] for name in SIGNALS))
         rows = np.column_stack(columns)[kept].tolist()
         lines += [",".join(f"{value:.12g}" for value in row) for row in rows]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.atomic_outputs import staged
-from drivetwin.cli.output import JsonFlag, print_json, say, step
+from drivetwin.cli.atomic_outputs import write_atomically
+from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
 from drivetwin.dyno.names import ScenarioName
 
 if TYPE_CHECKING:
@@ -63,14 +63,14 @@ def synth(
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.scenario_file import load_scenario
 
-    with step(f"running {scenario}"):
-        setup = load_scenario(scenario, drum).with_torque_reduction(torque_reduction)
+    with show_step(f"running {scenario}"):
+        setup = load_scenario(scenario, drum).set_torque_reduction(torque_reduction)
         log, card, truth = write_run(output, run(setup, seed, noise=noise))
     if as_json:
         print_json({"log": log, "card": card, "truth": truth})
         return
     for name in (log, card, truth):
-        say(f"wrote {name}")
+        print_line(f"wrote {name}")
 
 
 def write_run(output: Path, run: DynoRun) -> tuple[Path, Path, Path]:
@@ -79,16 +79,16 @@ def write_run(output: Path, run: DynoRun) -> tuple[Path, Path, Path]:
     A CSV log is one table in which slow channels hold their value, as a data logger writes it; the
     other formats keep each channel's own time base.
     """
-    from drivetwin.dyno.files import card_text, log_text, recorded_channels, truth_text
+    from drivetwin.dyno.files import convert_channels, format_card, format_log, format_truth
     from drivetwin.logs.write import write_log
 
     card, truth = output.with_suffix(".card.toml"), output.with_suffix(".truth.json")
-    texts = {card: card_text(run.scenario), truth: truth_text(run)}
+    texts = {card: format_card(run.scenario), truth: format_truth(run)}
     if output.suffix.casefold() == ".csv":
-        texts[output] = log_text(run)
-    with staged(output.parent) as folder:
+        texts[output] = format_log(run)
+    with write_atomically(output.parent) as folder:
         for path, text in texts.items():
             (folder / path.name).write_text(text, encoding="utf-8", newline="\n")
         if output not in texts:
-            write_log(folder / output.name, recorded_channels(run))
+            write_log(folder / output.name, convert_channels(run))
     return output, card, truth

@@ -6,17 +6,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.numbers import around, percent, quantity, shown
-from drivetwin.cli.output import table_of
+from drivetwin.cli.numbers import (
+    format_estimate,
+    format_half_width,
+    format_percent,
+    format_quantity,
+)
+from drivetwin.cli.output import make_table
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.report.labels import channel_unit
+from drivetwin.report.labels import get_channel_unit
 from drivetwin.shifts.quality import QUALITY_UNITS
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, SignalFit
-    from drivetwin.estimation.result.suggestion import Suggestion
+    from drivetwin.estimation.result.suggestion import ExperimentRanking
     from drivetwin.shifts.shift import Shift
 
 _BESIDE = 3
@@ -25,9 +30,9 @@ _BESIDE = 3
 _PHASES = ("all", "before", "torque", "inertia", "after")
 
 
-def shift_table(shifts: Sequence[Shift], source: str) -> Table:
+def build_shift_table(shifts: Sequence[Shift], source: str) -> Table:
     """One row for each phase of each shift, with the 95 % interval of its start."""
-    table = table_of(
+    table = make_table(
         f"Shifts in {source}", "shift", "phase", "from s", "95 %", "to s",
         right=("from s", "95 %", "to s"),
     )  # fmt: skip
@@ -50,80 +55,84 @@ def shift_table(shifts: Sequence[Shift], source: str) -> Table:
     return table
 
 
-def quality_tables(shifts: Sequence[Shift]) -> Iterator[Table]:
+def build_quality_tables(shifts: Sequence[Shift]) -> Iterator[Table]:
     """Build tables of shift quality, one column for each shift; split if there are many."""
     for first in range(0, len(shifts), _BESIDE):
         part = shifts[first : first + _BESIDE]
         names = [f"{one.start_gear}→{one.end_gear}, {one.lockup_time:.2f} s" for one in part]
-        table = table_of("Shift quality", "figure", *names, right=tuple(names))
+        table = make_table("Shift quality", "figure", *names, right=tuple(names))
         for figure, unit in QUALITY_UNITS.items():
             if any(figure in one.quality for one in part):
-                values = [quantity(one.quality.get(figure), unit) for one in part]
+                values = [format_quantity(one.quality.get(figure), unit) for one in part]
                 table.add_row(figure.replace("_", " "), *values)
         yield table
 
 
-def parameter_table(estimates: Mapping[str, Estimate], title: str) -> Table:
+def build_parameter_table(estimates: Mapping[str, Estimate], title: str) -> Table:
     """Value, 95 % interval with sensor tolerances, unit, verdict and the remark's number."""
-    table = table_of(
+    table = make_table(
         title, "parameter", "value", "95 %", "unit", "verdict", right=("value", "95 %")
     )
-    numbers = _numbers(estimates)
+    numbers = _number_reasons(estimates)
     for estimate in estimates.values():
-        value, interval, unit = shown(estimate.value, estimate.ci95_total, estimate.unit)
+        value, interval, unit = format_estimate(estimate.value, estimate.ci95_total, estimate.unit)
         remark = f" ({numbers[estimate.reason]})" if estimate.reason else ""
         table.add_row(estimate.id, value, interval, unit, estimate.verdict.value + remark)
     return table
 
 
-def remarks(estimates: Mapping[str, Estimate]) -> list[str]:
+def list_remarks(estimates: Mapping[str, Estimate]) -> list[str]:
     """List the reasons of the verdicts as numbered lines, each reason once."""
-    return [f"({number}) {reason}" for reason, number in _numbers(estimates).items()]
+    return [f"({number}) {reason}" for reason, number in _number_reasons(estimates).items()]
 
 
-def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, int]:
+def _number_reasons(estimates: Mapping[str, Estimate]) -> dict[str, int]:
     """The different reasons, numbered from 1 in the order of the parameters."""
     reasons = dict.fromkeys(one.reason for one in estimates.values() if one.reason)
     return {reason: number for number, reason in enumerate(reasons, start=1)}
 
 
-def suggestion_table(suggestions: Sequence[Suggestion], estimates: Mapping[str, Estimate]) -> Table:
+def build_suggestion_table(
+    suggestions: Sequence[ExperimentRanking], estimates: Mapping[str, Estimate]
+) -> Table:
     """By parameter the experiment that would narrow it most, with the interval now and then."""
-    table = table_of(
+    table = make_table(
         "What would tell more", "parameter", "now", "experiment", "then", "unit",
         right=("now", "then"),
     )  # fmt: skip
     for one in suggestions:
         estimate = estimates[one.parameter]
         unit, best = estimate.unit, one.best
-        then = "" if best is None else around(estimate.value, best.half_width, unit)
-        now = around(estimate.value, one.half_width, unit)
-        table.add_row(one.parameter, now, one.text, then, shown(None, None, unit)[2])
+        then = "" if best is None else format_half_width(estimate.value, best.half_width, unit)
+        now = format_half_width(estimate.value, one.half_width, unit)
+        table.add_row(one.parameter, now, one.text, then, format_estimate(None, None, unit)[2])
     return table
 
 
-def friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
+def build_friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
     """μ with its 95 % band at the ends and in the middle of the slip range seen."""
-    table = table_of(
+    table = make_table(
         "Friction", "element", "slip rad/s", "μ", "95 %", right=("slip rad/s", "μ", "95 %")
     )
     for name, curve in friction.items():
         element = f"{name} ({curve.symbol})" if curve.over_eta else name
         for place, index in enumerate((0, curve.slip.size // 2, curve.slip.size - 1)):
             band = (float(curve.mu_lo[index]), float(curve.mu_hi[index]))
-            value, interval, _ = shown(float(curve.mu[index]), band, "1")
+            value, interval, _ = format_estimate(float(curve.mu[index]), band, "1")
             table.add_row(
                 element if place == 0 else "", f"{curve.slip[index]:.1f}", value, interval
             )
     return table
 
 
-def fit_table(fit: Mapping[str, Mapping[str, SignalFit]], title: str) -> Table:
+def build_fit_table(fit: Mapping[str, Mapping[str, SignalFit]], title: str) -> Table:
     """Fit in percent by phase, and the root mean square error over all of it."""
-    table = table_of(title, "fit %", *_PHASES, "rmse", right=(*_PHASES, "rmse"))
+    table = make_table(title, "fit %", *_PHASES, "rmse", right=(*_PHASES, "rmse"))
     for signal, phases in fit.items():
-        cells = [percent(phases[name].fit_percent if name in phases else None) for name in _PHASES]
+        cells = [
+            format_percent(phases[name].fit_percent if name in phases else None) for name in _PHASES
+        ]
         rmse = phases["all"].rmse if "all" in phases else None
-        unit = channel_unit(signal)
-        table.add_row(signal, *cells, quantity(rmse, unit))
+        unit = get_channel_unit(signal)
+        table.add_row(signal, *cells, format_quantity(rmse, unit))
     return table

@@ -23,7 +23,7 @@ class Remaining:
         self._what = ""
         self._end = self._start
 
-    def hear(self, share: float, what: str) -> None:
+    def update(self, share: float, what: str) -> None:
         """Listener of the computation, see `drivetwin._util.progress`."""
         if share > self._share:
             now = self._clock()
@@ -36,12 +36,12 @@ class Remaining:
             return self._text
         doing = f"{self._text}, {self._what}" if self._what else self._text
         if not _EARLY <= self._share < 1.0:
-            return f"{doing}: {duration(now - self._start)}"
-        left = duration(max(self._end - now, 0.0))
+            return f"{doing}: {format_duration(now - self._start)}"
+        left = format_duration(max(self._end - now, 0.0))
         return f"{doing}: {100.0 * self._share:.0f} %, about {left} left"
 
 
-def duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Rounded to what a waiting person needs: seconds, minutes, hours."""
     if seconds < 60.0:
         return f"{max(1, round(seconds))} s"

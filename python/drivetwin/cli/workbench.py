@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.output import note, say
+from drivetwin.cli.output import print_line, print_paragraph
 from drivetwin.errors import MissingExtraError
 
 if TYPE_CHECKING:
@@ -46,23 +46,23 @@ def workbench(
     """
     _require_dash()
     from drivetwin.workbench.access_control import is_loopback
-    from drivetwin.workbench.server import build, listen
+    from drivetwin.workbench.server import build_server, start_server
     from drivetwin.workbench.workspace_folder import Folder
 
-    place = Folder.at(folder)
-    app, sessions = build(place, _start(place, log, vehicle, channels), host)
-    server = listen(app, host, port)
+    place = Folder.from_path(folder)
+    app, sessions = build_server(place, _make_start(place, log, vehicle, channels), host)
+    server = start_server(app, host, port)
     shown = f"[{host}]" if ":" in host else host
     address = f"http://{shown}:{server.port}/"
-    say(f"workbench at {address}, files of {place.root}; Ctrl-C ends it")
+    print_line(f"workbench at {address}, files of {place.root}; Ctrl-C ends it")
     if not is_loopback(host):
-        note(
+        print_paragraph(
             "warning: every machine that reaches this address can read and write files of this "
             "folder; there is no password"
         )
     if browser:
         typer.launch(address)
-    signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGTERM, _stop_on_signal)
     try:
         server.serve_forever()
     finally:
@@ -70,7 +70,7 @@ def workbench(
         sessions.close()
 
 
-def _end(*_: object) -> None:
+def _stop_on_signal(*_: object) -> None:
     """End as after Ctrl-C: jobs stopped, temporary files removed."""
     raise SystemExit(0)
 
@@ -84,7 +84,7 @@ def _require_dash() -> None:
         ) from None
 
 
-def _start(place: Folder, log: Path | None, card: Path | None, mapping: Path | None) -> Start:
+def _make_start(place: Folder, log: Path | None, card: Path | None, mapping: Path | None) -> Start:
     """The files of the command line, as far as the folder holds them. Raises RefusedError."""
     from drivetwin.workbench.session_state import Source
     from drivetwin.workbench.views.page import Start
@@ -92,7 +92,7 @@ def _start(place: Folder, log: Path | None, card: Path | None, mapping: Path | N
     def source(path: Path | None) -> Source | None:
         if path is None:
             return None
-        found = place.file(str(path.resolve()))
-        return Source(place.name_of(found), found)
+        found = place.get_file(str(path.resolve()))
+        return Source(place.get_name(found), found)
 
     return Start(source(log), source(card), mapping)

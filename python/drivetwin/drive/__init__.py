@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.drive.load import builtin_powertrains, load_powertrain, suited_powertrain
+from drivetwin.drive.load import list_builtin_powertrains, load_powertrain, select_powertrain
 from drivetwin.drive.plan import (
     Leg,
     LockUp,
@@ -11,9 +11,9 @@ from drivetwin.drive.plan import (
     ShiftTo,
     Until,
     Watched,
-    all_kinds,
-    coast_down,
-    launch,
+    plan_all_shift_kinds,
+    plan_coast_down,
+    plan_launch,
 )
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.result import DriveRun
@@ -28,11 +28,11 @@ __all__ = [
     "ShiftTo",
     "Until",
     "Watched",
-    "all_kinds",
-    "builtin_powertrains",
-    "coast_down",
-    "launch",
+    "list_builtin_powertrains",
     "load_powertrain",
+    "plan_all_shift_kinds",
+    "plan_coast_down",
+    "plan_launch",
     "run",
-    "suited_powertrain",
+    "select_powertrain",
 ]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from drivetwin._util.toml import did_you_mean, raise_faults, read_toml, schema_faults
+from drivetwin._util.toml import raise_faults, read_toml, suggest_spelling, validate_schema
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schema import PowertrainFile
 from drivetwin.errors import CardError
@@ -15,12 +15,12 @@ from drivetwin.gearbox import Gearbox
 _FILES = Path(__file__).parent / "powertrains"
 
 
-def builtin_powertrains() -> tuple[str, ...]:
+def list_builtin_powertrains() -> tuple[str, ...]:
     """Names of the built-in powertrains, in alphabetical order."""
     return tuple(sorted(path.stem for path in _FILES.glob("*.toml")))
 
 
-def suited_powertrain(gearbox: Gearbox) -> str:
+def select_powertrain(gearbox: Gearbox) -> str:
     """Return the built-in powertrain whose engine is nearest in torque to that of the card.
 
     Raises CardError where the gearbox card has no [drive].
@@ -30,23 +30,23 @@ def suited_powertrain(gearbox: Gearbox) -> str:
     def distance(name: str) -> float:
         return abs(math.log(max(load_powertrain(name).engine.full) / torque))
 
-    return min(builtin_powertrains(), key=distance)
+    return min(list_builtin_powertrains(), key=distance)
 
 
 def load_powertrain(file: Path | str) -> Powertrain:
     """Read a powertrain file; raises CardError that lists all faults by key path."""
-    known = builtin_powertrains()
+    known = list_builtin_powertrains()
     path = _FILES / f"{file}.toml" if str(file) in known else Path(file)
     if not path.suffix and not path.exists():
         raise CardError(
-            f"no built-in powertrain {str(file)!r}{did_you_mean(str(file), known)}",
+            f"no built-in powertrain {str(file)!r}{suggest_spelling(str(file), known)}",
             f"give a path to a file, or one of {', '.join(known)}",
         )
     document = read_toml(path, CardError)
     raise_faults(
-        schema_faults(document, PowertrainFile),
+        validate_schema(document, PowertrainFile),
         CardError,
         str(file),
         "correct these keys of the powertrain file; docs/howto/drive.md describes them",
     )
-    return PowertrainFile.model_validate(document).spec()
+    return PowertrainFile.model_validate(document).to_spec()

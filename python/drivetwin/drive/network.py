@@ -12,9 +12,9 @@ from dataclasses import asdict
 
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.errors import InputError
-from drivetwin.gearbox import Drive, Gearbox, gear_statics, network_elements
+from drivetwin.gearbox import Drive, Gearbox, build_network_elements, solve_gear
 from drivetwin.gearbox.spec import ElementKind
-from drivetwin.simulation.network import Element, Output, Start, element
+from drivetwin.simulation.network import Element, Output, Start, build_element
 
 CRANK, AXLE, WHEEL = "crankshaft", "axle beyond the shaft", "wheel of the vehicle"
 SHAFT, ROAD = "shaft to the axle", "rolling resistance"
@@ -24,7 +24,7 @@ and the brake torque [N m]."""
 PEDAL = "pedal"
 
 
-def driveline_elements(gearbox: Gearbox, powertrain: Powertrain) -> list[Element]:
+def build_driveline_elements(gearbox: Gearbox, powertrain: Powertrain) -> list[Element]:
     """Return the elements; inputs are PEDAL, BRAKE and the pressures by element.
 
     Raises CardError where the gearbox card has no [drive], InputError where it has dogs, which
@@ -38,27 +38,27 @@ def driveline_elements(gearbox: Gearbox, powertrain: Powertrain) -> list[Element
             "choose a gearbox whose gears are made by clutches and brakes alone",
         )
     return [
-        *_engine(powertrain, drive),
-        *_converter(powertrain, gearbox.input),
-        *network_elements(gearbox),
-        *_vehicle(powertrain, drive, gearbox.output),
+        *_build_engine(powertrain, drive),
+        *_build_converter(powertrain, gearbox.input),
+        *build_network_elements(gearbox),
+        *_build_vehicle(powertrain, drive, gearbox.output),
     ]
 
 
-def _engine(powertrain: Powertrain, drive: Drive) -> list[Element]:
+def _build_engine(powertrain: Powertrain, drive: Drive) -> list[Element]:
     engine = powertrain.engine
     table = {"throttle": [0.0, 1.0], "speed": engine.speed, "torque": [engine.closed, engine.full]}
     return [
-        element("inertia", "engine", node=CRANK, inertia=drive.engine_inertia),
-        element("engine_map", "map", node=CRANK, throttle=PEDAL, lag=engine.lag, map=table),
+        build_element("inertia", "engine", node=CRANK, inertia=drive.engine_inertia),
+        build_element("engine_map", "map", node=CRANK, throttle=PEDAL, lag=engine.lag, map=table),
     ]
 
 
-def _converter(powertrain: Powertrain, turbine: str) -> list[Element]:
+def _build_converter(powertrain: Powertrain, turbine: str) -> list[Element]:
     table, clutch = asdict(powertrain.converter), powertrain.lock_up
     return [
-        element("torque_converter", "converter", pump=CRANK, turbine=turbine, map=table),
-        element(
+        build_element("torque_converter", "converter", pump=CRANK, turbine=turbine, map=table),
+        build_element(
             "clutch",
             LOCK_UP,
             a=CRANK,
@@ -73,16 +73,18 @@ def _converter(powertrain: Powertrain, turbine: str) -> list[Element]:
     ]
 
 
-def _vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]:
+def _build_vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]:
     road = asdict(powertrain.road)
     # A disc brake by its torque: unit gain and friction make the input a capacity in N m.
     unit = {"slip": [0.0], "mu": [1.0]}
     return [
-        element("spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o),
-        element("gear", "final drive", a=AXLE, b=WHEEL, ratio=drive.i_f),
-        element("inertia", "vehicle", node=WHEEL, inertia=drive.vehicle_inertia),
-        element("road_load", ROAD, node=WHEEL, **road),
-        element(
+        build_element(
+            "spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o
+        ),
+        build_element("gear", "final drive", a=AXLE, b=WHEEL, ratio=drive.i_f),
+        build_element("inertia", "vehicle", node=WHEEL, inertia=drive.vehicle_inertia),
+        build_element("road_load", ROAD, node=WHEEL, **road),
+        build_element(
             "clutch",
             BRAKE,
             a=WHEEL,
@@ -97,29 +99,29 @@ def _vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]
     ]
 
 
-def standstill(gearbox: Gearbox, gear: str, powertrain: Powertrain) -> Start:
+def build_standstill(gearbox: Gearbox, gear: str, powertrain: Powertrain) -> Start:
     """Return the vehicle at rest in `gear`, the engine idling against the converter.
 
     The shaft is twisted by what the turbine pulls, else the drive would begin with a jerk.
     """
-    idle, statics = powertrain.engine.idle, gear_statics(gearbox, gear)
+    idle, statics = powertrain.engine.idle, solve_gear(gearbox, gear)
     members: Mapping[str, float | None] = statics.speeds
     speeds = dict.fromkeys(members, 0.0)
-    locked = (*gearbox.gear(gear).elements, ROAD, BRAKE)
-    pull = float(powertrain.converter.turbine_torque(idle, 0.0)) * statics.ratio
+    locked = (*gearbox.get_gear(gear).elements, ROAD, BRAKE)
+    pull = float(powertrain.converter.compute_turbine_torque(idle, 0.0)) * statics.ratio
     twists = {SHAFT: pull / gearbox.require_drive().k_o}
     return Start(speeds | {CRANK: idle, WHEEL: 0.0}, twists, locked)
 
 
-def friction_elements(gearbox: Gearbox) -> tuple[str, ...]:
+def list_friction_elements(gearbox: Gearbox) -> tuple[str, ...]:
     """Names of the lock-up clutch and the gearbox's shift elements."""
     return (LOCK_UP, *gearbox.elements)
 
 
-def recorded(gearbox: Gearbox) -> Sequence[Output]:
+def list_outputs(gearbox: Gearbox) -> Sequence[Output]:
     """List the outputs of a drive: speeds, shaft torque, slip and torque of all shift elements."""
     nodes = (CRANK, gearbox.input, gearbox.output, WHEEL)
-    elements = friction_elements(gearbox)
+    elements = list_friction_elements(gearbox)
     return [
         *(("speed", node) for node in nodes),
         ("shaft_torque", SHAFT),

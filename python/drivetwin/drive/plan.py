@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from drivetwin.drive.powertrain import Control
 from drivetwin.errors import InputError
-from drivetwin.gearbox import Gearbox, gear_statics
+from drivetwin.gearbox import Gearbox, solve_gear
 
 
 class Watched(StrEnum):
@@ -97,20 +97,20 @@ _CRUISE = 2.0
 """Time between two manoeuvres, s: the shaft oscillation has died away."""
 
 
-def forward_gears(gearbox: Gearbox) -> tuple[str, ...]:
+def list_forward_gears(gearbox: Gearbox) -> tuple[str, ...]:
     """Names of the forward gears from low to high."""
-    ratios = {gear.name: gear_statics(gearbox, gear.name).ratio for gear in gearbox.gears}
+    ratios = {gear.name: solve_gear(gearbox, gear.name).ratio for gear in gearbox.gears}
     forward = [name for name, ratio in ratios.items() if ratio > 0.0]
     return tuple(sorted(forward, key=lambda name: -ratios[name]))
 
 
-def launch(gearbox: Gearbox, control: Control, pedal: float = LAUNCH_PEDAL) -> Plan:
+def plan_launch(gearbox: Gearbox, control: Control, pedal: float = LAUNCH_PEDAL) -> Plan:
     """From standstill through all gears under power.
 
     First to second gear with the converter, lock-up in second, the other up-shifts locked up.
     Raises InputError for a gearbox of fewer than three forward gears.
     """
-    gears = forward_gears(gearbox)
+    gears = list_forward_gears(gearbox)
     if len(gears) < 3:
         raise InputError(
             f"{gearbox.name} has {len(gears)} forward gears",
@@ -126,12 +126,12 @@ def launch(gearbox: Gearbox, control: Control, pedal: float = LAUNCH_PEDAL) -> P
     )
 
 
-def coast_down(gearbox: Gearbox, control: Control) -> Plan:
+def plan_coast_down(gearbox: Gearbox, control: Control) -> Plan:
     """From the highest gear down to first, pedal closed, with the service brake.
 
     The lock-up clutch opens in second gear.
     """
-    gears = forward_gears(gearbox)
+    gears = list_forward_gears(gearbox)
     low = Until(Watched.INPUT_SPEED, control.downshift, falling=True)
     slow = Until(Watched.INPUT_SPEED, control.release, falling=True)
     slower = Until(Watched.INPUT_SPEED, 0.75 * control.release, falling=True)
@@ -143,14 +143,14 @@ def coast_down(gearbox: Gearbox, control: Control) -> Plan:
     )
 
 
-def all_kinds(gearbox: Gearbox, control: Control) -> Plan:
+def plan_all_shift_kinds(gearbox: Gearbox, control: Control) -> Plan:
     """All four kinds of shift: launch, kick-down, up-shift with closed pedal, coast-down."""
-    gears = forward_gears(gearbox)
+    gears = list_forward_gears(gearbox)
     return (
-        *launch(gearbox, control),
+        *plan_launch(gearbox, control),
         Leg(1.0, Until(Watched.TIME, _KICK_DOWN), ShiftTo(gears[-2])),
         Leg(1.0, Until(Watched.TIME, _LIFT)),
         Leg(0.0, Until(Watched.TIME, _LIFT), ShiftTo(gears[-1])),
         Leg(0.0, Until(Watched.TIME, _CRUISE)),
-        *coast_down(gearbox, control),
+        *plan_coast_down(gearbox, control),
     )

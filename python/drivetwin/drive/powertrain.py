@@ -27,13 +27,15 @@ class Engine:
     lag: float
     idle: float
 
-    def steady(self, pedal: FloatArray | float, speed: FloatArray | float) -> FloatArray:
+    def compute_steady_torque(
+        self, pedal: FloatArray | float, speed: FloatArray | float
+    ) -> FloatArray:
         """Torque [N m] that the map asks for at pedal positions and speeds of one shape."""
         low = np.interp(speed, self.speed, self.closed)
         high = np.interp(speed, self.speed, self.full)
         return np.asarray(low + pedal * (high - low), dtype=np.float64)
 
-    def lagged(self, time: FloatArray, steady: FloatArray) -> FloatArray:
+    def apply_lag(self, time: FloatArray, steady: FloatArray) -> FloatArray:
         """Torque (n,) [N m] behind `steady` (n,) at evenly spaced `time` (n,) [s], from 0.
 
         The lag is solved exactly for a demand that is linear between the samples.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.drive.network import BRAKE, CRANK, PEDAL, SHAFT, WHEEL, friction_elements
+from drivetwin.drive.network import BRAKE, CRANK, PEDAL, SHAFT, WHEEL, list_friction_elements
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schedule import Schedule
 from drivetwin.gearbox import Gearbox
@@ -68,10 +68,10 @@ class DriveRun:
     """A drive; arrays (n,) on `time` [s], SI.
 
     `engine_torque` is that of the lagging map, `brake_torque` what the service brake can hold;
-    `speed_ratio` and `torque_ratio` are the converter's and `turbine_torque` what it gives to the
-    gearbox; `slip`, `torque`, `pressure` go by element. `work` is the friction work of each element
-    over the whole drive [J]; `warnings` name elements that slip outside their shifts, and
-    different vehicle inertias of gearbox card and powertrain.
+    `estimate_speed_ratio` and `torque_ratio` are the converter's and `compute_turbine_torque` what
+    it gives to the gearbox; `slip`, `torque`, `pressure` go by element. `work` is the friction work
+    of each element over the whole drive [J]; `warnings` name elements that slip outside their
+    shifts, and different vehicle inertias of gearbox card and powertrain.
     """
 
     time: FloatArray
@@ -96,7 +96,7 @@ class DriveRun:
     warnings: tuple[str, ...]
 
 
-def observe(
+def build_drive_run(
     gearbox: Gearbox,
     powertrain: Powertrain,
     schedule: Schedule,
@@ -109,9 +109,9 @@ def observe(
         raise ValueError("the motion has not been audited")
     crank, turbine = columns["speed", CRANK], columns["speed", gearbox.input]
     engine, converter = powertrain.engine, powertrain.converter
-    pedal = schedule.at(PEDAL, time)
-    torque_ratio = converter.ratio(crank, turbine)
-    elements = friction_elements(gearbox)
+    pedal = schedule.evaluate(PEDAL, time)
+    torque_ratio = converter.compute_torque_ratio(crank, turbine)
+    elements = list_friction_elements(gearbox)
     slip = {name: columns["slip", name] for name in elements}
     torque = {name: columns["friction_torque", name] for name in elements}
     power = {name: slip[name] * torque[name] for name in elements}
@@ -122,28 +122,30 @@ def observe(
         input_speed=turbine,
         output_speed=columns["speed", gearbox.output],
         wheel_speed=columns["speed", WHEEL],
-        engine_torque=engine.lagged(time, engine.steady(pedal, crank)),
+        engine_torque=engine.apply_lag(time, engine.compute_steady_torque(pedal, crank)),
         shaft_torque=shaft_torque,
         pedal=pedal,
-        brake_torque=schedule.at(BRAKE, time),
+        brake_torque=schedule.evaluate(BRAKE, time),
         speed_ratio=turbine / crank,
         torque_ratio=torque_ratio,
-        turbine_torque=converter.turbine_torque(crank, turbine),
+        turbine_torque=converter.compute_turbine_torque(crank, turbine),
         slip=slip,
         torque=torque,
-        pressure={name: schedule.at(name, time) for name in elements},
-        maneuvers=tuple(_maneuver(each, motion, power) for each in actions),
+        pressure={name: schedule.evaluate(name, time) for name in elements},
+        maneuvers=tuple(_build_maneuver(each, motion, power) for each in actions),
         work={name: float(np.trapezoid(power[name], time)) for name in elements},
         events=motion.events,
         audit=audit,
         warnings=(
-            *_two_vehicles(gearbox, powertrain),
-            *_unwanted_slip(elements, actions, motion.events),
+            *_warn_vehicle_mismatch(gearbox, powertrain),
+            *_warn_unwanted_slip(elements, actions, motion.events),
         ),
     )
 
 
-def _maneuver(action: Action, motion: NetworkRun, power: Mapping[str, FloatArray]) -> Maneuver:
+def _build_maneuver(
+    action: Action, motion: NetworkRun, power: Mapping[str, FloatArray]
+) -> Maneuver:
     inside = slice(*np.searchsorted(motion.time, (action.start, action.end), side="right"))
     shaft_torque = motion.columns["shaft_torque", SHAFT][inside]
     events = [event for event in motion.events if action.start <= event.time <= action.end]
@@ -168,7 +170,7 @@ def _maneuver(action: Action, motion: NetworkRun, power: Mapping[str, FloatArray
     )
 
 
-def _two_vehicles(gearbox: Gearbox, powertrain: Powertrain) -> tuple[str, ...]:
+def _warn_vehicle_mismatch(gearbox: Gearbox, powertrain: Powertrain) -> tuple[str, ...]:
     """One sentence where the card's vehicle inertia is not that of the powertrain's mass."""
     inertia, mass = gearbox.require_drive().vehicle_inertia, powertrain.mass_inertia
     if _OF_MASS[0] <= inertia / mass <= _OF_MASS[1]:
@@ -180,7 +182,7 @@ def _two_vehicles(gearbox: Gearbox, powertrain: Powertrain) -> tuple[str, ...]:
     )
 
 
-def _unwanted_slip(
+def _warn_unwanted_slip(
     elements: Sequence[str], actions: Sequence[Action], events: Sequence[Event]
 ) -> tuple[str, ...]:
     """One sentence for each element that breaks away outside the actions it takes part in."""

@@ -15,21 +15,29 @@ from functools import cache
 
 import numpy as np
 
-from drivetwin._util.progress import tell
+from drivetwin._util.progress import notify_progress
 from drivetwin.drive.network import (
     BRAKE,
     CRANK,
     LOCK_UP,
     PEDAL,
-    driveline_elements,
-    recorded,
-    standstill,
+    build_driveline_elements,
+    build_standstill,
+    list_outputs,
 )
-from drivetwin.drive.plan import LONGEST_LEG, Leg, LockUp, Plan, ShiftTo, Watched, forward_gears
+from drivetwin.drive.plan import (
+    LONGEST_LEG,
+    Leg,
+    LockUp,
+    Plan,
+    ShiftTo,
+    Watched,
+    list_forward_gears,
+)
 from drivetwin.drive.powertrain import Powertrain
-from drivetwin.drive.result import Action, DriveRun, observe
+from drivetwin.drive.result import Action, DriveRun, build_drive_run
 from drivetwin.drive.schedule import Knots, Schedule
-from drivetwin.drive.shift import CLOSE, FILL, OPEN, RAMP, ShiftPlan, pressure
+from drivetwin.drive.shift import CLOSE, FILL, OPEN, RAMP, ShiftPlan, compute_pressure
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, Reduction, reduce
 from drivetwin.simulation.dual_clutch import FloatArray
@@ -63,15 +71,15 @@ def run(gearbox: Gearbox, powertrain: Powertrain, plan: Plan) -> DriveRun:
     if not plan:
         raise InputError("the plan has no legs", "give at least one leg, with pedal and end")
     driver = _Driver(gearbox, powertrain)
-    state = driver.begin(plan[0])
+    state = driver.start_drive(plan[0])
     for count, leg in enumerate(plan):
-        tell(count / (len(plan) + 1))
-        state = driver.drive(leg, state)
-    motion = driver.simulate(state.schedule, _grid(0, round(state.time / STEP)), audit=True)
-    return observe(gearbox, powertrain, state.schedule, state.actions, motion)
+        notify_progress(count / (len(plan) + 1))
+        state = driver.run_leg(leg, state)
+    motion = driver.simulate(state.schedule, _build_grid(0, round(state.time / STEP)), audit=True)
+    return build_drive_run(gearbox, powertrain, state.schedule, state.actions, motion)
 
 
-def _grid(first: int, last: int) -> FloatArray:
+def _build_grid(first: int, last: int) -> FloatArray:
     """Sample times from one index to another, both included [s]."""
     return np.asarray(np.arange(first, last + 1) * STEP, dtype=np.float64)
 
@@ -93,15 +101,15 @@ class _Driver:
     def __init__(self, gearbox: Gearbox, powertrain: Powertrain) -> None:
         self.gearbox = gearbox
         self.powertrain = powertrain
-        self.elements = driveline_elements(gearbox, powertrain)
-        self.first = forward_gears(gearbox)[0]
-        self.start = standstill(gearbox, self.first, powertrain)
-        self.outputs = recorded(gearbox)
+        self.elements = build_driveline_elements(gearbox, powertrain)
+        self.first = list_forward_gears(gearbox)[0]
+        self.start = build_standstill(gearbox, self.first, powertrain)
+        self.outputs = list_outputs(gearbox)
         self.reduced = cache(lambda old, new: reduce(gearbox, old, new))
 
-    def begin(self, leg: Leg) -> _State:
+    def start_drive(self, leg: Leg) -> _State:
         """Standstill in the lowest gear with the first leg's pedal and brake."""
-        engaged = self.gearbox.gear(self.first).elements
+        engaged = self.gearbox.get_gear(self.first).elements
         main = self.powertrain.control.main
         levels = {name: main if name in engaged else OPEN for name in self.gearbox.elements}
         levels |= {LOCK_UP: OPEN, PEDAL: leg.pedal, BRAKE: leg.brake}
@@ -110,7 +118,7 @@ class _Driver:
 
     def simulate(self, schedule: Schedule, time: FloatArray, *, audit: bool = False) -> NetworkRun:
         """Return the motion at `time` (n,) [s], which begins with 0."""
-        inputs = schedule.signals(float(time[-1]))
+        inputs = schedule.to_signals(float(time[-1]))
         motion = simulate(self.elements, inputs, self.start, time, self.outputs, audit=audit)
         if motion.status != "completed":
             raise SimulationError(
@@ -119,27 +127,27 @@ class _Driver:
             )
         return motion
 
-    def drive(self, leg: Leg, state: _State) -> _State:
+    def run_leg(self, leg: Leg, state: _State) -> _State:
         """One leg and its action."""
-        schedule = state.schedule.go(PEDAL, state.time, (_PEDAL_RAMP, leg.pedal))
-        schedule = schedule.go(BRAKE, state.time, (_PEDAL_RAMP, leg.brake))
+        schedule = state.schedule.add_knots(PEDAL, state.time, (_PEDAL_RAMP, leg.pedal))
+        schedule = schedule.add_knots(BRAKE, state.time, (_PEDAL_RAMP, leg.brake))
         state = _State(state.time, state.gear, state.locked_up, schedule, state.actions)
-        end, now = self._end_of(leg, state)
+        end, now = self._find_leg_end(leg, state)
         match leg.then:
             case ShiftTo(gear):
-                return self._shift(gear, leg, state, end, now)
+                return self._run_shift(gear, leg, state, end, now)
             case LockUp(closed):
-                return self._lock_up(closed, leg, state, end, now)
+                return self._run_lock_up(closed, leg, state, end, now)
             case None:
                 return _State(end, state.gear, state.locked_up, schedule, state.actions)
 
-    def _end_of(self, leg: Leg, state: _State) -> tuple[float, Mapping[Output, float]]:
+    def _find_leg_end(self, leg: Leg, state: _State) -> tuple[float, Mapping[Output, float]]:
         """Time at which the leg's condition is met, and the motion then."""
         until = leg.until
         ahead = until.value if until.watched is Watched.TIME else _LOOK_AHEAD
         while ahead <= LONGEST_LEG:
-            time, motion = self._look(state.schedule, state.time, ahead)
-            value = self._watched(until.watched, time - state.time, motion)
+            time, motion = self._simulate_ahead(state.schedule, state.time, ahead)
+            value = self._compute_watched(until.watched, time - state.time, motion)
             met = value <= until.value if until.falling else value >= until.value - 0.5 * STEP
             if met.any():
                 at = int(np.argmax(met))
@@ -151,17 +159,17 @@ class _Driver:
             "change pedal, brake or threshold of the leg, or the road load",
         )
 
-    def _look(
+    def _simulate_ahead(
         self, schedule: Schedule, start: float, ahead: float
     ) -> tuple[FloatArray, Mapping[Output, FloatArray]]:
         """Samples (n,) from `start` [s] on, and the columns over them."""
         first, last = round(start / STEP), round((start + ahead) / STEP)
-        time = _grid(first, last)
+        time = _build_grid(first, last)
         grid = time if first == 0 else np.concatenate([np.zeros(1), time])
         motion = self.simulate(schedule, grid)
         return time, {key: column[-time.size :] for key, column in motion.columns.items()}
 
-    def _watched(
+    def _compute_watched(
         self, what: Watched, elapsed: FloatArray, motion: Mapping[Output, FloatArray]
     ) -> FloatArray:
         turbine = motion["speed", self.gearbox.input]
@@ -173,12 +181,12 @@ class _Driver:
             case Watched.SPEED_RATIO:
                 return turbine / motion["speed", CRANK]
 
-    def _shift(
+    def _run_shift(
         self, gear: str, leg: Leg, state: _State, start: float, now: Mapping[Output, float]
     ) -> _State:
         plan = self._plan(self.reduced(state.gear, gear), leg, state.locked_up, (start, now))
-        schedule = plan.begin(state.schedule)
-        time, motion = self._look(schedule, plan.filled, _LONGEST_SHIFT)
+        schedule = plan.add_opening(state.schedule)
+        time, motion = self._simulate_ahead(schedule, plan.filled, _LONGEST_SHIFT)
         slip = motion["slip", plan.reduction.on_coming.element]
         side = np.sign(now["slip", plan.reduction.on_coming.element])
         reached = slip * side <= _NO_SLIP
@@ -209,11 +217,11 @@ class _Driver:
         old, new = reduction.off_going, reduction.on_coming
         swing = new.ratio * now["speed", self.gearbox.output] - turbine
         if locked_up:
-            torque = float(self.powertrain.engine.steady(leg.pedal, crank))
+            torque = float(self.powertrain.engine.compute_steady_torque(leg.pedal, crank))
         else:
             converter = self.powertrain.converter
             after = (crank, turbine + swing)
-            torque = float(converter.turbine_torque(*after))
+            torque = float(converter.compute_turbine_torque(*after))
         return ShiftPlan(
             reduction=reduction,
             drive=drive,
@@ -226,23 +234,27 @@ class _Driver:
             main=self.powertrain.control.main,
         )
 
-    def _lock_up(
+    def _run_lock_up(
         self, closed: bool, leg: Leg, state: _State, start: float, now: Mapping[Output, float]
     ) -> _State:
         points: Knots = ((CLOSE, OPEN),)
         if closed:
-            points = self._closing(leg.pedal, now)
-        schedule = state.schedule.go(LOCK_UP, start, *points)
+            points = self._plan_closing(leg.pedal, now)
+        schedule = state.schedule.add_knots(LOCK_UP, start, *points)
         done = start + points[-1][0]
         label, elements = ("lock-up", (None, LOCK_UP)) if closed else ("release", (LOCK_UP, None))
         action = Action(label, "converter", start, done, *elements)
         return _State(done, state.gear, closed, schedule, (*state.actions, action))
 
-    def _closing(self, pedal: float, now: Mapping[Output, float]) -> Knots:
+    def _plan_closing(self, pedal: float, now: Mapping[Output, float]) -> Knots:
         """Pressures of the lock-up clutch: it takes the engine torque over, locks, is held."""
         clutch = self.powertrain.lock_up
-        torque = float(self.powertrain.engine.steady(pedal, now["speed", self.gearbox.input]))
-        carrying = pressure(clutch, _LOCK_UP_MARGIN * abs(torque), abs(now["slip", LOCK_UP]))
+        torque = float(
+            self.powertrain.engine.compute_steady_torque(pedal, now["speed", self.gearbox.input])
+        )
+        carrying = compute_pressure(
+            clutch, _LOCK_UP_MARGIN * abs(torque), abs(now["slip", LOCK_UP])
+        )
         taken = FILL + _LOCK_UP_RAMP
         held = taken + _LOCK_UP_HOLD
         main = self.powertrain.control.main

@@ -19,11 +19,11 @@ class Schedule:
 
     knots: Mapping[str, Knots]
 
-    def value(self, name: str) -> float:
+    def get_last_value(self, name: str) -> float:
         """Return the last value decided for an input."""
         return self.knots[name][-1][1]
 
-    def go(self, name: str, start: float, *points: tuple[float, float]) -> Schedule:
+    def add_knots(self, name: str, start: float, *points: tuple[float, float]) -> Schedule:
         """Keep an input until `start` [s], then lead it through `points` (time after start, value).
 
         What was decided beyond `start` is replaced: the input leaves from where it is then.
@@ -34,12 +34,12 @@ class Schedule:
         new = tuple((start + after, value) for after, value in points)
         return Schedule({**self.knots, name: (*kept, (start, here), *new)})
 
-    def at(self, name: str, time: FloatArray) -> FloatArray:
+    def evaluate(self, name: str, time: FloatArray) -> FloatArray:
         """Values (n,) of an input at `time` (n,) [s]."""
         knots, values = np.transpose(self.knots[name])
         return np.asarray(np.interp(time, knots, values), dtype=np.float64)
 
-    def signals(self, end: float) -> dict[str, Signal]:
+    def to_signals(self, end: float) -> dict[str, Signal]:
         """Return all inputs from 0 to `end` [s]."""
         found = {}
         for name, knots in self.knots.items():

@@ -24,7 +24,7 @@ GRAVITY = 9.81
 Positive = Annotated[float, Field(gt=0)]
 
 
-def _increases(values: list[float]) -> bool:
+def _check_increasing(values: list[float]) -> bool:
     return all(a < b for a, b in pairwise(values))
 
 
@@ -46,11 +46,11 @@ class EngineTable(StrictModel):
     def _fits(self) -> EngineTable:
         if not len(self.speed_rpm) == len(self.full_load_Nm) == len(self.motoring_Nm):
             raise ValueError("speed_rpm, full_load_Nm and motoring_Nm have as many entries")
-        if not _increases(self.speed_rpm):
+        if not _check_increasing(self.speed_rpm):
             raise ValueError("speed_rpm must increase")
         return self
 
-    def spec(self) -> Engine:
+    def to_spec(self) -> Engine:
         """Return the engine in SI, its closed-pedal line with the idle governor."""
         low, high = self.idle_rpm - self.governor_rpm, self.idle_rpm + self.governor_rpm
         speed = np.union1d(self.speed_rpm, [low, self.idle_rpm, high])
@@ -85,7 +85,7 @@ class LockUpTable(StrictModel):
     v_s_rad_s: Positive
     mu_v_s: float = 0.0
 
-    def spec(self) -> Capacity:
+    def to_spec(self) -> Capacity:
         """Return what the clutch transmits, in SI."""
         gain = self.surfaces * self.derating * self.area_m2 * self.radius_m
         lining = Stribeck(self.mu_c, self.mu_s, self.v_s_rad_s, self.mu_v_s)
@@ -101,7 +101,7 @@ class RoadTable(StrictModel):
     cda_m2: Annotated[float, Field(ge=0)]
     grade: float = 0.0
 
-    def spec(self) -> RoadLoad:
+    def to_spec(self) -> RoadLoad:
         """Return the torques at the wheel."""
         weight = self.mass_kg * GRAVITY * self.radius_m
         slope = math.atan(self.grade)
@@ -123,7 +123,7 @@ class ControlTable(StrictModel):
     main_bar: Positive
     brake_Nm: Annotated[float, Field(ge=0)]
 
-    def spec(self) -> Control:
+    def to_spec(self) -> Control:
         """Return the thresholds in SI."""
         return Control(
             upshift=self.upshift_rpm * RPM,
@@ -147,15 +147,15 @@ class PowertrainFile(StrictModel):
     road: RoadTable
     control: ControlTable
 
-    def spec(self) -> Powertrain:
+    def to_spec(self) -> Powertrain:
         """Return the powertrain in SI."""
         return Powertrain(
             name=self.name,
             source=self.source,
-            engine=self.engine.spec(),
-            converter=self.converter.spec(),
-            lock_up=self.lock_up.spec(),
-            road=self.road.spec(),
+            engine=self.engine.to_spec(),
+            converter=self.converter.to_spec(),
+            lock_up=self.lock_up.to_spec(),
+            road=self.road.to_spec(),
             mass_inertia=self.road.mass_kg * self.road.radius_m**2,
-            control=self.control.spec(),
+            control=self.control.to_spec(),
         )

@@ -70,63 +70,65 @@ class ShiftPlan:
         """Time at which the on-coming element is filled [s]."""
         return self.start + FILL
 
-    def begin(self, schedule: Schedule) -> Schedule:
+    def add_opening(self, schedule: Schedule) -> Schedule:
         """Add the pressures up to the inertia phase, which they keep."""
         old, new = self.reduction.off_going, self.reduction.on_coming
-        off, on = self._capacities()
-        hold = min(pressure(off, MARGIN * abs(self.held) * old.i_c, 0.0), self.main)
-        schedule = schedule.go(old.element, self.start, (FILL, hold))
-        schedule = schedule.go(new.element, self.start, (FILL, on.P0))
+        off, on = self._get_capacities()
+        hold = min(compute_pressure(off, MARGIN * abs(self.held) * old.i_c, 0.0), self.main)
+        schedule = schedule.add_knots(old.element, self.start, (FILL, hold))
+        schedule = schedule.add_knots(new.element, self.start, (FILL, on.P0))
         if self.torque_first:
             phase = self.drive.torque_phase
-            handed = pressure(on, abs(self.held) * new.i_c, self.slip)
-            schedule = schedule.go(old.element, self.filled, (phase, off.P0), (phase + RAMP, OPEN))
-            pulling = self._pulling(phase)
-            return schedule.go(new.element, self.filled, (phase, handed), *pulling)
-        taken = self._taken(1.0)
+            handed = compute_pressure(on, abs(self.held) * new.i_c, self.slip)
+            schedule = schedule.add_knots(
+                old.element, self.filled, (phase, off.P0), (phase + RAMP, OPEN)
+            )
+            pulling = self._plan_inertia_phase(phase)
+            return schedule.add_knots(new.element, self.filled, (phase, handed), *pulling)
+        taken = self._compute_input_torque(1.0)
         if taken * self.torque > 0.0:
-            kept = pressure(off, abs(taken) * old.i_c, 0.0)
+            kept = compute_pressure(off, abs(taken) * old.i_c, 0.0)
             late = RAMP + self.drive.inertia_phase
-            return schedule.go(
+            return schedule.add_knots(
                 old.element, self.filled, (RAMP, kept), (late, kept), (late + FORCE, OPEN)
             )
-        schedule = schedule.go(old.element, self.filled, (RAMP, OPEN))
-        return schedule.go(new.element, self.filled, *self._pulling(0.0))
+        schedule = schedule.add_knots(old.element, self.filled, (RAMP, OPEN))
+        return schedule.add_knots(new.element, self.filled, *self._plan_inertia_phase(0.0))
 
-    def _taken(self, pace: float) -> float:
+    def _compute_input_torque(self, pace: float) -> float:
         """What both elements take from the input [N m] at `pace`, relative to the mean swing."""
         return self.torque - pace * self.inertia * self.swing / self.drive.inertia_phase
 
-    def _pulling(self, after: float) -> Knots:
+    def _plan_inertia_phase(self, after: float) -> Knots:
         """Pressures of the on-coming element that bring the input to the new gear.
 
         They start `after` the fill [s]. The pace falls from FAST to SLOW, so that the torque jumps
         less when the element locks. An element that is late is forced.
         """
-        _, on = self._capacities()
+        _, on = self._get_capacities()
         i_c, phase = self.reduction.on_coming.i_c, self.drive.inertia_phase
-        first = pressure(on, abs(self._taken(FAST)) * i_c, self.slip)
-        last = pressure(on, abs(self._taken(SLOW)) * i_c, 0.0)
+        first = compute_pressure(on, abs(self._compute_input_torque(FAST)) * i_c, self.slip)
+        last = compute_pressure(on, abs(self._compute_input_torque(SLOW)) * i_c, 0.0)
         late = after + RAMP + phase
         return (after + RAMP, first), (late, last), (late + FORCE, max(self.main, last))
 
     def close(self, schedule: Schedule, synchronous: float) -> Schedule:
         """Add what follows the time at which the input has the speed of the new gear [s]."""
         old, new = self.reduction.off_going, self.reduction.on_coming
-        _, on = self._capacities()
-        enough = pressure(on, MARGIN * abs(self.torque) * new.i_c, 0.0)
-        enough = max(enough, float(schedule.at(new.element, np.array([synchronous]))[0]))
-        schedule = schedule.go(old.element, synchronous, (RAMP, OPEN))
+        _, on = self._get_capacities()
+        enough = compute_pressure(on, MARGIN * abs(self.torque) * new.i_c, 0.0)
+        enough = max(enough, float(schedule.evaluate(new.element, np.array([synchronous]))[0]))
+        schedule = schedule.add_knots(old.element, synchronous, (RAMP, OPEN))
         closing = ((RAMP, enough), (RAMP + CLOSE, self.main))
-        return schedule.go(new.element, synchronous, *closing)
+        return schedule.add_knots(new.element, synchronous, *closing)
 
-    def _capacities(self) -> tuple[Capacity, Capacity]:
+    def _get_capacities(self) -> tuple[Capacity, Capacity]:
         box = self.reduction.gearbox
         names = (self.reduction.off_going.element, self.reduction.on_coming.element)
-        return box.capacity(names[0]), box.capacity(names[1])
+        return box.get_capacity(names[0]), box.get_capacity(names[1])
 
 
-def pressure(capacity: Capacity, torque: float, slip: float) -> float:
+def compute_pressure(capacity: Capacity, torque: float, slip: float) -> float:
     """Pressure [Pa] at which an element transmits `torque` [N m] at `slip` [rad/s], both >= 0."""
-    mu = float(capacity.friction.at(np.array([slip]))[0])
+    mu = float(capacity.friction.evaluate(np.array([slip]))[0])
     return capacity.P0 + torque / (mu * capacity.gain)

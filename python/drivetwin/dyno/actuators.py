@@ -33,7 +33,7 @@ class Program:
                 Where(key="knots"),
             )
 
-    def at(self, time: FloatArray) -> FloatArray:
+    def evaluate(self, time: FloatArray) -> FloatArray:
         """Values at `time` (n,) [s]."""
         knots = np.array(self.knots)
         return np.asarray(np.interp(time, knots[:, 0], knots[:, 1]), dtype=np.float64)
@@ -51,7 +51,7 @@ class Vibration:
     start: float
     end: float
 
-    def at(self, time: FloatArray) -> FloatArray:
+    def evaluate(self, time: FloatArray) -> FloatArray:
         """Pressure to add at `time` (n,) [s], in Pa."""
         edge = np.minimum(time - self.start, self.end - time) * self.frequency
         envelope = 0.5 - 0.5 * np.cos(np.pi * np.clip(edge, 0.0, 1.0))
@@ -71,7 +71,7 @@ class Fill:
     boost: float
     time: float
 
-    def limit(self, command: FloatArray, step: float) -> FloatArray:
+    def apply_fill(self, command: FloatArray, step: float) -> FloatArray:
         """Return what is left of `command` (n,) [Pa], sampled every `step` [s].
 
         A clutch that is commanded below the spring pressure at first is empty.
@@ -109,19 +109,19 @@ class Actuator:
                 Where(key="actuator"),
             )
 
-    def pressure(self, time: FloatArray) -> FloatArray:
+    def compute_pressure(self, time: FloatArray) -> FloatArray:
         """Pressure at evenly spaced `time` (n,) [s], in Pa; at rest before `time[0]`.
 
         The lag is solved exactly for a command that is linear between the samples.
         """
-        command = self.command.at(time - self.dead_time)
+        command = self.command.evaluate(time - self.dead_time)
         step = float(time[1] - time[0])
         if self.fill is not None:
-            command = self.fill.limit(command, step)
+            command = self.fill.apply_fill(command, step)
         decay = np.exp(-step / self.lag)
         mean = self.lag / step * (1.0 - decay)
         b, a = np.array([1.0 - mean, mean - decay]), np.array([1.0, -decay])
         pressure, _ = signal.lfilter(b, a, command, zi=signal.lfilter_zi(b, a) * command[0])
         if self.vibration is not None:
-            pressure = pressure + self.vibration.at(time)
+            pressure = pressure + self.vibration.evaluate(time)
         return np.asarray(pressure, dtype=np.float64)

@@ -18,7 +18,7 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Trajectory,
 )
-from drivetwin.simulation.network import Element, Output, Start, element, simulate
+from drivetwin.simulation.network import Element, Output, Start, build_element, simulate
 
 _CRANK, _TURBINE, _INPUT, _OUTPUT = "crankshaft", "turbine", "input", "output"
 _AXLE, _WHEEL, _SHAFT = "axle", "wheel", "output shaft"
@@ -37,14 +37,14 @@ class OpenConverter:
     converter: Converter
     engine_inertia: float
 
-    def steady(self, torque: float, turbine: float) -> tuple[float, float]:
+    def solve_steady_speed(self, torque: float, turbine: float) -> tuple[float, float]:
         """Speed of the engine [rad/s] that gives `torque` [N m] steadily, and turbine torque."""
 
         def surplus(ratio: float) -> float:
-            return float(self.converter.pump_torque(turbine / ratio, turbine)) - torque
+            return float(self.converter.compute_pump_torque(turbine / ratio, turbine)) - torque
 
         speed = turbine / float(brentq(surplus, _STALL, 1.0))
-        return speed, float(self.converter.turbine_torque(speed, turbine))
+        return speed, float(self.converter.compute_turbine_torque(speed, turbine))
 
     def simulate(
         self,
@@ -60,14 +60,14 @@ class OpenConverter:
         torque is steady. Raises InputError where the description is inconsistent.
         """
         torque = float(np.interp(time[0], engine_torque.arrival, engine_torque.values))
-        crank, _ = self.steady(torque, start.engine_speed)
+        crank, _ = self.solve_steady_speed(torque, start.engine_speed)
         names = [each.name for each in model.elements]
         run = simulate(
-            self._elements(model),
+            self._build_elements(model),
             {**pressures, _TORQUE: engine_torque},
             _start(model, start, crank),
             time,
-            _outputs(names),
+            _list_outputs(names),
         )
         motion = run.columns
         trajectory = Trajectory(
@@ -85,25 +85,25 @@ class OpenConverter:
         )
         return trajectory, motion["speed", _CRANK]
 
-    def _elements(self, model: DualClutch) -> list[Element]:
+    def _build_elements(self, model: DualClutch) -> list[Element]:
         """The dual clutch in general elements, the converter before it."""
         loss = {"law": model.loss_law, "eta": model.eta}
         return [
-            element("torque", _TORQUE, node=_CRANK, input=_TORQUE),
-            element("inertia", "engine", node=_CRANK, inertia=self.engine_inertia),
-            element(
+            build_element("torque", _TORQUE, node=_CRANK, input=_TORQUE),
+            build_element("inertia", "engine", node=_CRANK, inertia=self.engine_inertia),
+            build_element(
                 "torque_converter",
                 "converter",
                 pump=_CRANK,
                 turbine=_TURBINE,
                 map=asdict(self.converter),
             ),
-            element("inertia", "J1", node=_TURBINE, inertia=model.J1),
-            element("gear", "input gear", a=_TURBINE, b=_INPUT, ratio=model.i_in, loss=loss),
-            element("inertia", "J2e", node=_INPUT, inertia=model.J2e * model.i_in**2),
-            *(part for each in model.elements for part in _clutch(each)),
-            element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
-            element(
+            build_element("inertia", "J1", node=_TURBINE, inertia=model.J1),
+            build_element("gear", "input gear", a=_TURBINE, b=_INPUT, ratio=model.i_in, loss=loss),
+            build_element("inertia", "J2e", node=_INPUT, inertia=model.J2e * model.i_in**2),
+            *(part for each in model.elements for part in _build_clutch(each)),
+            build_element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
+            build_element(
                 "spring_damper",
                 _SHAFT,
                 a=_OUTPUT,
@@ -111,24 +111,24 @@ class OpenConverter:
                 stiffness=model.k_o,
                 damping=model.c_o,
             ),
-            element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
-            element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
-            element("road_load", "load", node=_WHEEL, **asdict(model.load)),
+            build_element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
+            build_element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
+            build_element("road_load", "load", node=_WHEEL, **asdict(model.load)),
         ]
 
 
-def _sides(name: str) -> tuple[str, str]:
+def _get_side_nodes(name: str) -> tuple[str, str]:
     """Nodes on both sides of a shift element."""
     return f"{name} driving", f"{name} driven"
 
 
-def _clutch(one: ShiftElement) -> list[Element]:
+def _build_clutch(one: ShiftElement) -> list[Element]:
     """A shift element between its two ratios (eq. 15)."""
-    driving, driven = _sides(one.name)
+    driving, driven = _get_side_nodes(one.name)
     return [
-        element("gear", f"{one.name} i_c", a=_INPUT, b=driving, ratio=one.i_c),
-        element("gear", f"{one.name} i_out", a=driven, b=_OUTPUT, ratio=one.i_out),
-        element(
+        build_element("gear", f"{one.name} i_c", a=_INPUT, b=driving, ratio=one.i_c),
+        build_element("gear", f"{one.name} i_out", a=driven, b=_OUTPUT, ratio=one.i_out),
+        build_element(
             "clutch",
             one.name,
             a=driving,
@@ -154,12 +154,12 @@ def _start(model: DualClutch, start: State, crank: float) -> Start:
         _WHEEL: start.wheel_speed,
     }
     for one in model.elements:
-        driving, driven = _sides(one.name)
+        driving, driven = _get_side_nodes(one.name)
         speeds |= {driving: inlet / one.i_c, driven: one.i_out * start.output_speed}
     return Start(speeds, {_SHAFT: start.twist}, start.locked)
 
 
-def _outputs(elements: list[str]) -> list[Output]:
+def _list_outputs(elements: list[str]) -> list[Output]:
     return [
         *(("speed", node) for node in (_CRANK, _TURBINE, _OUTPUT, _WHEEL)),
         ("twist", _SHAFT),

@@ -9,24 +9,24 @@ from io import StringIO
 import numpy as np
 import tomlkit
 
-from drivetwin.channels.pressure_roles import pressed_element
+from drivetwin.channels.pressure_roles import get_pressure_element
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.dyno import DynoRun
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.logs.raw import RawChannel
-from drivetwin.logs.write import as_recorded
+from drivetwin.logs.write import convert_to_recorded_units
 from drivetwin.vehicle.converter import ConverterTable
-from drivetwin.vehicle.spec import brake_ratios
+from drivetwin.vehicle.spec import compute_brake_ratios
 
 _J_OUT_TOLERANCE = 0.1
 """Relative standard deviation of Jo' on a card, as computed from drawings."""
 
 
-def log_text(run: DynoRun) -> str:
+def format_log(run: DynoRun) -> str:
     """One CSV table: names, units, rows of the fastest channel; slower ones hold their value."""
     time = max((channel.time for channel in run.channels), key=lambda stamps: stamps.size)
-    columns = [time, *(_column(channel, time) for channel in run.channels)]
+    columns = [time, *(_format_column(channel, time) for channel in run.channels)]
     text = StringIO()
     text.write(",".join(("time", *(channel.source_name for channel in run.channels))) + "\n")
     text.write(",".join(("s", *(channel.source_unit for channel in run.channels))) + "\n")
@@ -34,18 +34,18 @@ def log_text(run: DynoRun) -> str:
     return text.getvalue()
 
 
-def _column(channel: Channel, time: FloatArray) -> FloatArray:
+def _format_column(channel: Channel, time: FloatArray) -> FloatArray:
     """The channel in its file unit at the rows' times; the last value before them is held."""
     held = np.searchsorted(channel.time, time + 1e-9, side="right") - 1
-    return as_recorded(channel).values[np.clip(held, 0, None)]
+    return convert_to_recorded_units(channel).values[np.clip(held, 0, None)]
 
 
-def recorded_channels(run: DynoRun) -> tuple[RawChannel, ...]:
+def convert_channels(run: DynoRun) -> tuple[RawChannel, ...]:
     """Return all channels in the units of their file, each on its own time base."""
-    return tuple(as_recorded(channel) for channel in run.channels)
+    return tuple(convert_to_recorded_units(channel) for channel in run.channels)
 
 
-def truth_text(run: DynoRun) -> str:
+def format_truth(run: DynoRun) -> str:
     """The truth as JSON, with what was run."""
     setup = {
         "scenario": run.scenario.name,
@@ -58,14 +58,16 @@ def truth_text(run: DynoRun) -> str:
     return json.dumps({**run.truth.as_dict(), "run": setup}, indent=2, ensure_ascii=False) + "\n"
 
 
-def card_text(scenario: Scenario) -> str:
+def format_card(scenario: Scenario) -> str:
     """Vehicle card (TOML) with the values of the driveline that are known from design."""
     model = scenario.model
     gears = tomlkit.aot()
-    for gear in sorted(scenario.gears, key=lambda gear: -scenario.ratio(gear.element)):
-        ratio = round(scenario.ratio(gear.element) / model.i_in, 12)
+    for gear in sorted(scenario.gears, key=lambda gear: -scenario.get_ratio(gear.element)):
+        ratio = round(scenario.get_ratio(gear.element) / model.i_in, 12)
         gears.append(tomlkit.item({"name": gear.name, "ratio": ratio, "elements": [gear.element]}))
-    elements = {gear.element: _element(scenario, gear.element) for gear in scenario.gears}
+    elements = {
+        gear.element: _build_element_table(scenario, gear.element) for gear in scenario.gears
+    }
     inertia = {
         "J_prime_kgm2": list(scenario.J_prime_range),
         "J_vehicle_kgm2": list(scenario.J_vehicle_range),
@@ -80,21 +82,21 @@ def card_text(scenario: Scenario) -> str:
     card.add("elements", tomlkit.item(elements))
     card.add("inertia", tomlkit.item(inertia))
     if scenario.converter is not None:
-        table = ConverterTable.of(scenario.converter.converter)
+        table = ConverterTable.from_converter(scenario.converter.converter)
         card.add("converter", tomlkit.item(table.model_dump()))
     if scenario.one_clutch:
-        (column,) = (s.column for s in scenario.sensors if pressed_element(s.role) is not None)
+        (column,) = (s.column for s in scenario.sensors if get_pressure_element(s.role) is not None)
         roles = {gear.element: {"source": column} for gear in scenario.gears}
         card.add("channels", tomlkit.item({"pressure": roles}))
     return tomlkit.dumps(card)
 
 
-def _element(scenario: Scenario, name: str) -> dict[str, str | float]:
+def _build_element_table(scenario: Scenario, name: str) -> dict[str, str | float]:
     """A shift element; its ratios are stated where they are not those of a brake by its gear."""
-    element = scenario.element(name)
-    ratio = scenario.ratio(name) / scenario.model.i_in
+    element = scenario.get_element(name)
+    ratio = scenario.get_ratio(name) / scenario.model.i_in
     stated = (element.i_c, element.i_out)
-    is_brake = ratio != 1.0 and np.allclose(stated, brake_ratios(ratio), rtol=1e-12)
+    is_brake = ratio != 1.0 and np.allclose(stated, compute_brake_ratios(ratio), rtol=1e-12)
     return {
         "kind": "brake" if is_brake else "clutch",
         "gain_m3": element.gain,

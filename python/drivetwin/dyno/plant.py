@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from drivetwin.gearbox import Gearbox, gear_statics, network_elements, reduce
-from drivetwin.gearbox.dual import shift_element
+from drivetwin.gearbox import Gearbox, build_network_elements, reduce, solve_gear
+from drivetwin.gearbox.dual import build_shift_element
 from drivetwin.gearbox.reduction import ElementRatios
 from drivetwin.gearbox.spec import GROUND
 from drivetwin.simulation.dual_clutch import (
@@ -21,7 +21,7 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Trajectory,
 )
-from drivetwin.simulation.network import Element, Output, Start, element, simulate
+from drivetwin.simulation.network import Element, Output, Start, build_element, simulate
 
 _ENGINE, _AXLE, _WHEEL, _SHAFT = "engine", "axle", "wheel", "output shaft"
 _TORQUE = "engine torque"
@@ -64,11 +64,11 @@ class Plant:
         idle = {name: Signal(end, np.zeros(2)) for name in self.gearbox.elements}
         closed = {name: Signal(end, np.full(2, _MAIN)) for name in self.common}
         run = simulate(
-            self._elements(model),
+            self._build_elements(model),
             {**idle, **closed, **pressures, _TORQUE: engine_torque},
             self._start(start),
             time,
-            _outputs(self.gearbox, tuple(self.ratios)),
+            _list_outputs(self.gearbox, tuple(self.ratios)),
         )
         motion = run.columns
         sense = {name: each.sense for name, each in self.ratios.items()}
@@ -86,27 +86,27 @@ class Plant:
             audit=run.audit,
         )
 
-    def _elements(self, model: DualClutch) -> list[Element]:
+    def _build_elements(self, model: DualClutch) -> list[Element]:
         loss = {"law": model.loss_law, "eta": model.eta}
         box, shaft = self.gearbox, {"stiffness": model.k_o, "damping": model.c_o}
 
         return [
-            element("torque", "engine torque", node=_ENGINE, input=_TORQUE),
-            element("inertia", "J1", node=_ENGINE, inertia=model.J1),
-            element("gear", "losses", a=_ENGINE, b=box.input, ratio=1.0, loss=loss),
-            *network_elements(box),
-            element("spring_damper", _SHAFT, a=box.output, b=_AXLE, **shaft),
-            element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
-            element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
-            element("road_load", "load", node=_WHEEL, **asdict(model.load)),
+            build_element("torque", "engine torque", node=_ENGINE, input=_TORQUE),
+            build_element("inertia", "J1", node=_ENGINE, inertia=model.J1),
+            build_element("gear", "losses", a=_ENGINE, b=box.input, ratio=1.0, loss=loss),
+            *build_network_elements(box),
+            build_element("spring_damper", _SHAFT, a=box.output, b=_AXLE, **shaft),
+            build_element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
+            build_element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
+            build_element("road_load", "load", node=_WHEEL, **asdict(model.load)),
         ]
 
     def _start(self, start: State) -> Start:
         """The state in the gear that `start` holds; the members turn as that gear makes them."""
         gear = next(
-            name for name in self.gears if start.locked[0] in self.gearbox.gear(name).elements
+            name for name in self.gears if start.locked[0] in self.gearbox.get_gear(name).elements
         )
-        members = gear_statics(self.gearbox, gear).speeds
+        members = solve_gear(self.gearbox, gear).speeds
         speeds = {name: start.engine_speed * (each or 0.0) for name, each in members.items()}
         return Start(
             {**speeds, _ENGINE: start.engine_speed, _WHEEL: start.wheel_speed},
@@ -115,7 +115,7 @@ class Plant:
         )
 
 
-def _outputs(gearbox: Gearbox, elements: tuple[str, ...]) -> list[Output]:
+def _list_outputs(gearbox: Gearbox, elements: tuple[str, ...]) -> list[Output]:
     return [
         ("speed", _ENGINE),
         ("speed", gearbox.output),
@@ -127,7 +127,7 @@ def _outputs(gearbox: Gearbox, elements: tuple[str, ...]) -> list[Output]:
     ]
 
 
-def plant_of(gearbox: Gearbox, gears: tuple[str, ...]) -> Plant:
+def build_plant(gearbox: Gearbox, gears: tuple[str, ...]) -> Plant:
     """Prepare a gearbox for up-shifts through `gears`, all with the same elements in common.
 
     Raises ReductionError for a shift that is not one element off and one on.
@@ -150,7 +150,7 @@ class Surroundings:
     load: RoadLoad
 
 
-def form_of(plant: Plant, around: Surroundings) -> DualClutch:
+def build_form(plant: Plant, around: Surroundings) -> DualClutch:
     """Return the dual-clutch form of a gearbox in its surroundings.
 
     A member that is the drum of a shift element runs with its slip and becomes its drum inertia.
@@ -174,7 +174,8 @@ def form_of(plant: Plant, around: Surroundings) -> DualClutch:
         c_o=around.c_o,
         load=around.load,
         elements=tuple(
-            shift_element(box, each, _drum(box, each.element)) for each in plant.ratios.values()
+            build_shift_element(box, each, _get_drum_inertia(box, each.element))
+            for each in plant.ratios.values()
         ),
     )
 
@@ -183,7 +184,7 @@ def _is_brake(gearbox: Gearbox, element: str) -> bool:
     return gearbox.elements[element].b == GROUND
 
 
-def _drum(gearbox: Gearbox, element: str) -> float:
+def _get_drum_inertia(gearbox: Gearbox, element: str) -> float:
     """Inertia of the member that a brake holds; 0 for a clutch."""
     member = gearbox.elements[element].a
     drum = gearbox.inertias.get(member, 0.0)

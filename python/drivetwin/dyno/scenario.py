@@ -45,7 +45,7 @@ class TorqueReduction:
                 Where(key="torque reduction"),
             )
 
-    def factor(self, time: FloatArray) -> FloatArray:
+    def compute_factor(self, time: FloatArray) -> FloatArray:
         """Factor on the engine torque at `time` (n,)."""
         knots = (self.start, self.start + self.ramp, self.end, self.end + self.ramp)
         return 1.0 - self.fraction * np.interp(time, knots, (0.0, 1.0, 1.0, 0.0))
@@ -69,8 +69,8 @@ class Scenario:
     acceleration. `engine_torque` [N m] is the driver's demand, without the TCU's `reductions`.
     `rate` [Hz] is the sampling of the inputs, linear between samples. `J_prime_range` and
     `J_vehicle_range` are plausible ranges for the vehicle card: of J' at the engine and of J3 at
-    the wheel [kg m^2]. With `one_clutch` the elements are one and the same in two gears, and a log
-    has its pressure once.
+    the wheel [kg m^2]. With `is_shared_pressure` the elements are one and the same in two gears,
+    and a log has its pressure once.
     """
 
     name: str
@@ -109,37 +109,37 @@ class Scenario:
         """On-coming element of the first shift."""
         return self.gears[1].element
 
-    def with_torque_reduction(self, fraction: float) -> Scenario:
+    def set_torque_reduction(self, fraction: float) -> Scenario:
         """Return the scenario with another share of the engine torque taken in every shift."""
         reductions = tuple(replace(each, fraction=fraction) for each in self.reductions)
         return replace(self, reductions=reductions)
 
-    def element(self, name: str) -> ShiftElement:
+    def get_element(self, name: str) -> ShiftElement:
         """The shift element called `name`."""
         return next(element for element in self.model.elements if element.name == name)
 
-    def ratio(self, element: str) -> float:
+    def get_ratio(self, element: str) -> float:
         """Overall ratio with `element` locked."""
-        return self.model.ratio(element)
+        return self.model.get_overall_ratio(element)
 
-    def torque(self, time: FloatArray) -> FloatArray:
+    def compute_torque(self, time: FloatArray) -> FloatArray:
         """Engine torque [N m] at `time` (n,), with the TCU's reductions."""
-        torque = self.engine_torque.at(time)
+        torque = self.engine_torque.evaluate(time)
         for reduction in self.reductions:
-            torque = torque * reduction.factor(time)
+            torque = torque * reduction.compute_factor(time)
         return torque
 
     def start(self) -> State:
         """Quasi-steady acceleration in the start gear."""
-        model, i_g = self.model, self.ratio(self.offgoing)
+        model, i_g = self.model, self.get_ratio(self.offgoing)
         wheel_speed = self.engine_speed / i_g / model.i_f
-        torque = float(self.torque(np.zeros(1))[0])
+        torque = float(self.compute_torque(np.zeros(1))[0])
         if self.converter is not None:
-            _, torque = self.converter.steady(torque, self.engine_speed)
+            _, torque = self.converter.solve_steady_speed(torque, self.engine_speed)
         return State(
             engine_speed=self.engine_speed,
             output_speed=self.engine_speed / i_g,
             wheel_speed=wheel_speed,
-            twist=model.steady_torque(torque, i_g, wheel_speed) / model.k_o,
+            twist=model.compute_steady_torque(torque, i_g, wheel_speed) / model.k_o,
             locked=(self.offgoing,),
         )

@@ -24,12 +24,12 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin._util.toml import read_toml
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.actuators import Actuator, Fill, Program, Vibration
 from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.plant import Plant, Surroundings, form_of, plant_of
+from drivetwin.dyno.plant import Plant, Surroundings, build_form, build_plant
 from drivetwin.dyno.scenario import HeldGear, Scenario, TorqueReduction
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
@@ -120,7 +120,7 @@ def _build_plant(table: Table, gears: Sequence[str]) -> Plant:
     """Return the gearbox of a card with the stated inertias."""
     box = load_gearbox(table["card"])
     drums = {member: float(table["drum_inertia"]) for member in table["drums"]}
-    return plant_of(
+    return build_plant(
         replace(box, inertias={**box.inertias, **drums, **table["inertias"]}), tuple(gears)
     )
 
@@ -140,7 +140,7 @@ def _build_model(table: Table, elements: Sequence[str], plant: Plant | None) -> 
             c_o=drive.c_o,
             load=RoadLoad(constant=output_load * drive.i_f),
         )
-        return form_of(plant, around)
+        return build_form(plant, around)
     brakes, clutches = table.get("brakes", {}), table.get("clutches", {})
     return DualClutch(
         loss_law="paper",
@@ -205,7 +205,7 @@ def _build_sensors(table: Table, elements: Sequence[str]) -> tuple[Sensor, ...]:
     return (
         Sensor("engine_torque", torque, "EngTrq", "Nm", 100.0, **table["engine_torque"]),
         *(
-            Sensor(pressure_role(name), pressure, column, "bar", 1000.0, noise, 10.0)
+            Sensor(make_pressure_role(name), pressure, column, "bar", 1000.0, noise, 10.0)
             for name, column in table["pressure_columns"].items()
             if name in elements
         ),
@@ -219,4 +219,4 @@ def _build_sensors(table: Table, elements: Sequence[str]) -> tuple[Sensor, ...]:
 
 def _build_converter(table: Table) -> OpenConverter:
     curves = {key: value for key, value in table.items() if key != "engine_inertia"}
-    return OpenConverter(ConverterTable(**curves).spec(), table["engine_inertia"])
+    return OpenConverter(ConverterTable(**curves).to_spec(), table["engine_inertia"])

@@ -36,7 +36,7 @@ class Sensor:
     window: float = 0.0
     """Time [s] before the stamp over which a sample is the mean, as encoders on a bus send it."""
 
-    def looks(self, stamps: FloatArray) -> FloatArray:
+    def compute_instants(self, stamps: FloatArray) -> FloatArray:
         """Instants (n, m) [s] that each sample averages; none before 0."""
         if self.window == 0.0:
             before = np.zeros(1)
@@ -44,7 +44,7 @@ class Sensor:
             before = self.window * (np.arange(LOOKS) + 0.5) / LOOKS
         return np.maximum(stamps[:, None] - self.delay - before, 0.0)
 
-    def stamps(self, duration: float) -> FloatArray:
+    def compute_stamps(self, duration: float) -> FloatArray:
         """Time stamps (n,) [s] from 0 to `duration`, exact multiples of the period."""
         return np.arange(int(np.floor(duration * self.rate + 1e-9)) + 1) / self.rate
 

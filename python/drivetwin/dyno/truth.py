@@ -9,13 +9,13 @@ from math import inf, pi, sqrt
 from typing import Any
 
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FrictionTable,
     Stribeck,
     Trajectory,
-    in_series,
+    compute_series_inertia,
 )
 
 SCHEMA = "drivetwin-truth/2"
@@ -64,7 +64,7 @@ class Truth:
         return {
             "schema": SCHEMA,
             "parameters": {
-                key: {"value": value, "unit": spec_of(key).unit}
+                key: {"value": value, "unit": get_parameter_spec(key).unit}
                 for key, value in self.parameters.items()
             },
             "friction": {name: asdict(law) for name, law in self.friction.items()},
@@ -72,20 +72,20 @@ class Truth:
         }
 
 
-def lockup_oscillation(model: DualClutch, ratio: float) -> tuple[float, float]:
+def compute_lockup_oscillation(model: DualClutch, ratio: float) -> tuple[float, float]:
     """Damped frequency [Hz] and damping ratio of the gearbox side against the vehicle (eq. 14).
 
     `ratio` is the overall ratio of the gear that is held; eqs. 12-14 of the paper in the output
     shaft's frame, with the drums that turn in that gear.
     """
     drums = sum(each.drum_inertia * (ratio / each.i_c - each.i_out) ** 2 for each in model.elements)
-    before, behind = model.sides(ratio)
-    J = in_series(before + drums, behind)
+    before, behind = model.compute_side_inertias(ratio)
+    J = compute_series_inertia(before + drums, behind)
     zeta = model.c_o / (2.0 * sqrt(J * model.k_o))
     return sqrt(model.k_o / J * (1.0 - zeta**2)) / (2.0 * pi), zeta
 
 
-def truth_of(scenario: Scenario, trajectory: Trajectory) -> Truth:
+def compute_truth(scenario: Scenario, trajectory: Trajectory) -> Truth:
     """Compute the true parameters and instants of a run.
 
     J' and Jo' are without the drums of open elements; a member of the whole gearbox that is no such
@@ -94,8 +94,8 @@ def truth_of(scenario: Scenario, trajectory: Trajectory) -> Truth:
     model = scenario.model
     engine_side = model.J1 * model.eta + model.J2e
     delays = {sensor.role: sensor.delay for sensor in scenario.sensors}
-    ratios = {gear.name: scenario.ratio(gear.element) for gear in scenario.gears}
-    rings = {gear: lockup_oscillation(model, ratios[gear]) for gear in list(ratios)[1:]}
+    ratios = {gear.name: scenario.get_ratio(gear.element) for gear in scenario.gears}
+    rings = {gear: compute_lockup_oscillation(model, ratios[gear]) for gear in list(ratios)[1:]}
     parameters = {
         "eta": model.eta,
         **{
@@ -113,10 +113,10 @@ def truth_of(scenario: Scenario, trajectory: Trajectory) -> Truth:
         "te_delay": delays["engine_torque"],
     }
     friction = {element.name: element.friction for element in model.elements}
-    return Truth(parameters, friction, _shifts(scenario, trajectory))
+    return Truth(parameters, friction, _collect_shifts(scenario, trajectory))
 
 
-def _shifts(scenario: Scenario, trajectory: Trajectory) -> tuple[Instants, ...]:
+def _collect_shifts(scenario: Scenario, trajectory: Trajectory) -> tuple[Instants, ...]:
     """The instants of each shift; an element's events count from the lock-up before."""
     found: list[Instants] = []
     after = -inf

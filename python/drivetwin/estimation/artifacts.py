@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from drivetwin.estimation.linear.pipeline import IntegralShift
     from drivetwin.estimation.paper.pipeline import PaperShift
     from drivetwin.estimation.result.multi_log import Several
-    from drivetwin.estimation.result.suggestion import Suggestion
+    from drivetwin.estimation.result.suggestion import ExperimentRanking
     from drivetwin.estimation.result.validation import HeldOut, Validation
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Evidence:
+class StageResults:
     """Results of the stages, each with its own units and shapes (SI); empty where none ran.
 
     What goes by shift is in the order of `Identification.shifts`; of several logs fitted as one,
@@ -44,8 +44,8 @@ class Evidence:
     """Load of each shift at the output shaft [N m] where they differ, as on hills, T_v/i_f is then
     their mean; empty where the shifts of a log share one."""
     several: Several | None = None
-    """The logs behind a fit of several, from `identify_several`; None of one log."""
-    suggestions: tuple[Suggestion, ...] = ()
+    """The logs behind a fit of several, from `identify_joint`; None of one log."""
+    suggestions: tuple[ExperimentRanking, ...] = ()
     """Experiments that would tell what is left open, from `examined`; likelihood method only."""
     validation: tuple[Validation, ...] = ()
     """Each shift simulated and compared, from `validated`; by every method."""

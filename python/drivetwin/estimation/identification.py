@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from drivetwin._util.rich_display import DisplayMixin
-from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.result.estimate import (
     Estimate,
     FloatArray,
@@ -40,7 +40,7 @@ class Identification(DisplayMixin):
     inputs: dict[str, str]
     """File name -> SHA-256 of every input."""
     settings: dict[str, Any]
-    evidence: Evidence = field(default_factory=Evidence)
+    evidence: StageResults = field(default_factory=StageResults)
     warnings: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     correlation_ids: tuple[str, ...] = ()

@@ -7,24 +7,28 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from drivetwin._util.display_units import in_units
-from drivetwin._util.progress import part
+from drivetwin._util.display_units import format_with_unit
+from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError, Where
-from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.data.segments import MomentumSettings
-from drivetwin.estimation.data.select_shifts import balanced
+from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import DesignData, PreparedLog, ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.pipeline import likelihood, likelihood_alone
+from drivetwin.estimation.likelihood.pipeline import estimate_likelihood, estimate_without_linear
 from drivetwin.estimation.linear.friction_points import FrictionSettings
-from drivetwin.estimation.linear.multi_shift import integral_method, with_tolerances
-from drivetwin.estimation.paper.pipeline import PaperShift, paper_conclusions, paper_shift
+from drivetwin.estimation.linear.multi_shift import add_tolerances, estimate_integral
+from drivetwin.estimation.paper.pipeline import (
+    PaperShift,
+    assess_paper_shifts,
+    identify_paper_shift,
+)
 from drivetwin.estimation.result.estimate import FloatArray
-from drivetwin.estimation.result.estimate_set import Conclusions
+from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.estimation.result.prior_conflict import outside_ranges, without_gain
-from drivetwin.estimation.result.verdict import doubted
-from drivetwin.parameters import spec_of
+from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
+from drivetwin.estimation.result.verdict import reject_identified
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.shifts.coverage import AFTER, BEFORE
 
 BEHIND_CONVERTER = (
@@ -62,13 +66,13 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
     """
     if log.scale_known:
         if method is not Method.PAPER:
-            log = balanced(log)
-        found, method, evidence = _with_torque(log, method)
+            log = drop_unbalanced(log)
+        found, method, evidence = _estimate_torque_log(log, method)
     else:
-        found, evidence = _without_torque(log, method)
+        found, evidence = _estimate_torqueless_log(log, method)
     shifts, design = tuple(s.shift for s in log.signals), log.design
-    estimates, gains = without_gain(found.estimates, design.loss_law)
-    told = (*gains, *_of_card(found, log, method), *log.notes)
+    estimates, gains = check_efficiency_limit(found.estimates, design.loss_law)
+    told = (*gains, *_check_card(found, log, method), *log.notes)
     return Identification(
         estimates=estimates,
         friction=found.friction,
@@ -77,14 +81,14 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         fit={},
         method=method,
         loss_law=design.loss_law,
-        validity=_validity(log.signals, found),
+        validity=_compute_validity(log.signals, found),
         inputs=dict(log.inputs),
-        settings=_settings(design, method),
+        settings=_collect_settings(design, method),
         evidence=replace(evidence, signals=log.signals, loads=found.loads),
-        warnings=(*log.warnings, *_not_fitted(log), *found.warnings, *told),
+        warnings=(*log.warnings, *_describe_unfitted(log), *found.warnings, *told),
         assumptions=(
             *((BEHIND_CONVERTER,) if log.turbine_driven else ()),
-            *_assumptions(design, method, found),
+            *_collect_assumptions(design, method, found),
             *((NEAR,) if any(one not in log.candidates for one in shifts) else ()),
         ),
         correlation_ids=found.correlation_ids,
@@ -93,7 +97,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
     )
 
 
-def _of_card(found: Conclusions, log: PreparedLog, method: Method) -> tuple[str, ...]:
+def _check_card(found: EstimateSet, log: PreparedLog, method: Method) -> tuple[str, ...]:
     """Warn of a converter map that counts as exact and of inertias outside their design ranges.
 
     The paper's method doubts each value by itself; behind a converter J′ is without the engine.
@@ -101,10 +105,10 @@ def _of_card(found: Conclusions, log: PreparedLog, method: Method) -> tuple[str,
     is_exact = log.turbine_driven and "engine_torque" not in log.design.sensors
     exact = (MAP_EXACT,) if is_exact else ()
     elsewhere = method is Method.PAPER or log.turbine_driven
-    return exact if elsewhere else (*exact, *outside_ranges(found.estimates, log.design))
+    return exact if elsewhere else (*exact, *check_design_ranges(found.estimates, log.design))
 
 
-def _not_fitted(log: PreparedLog) -> list[str]:
+def _describe_unfitted(log: PreparedLog) -> list[str]:
     """Count the detected shifts that take no part in the fit."""
     count = len(log.candidates) - len(log.shifts)
     if count == 0:
@@ -115,63 +119,67 @@ def _not_fitted(log: PreparedLog) -> list[str]:
     ]
 
 
-_Stage = tuple[Conclusions, Method, Evidence]
+_Stage = tuple[EstimateSet, Method, StageResults]
 
 
-def _with_torque(log: PreparedLog, method: Method) -> _Stage:
+def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
     """Return the conclusions, the method that they are from, and the evidence."""
     if method is Method.PAPER:
-        paper = _paper_shifts(log)
-        return paper_conclusions(paper, log.signals, log.drivelines), method, Evidence(paper=paper)
+        paper = _identify_paper_shifts(log)
+        return (
+            assess_paper_shifts(paper, log.signals, log.drivelines),
+            method,
+            StageResults(paper=paper),
+        )
     likely, gave_up = method is Method.LIKELIHOOD, ""
     try:
-        with part(0.05, 0.2 if likely else 0.5, "linear method"):
-            found, integral = integral_method(log.signals, log.drivelines, log.design)
+        with scale_progress(0.05, 0.2 if likely else 0.5, "linear method"):
+            found, integral = estimate_integral(log.signals, log.drivelines, log.design)
     except IdentificationError as error:
         if not likely:
             raise
-        return _without_linear(log, error)
-    evidence = Evidence(integral=integral)
+        return _estimate_likelihood_only(log, error)
+    evidence = StageResults(integral=integral)
     if likely:
         try:
-            with part(0.2, 0.9, "likelihood"):
+            with scale_progress(0.2, 0.9, "likelihood"):
                 linear = found, integral
-                found, fit = likelihood(log.signals, log.drivelines, linear, log.design)
+                found, fit = estimate_likelihood(log.signals, log.drivelines, linear, log.design)
             evidence = replace(evidence, likelihood=fit)
         except IdentificationError as error:
             method, gave_up = Method.INTEGRAL, error.what
             evidence = replace(evidence, gave_up=gave_up)
     if method is Method.INTEGRAL:
-        with part(0.9 if likely else 0.5, 0.95, "tolerances of the sensors"):
-            found = with_tolerances(integral, log.signals, log.drivelines, log.design)
+        with scale_progress(0.9 if likely else 0.5, 0.95, "tolerances of the sensors"):
+            found = add_tolerances(integral, log.signals, log.drivelines, log.design)
     if gave_up:
         text = f"likelihood: {gave_up}; the values are those of the integral method"
-        estimates = {name: doubted(one, GAVE_UP) for name, one in found.estimates.items()}
+        estimates = {name: reject_identified(one, GAVE_UP) for name, one in found.estimates.items()}
         found = replace(found, estimates=estimates, warnings=(text, *found.warnings))
     try:
-        evidence = replace(evidence, paper=_paper_shifts(log))
+        evidence = replace(evidence, paper=_identify_paper_shifts(log))
     except IdentificationError as error:
         found = replace(found, warnings=(*found.warnings, f"paper's method: {error.what}"))
     return found, method, evidence
 
 
-def _without_linear(log: PreparedLog, refusal: IdentificationError) -> _Stage:
+def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) -> _Stage:
     """Fit the likelihood from a start of its own where the linear method has no equation.
 
     That is so for gears engaged too briefly, and by the dissipative law for a drive whose torque
     flows back throughout. Raises the linear method's `refusal` if it does not converge either.
     """
     try:
-        with part(0.2, 0.95, "likelihood"):
-            found, fit = likelihood_alone(log.signals, log.drivelines, log.design)
+        with scale_progress(0.2, 0.95, "likelihood"):
+            found, fit = estimate_without_linear(log.signals, log.drivelines, log.design)
     except IdentificationError:
         raise refusal from None
     text = f"linear method: {refusal.what}; the likelihood started without it"
     found = replace(found, warnings=(text, *found.warnings))
-    return found, Method.LIKELIHOOD, Evidence(likelihood=fit)
+    return found, Method.LIKELIHOOD, StageResults(likelihood=fit)
 
 
-def _without_torque(log: PreparedLog, method: Method) -> tuple[Conclusions, Evidence]:
+def _estimate_torqueless_log(log: PreparedLog, method: Method) -> tuple[EstimateSet, StageResults]:
     """Fit a log without an output torque, which only the likelihood method can do.
 
     Raises IdentificationError for the other methods.
@@ -183,20 +191,22 @@ def _without_torque(log: PreparedLog, method: Method) -> tuple[Conclusions, Evid
             "map an output-shaft torque sensor as `output_torque`, or use the likelihood method",
             Where(file=log.source),
         )
-    found, best = likelihood_alone(log.signals, log.drivelines, log.design)
-    return found, Evidence(likelihood=best)
+    found, best = estimate_without_linear(log.signals, log.drivelines, log.design)
+    return found, StageResults(likelihood=best)
 
 
-def _paper_shifts(log: PreparedLog) -> tuple[PaperShift, ...]:
+def _identify_paper_shifts(log: PreparedLog) -> tuple[PaperShift, ...]:
     design = log.design
     return tuple(
-        paper_shift(one.signals, one.driveline, design.J_prime_range, design.J_vehicle_range)
+        identify_paper_shift(
+            one.signals, one.driveline, design.J_prime_range, design.J_vehicle_range
+        )
         for one in log.shifts
     )
 
 
-def _validity(
-    signals: Sequence[ShiftSignals], found: Conclusions
+def _compute_validity(
+    signals: Sequence[ShiftSignals], found: EstimateSet
 ) -> dict[str, tuple[float, float]]:
     """Ranges that the identification saw: slip, pressure, torque, speed; SI."""
 
@@ -213,7 +223,7 @@ def _validity(
     return ranges
 
 
-def _settings(design: DesignData, method: Method) -> dict[str, Any]:
+def _collect_settings(design: DesignData, method: Method) -> dict[str, Any]:
     ranges = {"J_prime_range": design.J_prime_range, "J_vehicle_range": design.J_vehicle_range}
     if method is Method.PAPER:
         return ranges
@@ -224,7 +234,7 @@ def _settings(design: DesignData, method: Method) -> dict[str, Any]:
     }
 
 
-def _assumptions(design: DesignData, method: Method, found: Conclusions) -> tuple[str, ...]:
+def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet) -> tuple[str, ...]:
     grows = "" if found.load is None else GROWS
     texts = [
         f"loss law {design.loss_law} (theory page, section 3)",
@@ -241,12 +251,12 @@ def _assumptions(design: DesignData, method: Method, found: Conclusions) -> tupl
     if not design.sensors:
         texts.append("no sensor gain or offset tolerance is stated: intervals cover noise only")
     texts += [
-        f"known beforehand: {name} = {in_units(prior.value, spec_of(name).unit, prior.std)}"
+        f"known beforehand: {name} = {format_with_unit(prior.value, get_parameter_spec(name).unit, prior.std)}"
         + (" (1 sigma)" if prior.std > 0.0 else ", fixed")
         for name, prior in design.known.items()
         if method is not Method.PAPER
     ]
     if design.J_out is not None:
-        J_out = in_units(design.J_out.value, "kg*m^2", design.J_out.std)
+        J_out = format_with_unit(design.J_out.value, "kg*m^2", design.J_out.std)
         texts.append(f"design prior of J_out: {J_out} (1 sigma)")
     return tuple(texts)

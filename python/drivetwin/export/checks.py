@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from drivetwin.errors import InputError
-from drivetwin.export.entries import Entry, entries_of
+from drivetwin.export.entries import Entry, list_entries
 from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, State
 from drivetwin.simulation.serialize import as_json
 
@@ -35,7 +35,7 @@ def check_exportable(model: DualClutch, start: State) -> None:
                 f"the friction table of {element.name} has {len(law.slip)} points",
                 f"thin it out to at most {MAX_POINTS}, or fit a Stribeck law",
             )
-    for entry in entries_of(model):
+    for entry in list_entries(model):
         _check_range(entry)
 
 

@@ -24,7 +24,7 @@ _ZIG_TARGETS = {
 }
 
 
-def native_platform() -> Platform | None:
+def detect_platform() -> Platform | None:
     """The platform this program runs on; None where it is none of those known."""
     import platform
 
@@ -49,7 +49,7 @@ def compile_library(
     includes = sorted({relpath(path.parent, folder) for path in sources})
     windows = target.suffix == ".dll"
     command = [
-        *_compiler(platform),
+        *_find_compiler(platform),
         *("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-shared"),
         *(["-s"] if windows else ["-fPIC"]),
         *(f"-D{name}" for name in defines),
@@ -69,15 +69,15 @@ def compile_library(
         _clear_times(target)
 
 
-def native_compiler() -> tuple[str, ...]:
+def find_native_compiler() -> tuple[str, ...]:
     """Command of the C compiler found here; empty without one."""
     found = (name for name in ("cc", "gcc", "clang") if shutil.which(name))
     return tuple(islice(found, 1))
 
 
-def _compiler(platform: Platform | None) -> list[str]:
-    if platform is None and native_compiler():
-        return [*native_compiler()]
+def _find_compiler(platform: Platform | None) -> list[str]:
+    if platform is None and find_native_compiler():
+        return [*find_native_compiler()]
     if find_spec("ziglang") is None:
         raise MissingExtraError(
             "building for other platforms, or without a C compiler, needs zig",

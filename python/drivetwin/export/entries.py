@@ -28,7 +28,7 @@ class Entry:
     most: float = INF
 
 
-def entries_of(model: DualClutch) -> tuple[Entry, ...]:
+def list_entries(model: DualClutch) -> tuple[Entry, ...]:
     """All numbers of a model, in the order of `dt_params`."""
     load = model.load
     return (
@@ -44,11 +44,11 @@ def entries_of(model: DualClutch) -> tuple[Entry, ...]:
         Entry("load.constant", "load_constant", load.constant, "N*m", "load at the wheel"),
         Entry("load.rolling", "load_rolling", load.rolling, "N*m", "rolling resistance", 0.0),
         Entry("load.aero", "load_aero", load.aero, "N*m*s^2/rad^2", "load over speed squared", 0.0),
-        *(entry for index in range(2) for entry in _element_entries(model, index)),
+        *(entry for index in range(2) for entry in _list_element_entries(model, index)),
     )
 
 
-def _element_entries(model: DualClutch, index: int) -> tuple[Entry, ...]:
+def _list_element_entries(model: DualClutch, index: int) -> tuple[Entry, ...]:
     element = model.elements[index]
 
     def entry(field: str, value: float, unit: str, meaning: str, least: float = -INF) -> Entry:
@@ -97,7 +97,7 @@ def start_entries(start: State) -> tuple[Entry, ...]:
     )
 
 
-def locked_index(model: DualClutch, start: State) -> int:
+def get_lock_index(model: DualClutch, start: State) -> int:
     """0: nothing is locked at the start; k: the k-th element is."""
     names = [element.name for element in model.elements]
     return names.index(start.locked[0]) + 1 if start.locked else 0

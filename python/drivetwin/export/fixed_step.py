@@ -22,7 +22,7 @@ from drivetwin.simulation.dual_clutch import (
     simulate,
 )
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.simulate_log import compared
+from drivetwin.validation.simulate_log import replace_run
 
 DEFAULT_STEP = 1e-3
 """Default communication step [s]: the sampling interval of pressure signals."""
@@ -42,7 +42,7 @@ class Stepping:
     step: float
     kind: InputKind = InputKind.LINEAR
 
-    def grid(self, start: float, end: float) -> FloatArray:
+    def build_grid(self, start: float, end: float) -> FloatArray:
         """Communication points from `start` as far as whole steps reach. Raises InputError."""
         if not 1e-5 <= self.step <= 0.1:
             raise InputError(f"a step of {self.step:g} s", "choose one from 1e-5 s to 0.1 s")
@@ -55,13 +55,13 @@ class Stepping:
         return np.asarray(start + self.step * np.arange(count + 1), dtype=np.float64)
 
 
-def sampled(signals: Sequence[Signal], time: FloatArray) -> FloatArray:
+def sample_signals(signals: Sequence[Signal], time: FloatArray) -> FloatArray:
     """Values (n, signals) of inputs at `time` (n,) [s], linear between their own samples."""
     columns = [np.interp(time, one.arrival, one.values) for one in signals]
     return np.column_stack(columns)
 
 
-def stepped_run(
+def run_fixed_step(
     model: DualClutch, start: State, time: FloatArray, inputs: FloatArray, kind: InputKind
 ) -> Trajectory:
     """Run with `inputs` (n, 3) given at `time` (n,): engine torque, then pressures in the order of
@@ -69,27 +69,27 @@ def stepped_run(
 
     Raises InputError for an inconsistent description; a run that fails returns its status.
     """
-    torque, *pressures = (_signal(time, column, kind) for column in inputs.T)
+    torque, *pressures = (_build_signal(time, column, kind) for column in inputs.T)
     names = [element.name for element in model.elements]
     given = dict(zip(names, pressures, strict=True))
     return simulate(model, torque, given, start, time, accuracy=Accuracy(exact=True))
 
 
-def _signal(time: FloatArray, values: FloatArray, kind: InputKind) -> Signal:
+def _build_signal(time: FloatArray, values: FloatArray, kind: InputKind) -> Signal:
     if kind is InputKind.LINEAR:
         return Signal(time, np.ascontiguousarray(values))
     # A repeated time stamp is a jump: every value lasts until the next point.
     return Signal(np.repeat(time, 2)[1:-1], np.repeat(values[:-1], 2))
 
 
-def stepped_inputs(shift: Validation, stepping: Stepping) -> tuple[FloatArray, FloatArray]:
+def sample_inputs(shift: Validation, stepping: Stepping) -> tuple[FloatArray, FloatArray]:
     """Communication points (n,) over the window of a shift and its measured inputs (n, 3) there."""
-    time = stepping.grid(float(shift.trajectory.time[0]), float(shift.trajectory.time[-1]))
+    time = stepping.build_grid(float(shift.trajectory.time[0]), float(shift.trajectory.time[-1]))
     pressures = (shift.pressures[element.name] for element in shift.model.elements)
-    return time, sampled((shift.engine_torque, *pressures), time)
+    return time, sample_signals((shift.engine_torque, *pressures), time)
 
 
-def start_of(shift: Validation) -> State:
+def get_start_state(shift: Validation) -> State:
     """State that the simulation of a shift starts from."""
     run = shift.trajectory
     return State(
@@ -101,8 +101,10 @@ def start_of(shift: Validation) -> State:
     )
 
 
-def stepped_again(shift: Validation, twin: Twin, log: ShiftLog, stepping: Stepping) -> Validation:
+def rerun_fixed_step(
+    shift: Validation, twin: Twin, log: ShiftLog, stepping: Stepping
+) -> Validation:
     """A simulated shift as a fixed-step importer of the twin would have it."""
-    time, inputs = stepped_inputs(shift, stepping)
-    run = stepped_run(shift.model, start_of(shift), time, inputs, stepping.kind)
-    return compared(shift, twin, log, run)
+    time, inputs = sample_inputs(shift, stepping)
+    run = run_fixed_step(shift.model, get_start_state(shift), time, inputs, stepping.kind)
+    return replace_run(shift, twin, log, run)

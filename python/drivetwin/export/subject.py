@@ -27,27 +27,27 @@ class Subject:
     """Where the numbers come from, one line."""
 
 
-def subject_of(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
+def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
     """The model of the shift between two gears of a twin; by default its first upshift.
 
     It starts in the old gear at the mean engine speed of the twin's logs, without acceleration.
     Raises InputError for a shift that the twin does not have and MissingParameterError where a
     parameter that the simulation needs was not identified.
     """
-    shift = nominal_shift(twin, gears)
-    model = twin.dual_clutch(shift)
+    shift = build_nominal_shift(twin, gears)
+    model = twin.build_dual_clutch(shift)
     return Subject(
         name=f"{twin.name} {shift.start_gear}-{shift.end_gear}",
         model=model,
-        start=steady_start(model, shift.offgoing, _usual_speed(twin)),
+        start=compute_steady_start(model, shift.offgoing, _compute_usual_speed(twin)),
         note=f"identified by the {twin.method} method, loss law {model.loss_law}",
     )
 
 
-def nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
+def build_nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
     """The shift between two gears without times, as far as a model needs it."""
-    start, end = gears or _first_shift(twin)
-    elements = twin.gear(start).element, twin.gear(end).element
+    start, end = gears or _find_first_shift(twin)
+    elements = twin.get_gear(start).element, twin.get_gear(end).element
     if elements[0] == elements[1]:
         raise InputError(
             f"gears {start!r} and {end!r} of {twin.name!r} are held by the same element",
@@ -58,15 +58,15 @@ def nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
     return Shift(start, end, *elements, kind, never, never, never, never, 0.0)
 
 
-def steady_start(model: DualClutch, locked: str, engine_speed: float) -> State:
+def compute_steady_start(model: DualClutch, locked: str, engine_speed: float) -> State:
     """Constant speed with one element locked: the shaft carries the load, nothing slips."""
-    output_speed = engine_speed / model.ratio(locked)
+    output_speed = engine_speed / model.get_overall_ratio(locked)
     wheel_speed = output_speed / model.i_f
-    twist = model.load.at(wheel_speed) / model.i_f / model.k_o
+    twist = model.load.evaluate(wheel_speed) / model.i_f / model.k_o
     return State(engine_speed, output_speed, wheel_speed, twist, (locked,))
 
 
-def _first_shift(twin: Twin) -> tuple[str, str]:
+def _find_first_shift(twin: Twin) -> tuple[str, str]:
     """First pair of neighbouring gears with a friction curve."""
     for old, new in pairwise(twin.gears):
         held = (twin.gears[old].element, twin.gears[new].element)
@@ -78,6 +78,6 @@ def _first_shift(twin: Twin) -> tuple[str, str]:
     )
 
 
-def _usual_speed(twin: Twin) -> float:
+def _compute_usual_speed(twin: Twin) -> float:
     low, high = twin.validity.get("speed", (DEFAULT_ENGINE_SPEED, DEFAULT_ENGINE_SPEED))
     return 0.5 * (low + high)

@@ -11,23 +11,23 @@ from drivetwin.estimation.analysis.bootstrap import Bootstrap
 from drivetwin.estimation.analysis.friction_dependence import UNITS, Departure
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
 from drivetwin.estimation.analysis.profile_likelihood import Profile
-from drivetwin.estimation.result.suggestion import Suggestion
+from drivetwin.estimation.result.suggestion import ExperimentRanking
 from drivetwin.files.records import FrictionRecord, SuggestionRecord
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 
 
-def suggestions_text(found: tuple[Suggestion, ...]) -> str:
+def format_suggestions(found: tuple[ExperimentRanking, ...]) -> str:
     """`suggestions.json`: by parameter the experiments in order of worth; infinite widths null."""
     rows = [SuggestionRecord.from_result(one).model_dump(mode="json") for one in found]
-    return _text({"suggestions": rows})
+    return _format_json({"suggestions": rows})
 
 
-def profile_text(one: Profile) -> str:
+def format_profile(one: Profile) -> str:
     """`profile.<parameter>.json`: rise of Q over the parameter, and both intervals."""
-    return _text(
+    return _format_json(
         {
             "parameter": one.parameter,
-            "unit": spec_of(one.parameter).unit,
+            "unit": get_parameter_spec(one.parameter).unit,
             "estimate": one.estimate,
             "ci95_profile": one.interval,
             "ci95_linear": one.linear,
@@ -37,13 +37,13 @@ def profile_text(one: Profile) -> str:
     )
 
 
-def bootstrap_text(one: Bootstrap) -> str:
+def format_bootstrap(one: Bootstrap) -> str:
     """`bootstrap.json`: every refit by parameter, and its spread."""
     low, high = one.interval
     std, bias = one.std, one.bias
     parameters = {
         name: {
-            "unit": spec_of(name).unit,
+            "unit": get_parameter_spec(name).unit,
             "estimate": one.estimate[k],
             "std": std[k],
             "bias": bias[k],
@@ -52,19 +52,21 @@ def bootstrap_text(one: Bootstrap) -> str:
         }
         for k, name in enumerate(one.ids)
     }
-    return _text({"seed": one.seed, "failed": one.failed, "parameters": parameters})
+    return _format_json({"seed": one.seed, "failed": one.failed, "parameters": parameters})
 
 
-def friction_text(one: ShapedFriction) -> str:
+def format_friction(one: ShapedFriction) -> str:
     """`friction.json`: μ over slip of the shape asked for, by element, with its 95 % band."""
     curves = {
         name: FrictionRecord.from_result(curve).model_dump(mode="json")
         for name, curve in one.curves.items()
     }
-    return _text({"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves})
+    return _format_json(
+        {"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves}
+    )
 
 
-def departures_text(found: tuple[Departure, ...]) -> str:
+def format_departures(found: tuple[Departure, ...]) -> str:
     """`departures.json`: drag of open clutches, and μ that goes with pressure or temperature."""
     rows = [
         {
@@ -78,8 +80,8 @@ def departures_text(found: tuple[Departure, ...]) -> str:
         }
         for one in found
     ]
-    return _text({"departures": rows})
+    return _format_json({"departures": rows})
 
 
-def _text(content: dict[str, Any]) -> str:
+def _format_json(content: dict[str, Any]) -> str:
     return json.dumps(plain(content), allow_nan=False, ensure_ascii=False, indent=2) + "\n"

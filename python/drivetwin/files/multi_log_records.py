@@ -94,7 +94,7 @@ class HeldOutRecord(Record):
             "outcome": source.outcome,
             "fit": fit,
             "expected": {
-                name: {"outcome": source.outcome_of(name)}
+                name: {"outcome": source.get_signal_outcome(name)}
                 | (vars(bounds[name]) if name in bounds else {})
                 for name in fit
             },

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from drivetwin._util.toml import raise_faults, schema_faults
+from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.errors import ResultFileError, Where
 from drivetwin.files.records import Record
 
@@ -34,7 +34,7 @@ def read_record(path: Path | str, parse: Callable[[str], Any], schema: str, mode
     if not isinstance(tree, dict):
         raise ResultFileError("cannot be read: it is no table", _AGAIN, where)
     _check_schema(tree.get("schema"), schema, str(path))
-    raise_faults(schema_faults(tree, model), ResultFileError, str(path), _AGAIN)
+    raise_faults(validate_schema(tree, model), ResultFileError, str(path), _AGAIN)
     return model.model_validate(tree)
 
 

@@ -18,8 +18,8 @@ from drivetwin.estimation.result.estimate import (
     LoadLaw,
     Verdict,
 )
-from drivetwin.estimation.result.suggestion import Experiment, Suggestion
-from drivetwin.parameters import spec_of
+from drivetwin.estimation.result.suggestion import Experiment, ExperimentRanking
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
 
 OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(finite_or_none)]
@@ -57,7 +57,7 @@ class StribeckRecord(Record):
 class LoadRecord(Record):
     """T_v(ω) = i_f·(T_v/i_f) + aero·(ω·|ω| - mean_speed²) at the wheel; `std` of aero, total.
 
-    aero in N·m·s²/rad², mean_speed in rad/s; `over_eta`: aero is divided by η, as T_v/i_f is.
+    aero in N·m·s²/rad², mean_speed in rad/s; `divide_by_eta`: aero is divided by η, as T_v/i_f is.
     """
 
     aero: FiniteFloat
@@ -65,7 +65,7 @@ class LoadRecord(Record):
     mean_speed: FiniteFloat
     over_eta: bool = False
 
-    def law(self) -> LoadLaw:
+    def to_law(self) -> LoadLaw:
         """Back to the law."""
         return LoadLaw(**self.model_dump())
 
@@ -82,7 +82,7 @@ class FrictionRecord(Record):
     method: str
 
     @model_validator(mode="after")
-    def _arrays_agree(self) -> Self:
+    def _check_array_sizes(self) -> Self:
         lengths = {len(self.slip), len(self.mu), len(self.mu_lo), len(self.mu_hi)}
         if len(lengths) != 1 or not self.slip:
             raise ValueError("slip, mu, mu_lo and mu_hi must be of one length, at least 1")
@@ -97,17 +97,17 @@ class FrictionRecord(Record):
         arrays = ("slip", "mu", "mu_lo", "mu_hi")
         return {name: getattr(source, name).tolist() for name in arrays} | {
             "stribeck": source.stribeck,
-            "stribeck_covariance": _rows(source.stribeck_covariance),
+            "stribeck_covariance": _convert_rows(source.stribeck_covariance),
             "method": source.method_text,
         }
 
-    def curve(self) -> FrictionCurve:
+    def to_curve(self) -> FrictionCurve:
         """Back to the curve, without raw points."""
         return FrictionCurve(
             slip=np.asarray(self.slip),
             mu=np.asarray(self.mu),
-            mu_lo=_array(self.mu_lo),
-            mu_hi=_array(self.mu_hi),
+            mu_lo=_build_array(self.mu_lo),
+            mu_hi=_build_array(self.mu_hi),
             points_slip=np.empty(0),
             points_mu=np.empty(0),
             stribeck=None if self.stribeck is None else Stribeck(**self.stribeck.model_dump()),
@@ -119,14 +119,14 @@ class FrictionRecord(Record):
         )
 
 
-def _rows(matrix: FloatArray | None) -> list[list[float]] | None:
+def _convert_rows(matrix: FloatArray | None) -> list[list[float]] | None:
     """Nested lists of a finite matrix; None where it is unknown."""
     if matrix is None or not np.isfinite(matrix).all():
         return None
     return matrix.tolist()  # type: ignore[no-any-return]
 
 
-def _array(values: list[OptionalFloat]) -> FloatArray:
+def _build_array(values: list[OptionalFloat]) -> FloatArray:
     return np.array([np.nan if value is None else value for value in values])
 
 
@@ -144,12 +144,12 @@ class ParameterRecord(Record):
     reason: str = ""
 
     @model_validator(mode="after")
-    def _bare_numbers_only_where_told(self) -> Self:
+    def _check_identified_numbers(self) -> Self:
         if (self.value is None) != (self.verdict is Verdict.NOT_IDENTIFIABLE):
             raise ValueError("value must be null exactly where the verdict is 'not identifiable'")
         return self
 
-    def estimate(self, parameter_id: str) -> Estimate:
+    def to_estimate(self, parameter_id: str) -> Estimate:
         """Back to the estimate of that id."""
         systematic = None
         if self.std_total is not None and self.std_noise is not None:
@@ -205,8 +205,8 @@ class SuggestionRecord(Record):
     @model_validator(mode="before")
     @classmethod
     def _read_suggestion(cls, source: Any) -> Any:
-        if not isinstance(source, Suggestion):
+        if not isinstance(source, ExperimentRanking):
             return source
         fields = {name: getattr(source, name) for name in ("parameter", "verdict", "half_width")}
-        unit = spec_of(source.parameter).unit
+        unit = get_parameter_spec(source.parameter).unit
         return fields | {"unit": unit, "text": source.text, "experiments": source.prospects}

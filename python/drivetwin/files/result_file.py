@@ -91,7 +91,7 @@ class ResultFile(Record):
             "version": program_version(),
             "parameters": source.estimates,
             "settings": plain(source.settings),
-            "correlation": _correlation(source),
+            "correlation": _build_correlation(source),
             "several": evidence.several,
             "held_out": evidence.held_out,
             "suggestions": evidence.suggestions,
@@ -110,7 +110,7 @@ _SAME_NAME = (
 """Fields that an identification has under the same name."""
 
 
-def _correlation(found: Identification) -> dict[str, dict[str, float]]:
+def _build_correlation(found: Identification) -> dict[str, dict[str, float]]:
     if found.correlation is None:
         return {}
     ids = found.correlation_ids

@@ -40,7 +40,7 @@ _MODELS = {
 is imported when it is asked for."""
 
 
-def json_schema(kind: FileKind | str) -> dict[str, Any]:
+def build_json_schema(kind: FileKind | str) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a file, e.g. of `vehicle-card`.
 
     It says which keys there are, their types and the limits of single values. What depends on

@@ -75,11 +75,11 @@ def twin_from_file(content: TwinFile) -> Twin:
                 for name, one in gearbox.elements.items()
             },
             "channels": {name: ChannelSpec(**dict(one)) for name, one in gearbox.channels.items()},
-            "converter": None if gearbox.converter is None else gearbox.converter.converter(),
-            "parameters": {name: one.estimate(name) for name, one in content.parameters.items()},
-            "friction": {name: one.curve() for name, one in content.friction.items()},
+            "converter": None if gearbox.converter is None else gearbox.converter.to_converter(),
+            "parameters": {name: one.to_estimate(name) for name, one in content.parameters.items()},
+            "friction": {name: one.to_curve() for name, one in content.friction.items()},
             "assumptions": tuple(content.assumptions),
-            "load_law": None if content.load is None else content.load.law(),
+            "load_law": None if content.load is None else content.load.to_law(),
             "covariance_ids": () if covariance is None else tuple(covariance.ids),
             "covariance": None if covariance is None else np.asarray(covariance.matrix),
         }

@@ -13,7 +13,7 @@ import tomlkit
 from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from drivetwin._util.atomic import write_text
-from drivetwin._util.toml import Fault, did_you_mean, raise_faults
+from drivetwin._util.toml import Fault, raise_faults, suggest_spelling
 from drivetwin.errors import InputError, ResultFileError
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.read import read_record
@@ -26,7 +26,7 @@ from drivetwin.files.records import (
     Record,
     SchemaName,
 )
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.vehicle.check import RATIO_TOLERANCE
 from drivetwin.vehicle.spec import ElementKind
@@ -58,7 +58,7 @@ class ElementRecord(Record):
 
     @field_validator("i_c", "i_out")
     @classmethod
-    def _not_zero(cls, ratio: float) -> float:
+    def _reject_zero(cls, ratio: float) -> float:
         if ratio == 0.0:
             raise ValueError("a ratio must not be 0")
         return ratio
@@ -83,7 +83,7 @@ class ConverterRecord(Record):
     capacity: list[FiniteFloat]
     torque_ratio: list[FiniteFloat]
 
-    def converter(self) -> Converter:
+    def to_converter(self) -> Converter:
         """Return the map."""
         return Converter(tuple(self.speed_ratio), tuple(self.capacity), tuple(self.torque_ratio))
 
@@ -114,7 +114,7 @@ class CovarianceRecord(Record):
     matrix: list[list[FiniteFloat]]
 
     @model_validator(mode="after")
-    def _square(self) -> Self:
+    def _check_square(self) -> Self:
         size = len(self.ids)
         if len(self.matrix) != size or any(len(row) != size for row in self.matrix):
             raise ValueError(f"matrix must be {size} by {size}, as ids")
@@ -145,7 +145,7 @@ def write_twin_file(path: Path | str, content: TwinFile) -> None:
     document = tomlkit.document()
     for line in _HEADER:
         document.add(tomlkit.comment(line))
-    for key, value in _without_null(content.model_dump(mode="json", by_alias=True)).items():
+    for key, value in _drop_null(content.model_dump(mode="json", by_alias=True)).items():
         document.add(key, tomlkit.item(value))
     write_text(path, tomlkit.dumps(document))
 
@@ -158,7 +158,7 @@ def read_twin_file(path: Path | str) -> TwinFile:
     """
     content = read_record(path, tomllib.loads, TWIN_SCHEMA, TwinFile)
     raise_faults(
-        twin_faults(content),
+        find_twin_faults(content),
         ResultFileError,
         str(path),
         "correct these entries, or write the file again with `drivetwin identify`",
@@ -166,12 +166,12 @@ def read_twin_file(path: Path | str) -> TwinFile:
     return content
 
 
-def _without_null(value: Any) -> Any:
+def _drop_null(value: Any) -> Any:
     """Drop null table entries, which TOML does not know; null in an array becomes NaN."""
     if isinstance(value, dict):
-        return {k: _without_null(item) for k, item in value.items() if item is not None}
+        return {k: _drop_null(item) for k, item in value.items() if item is not None}
     if isinstance(value, list):
-        return [float("nan") if item is None else _without_null(item) for item in value]
+        return [float("nan") if item is None else _drop_null(item) for item in value]
     return value
 
 
@@ -179,12 +179,12 @@ _ABOVE_ZERO = ("eta", "k_o")
 """Stems of what models and their starts divide by."""
 
 
-def twin_faults(content: TwinFile) -> list[Fault]:
+def find_twin_faults(content: TwinFile) -> list[Fault]:
     """Return all faults of a file whose tables have the right form each."""
-    return [*_gears(content), *_parameters(content), *_friction(content)]
+    return [*_check_gears(content), *_check_parameters(content), *_check_friction(content)]
 
 
-def _gears(content: TwinFile) -> Iterator[Fault]:
+def _check_gears(content: TwinFile) -> Iterator[Fault]:
     """Gears are held by elements of the file, by whose ratios theirs is made."""
     transmission = content.transmission
     elements = transmission.elements
@@ -193,7 +193,7 @@ def _gears(content: TwinFile) -> Iterator[Fault]:
         key = f"transmission.gears.{name}"
         element = elements.get(gear.element)
         if element is None:
-            text = f"no element {gear.element!r}{did_you_mean(gear.element, elements)}"
+            text = f"no element {gear.element!r}{suggest_spelling(gear.element, elements)}"
             yield Fault(f"{key}.element", text)
             continue
         product = transmission.i_in * element.i_c * element.i_out
@@ -203,12 +203,12 @@ def _gears(content: TwinFile) -> Iterator[Fault]:
             yield Fault(f"{key}.ratio", text)
 
 
-def _parameters(content: TwinFile) -> Iterator[Fault]:
+def _check_parameters(content: TwinFile) -> Iterator[Fault]:
     """Ids and units are those of the parameter table."""
     for name, one in content.parameters.items():
         key = f"parameters.{name}"
         try:
-            spec = spec_of(name)
+            spec = get_parameter_spec(name)
         except InputError as error:
             yield Fault(key, error.what)
             continue
@@ -218,13 +218,13 @@ def _parameters(content: TwinFile) -> Iterator[Fault]:
             yield Fault(f"{key}.value", f"{one.value:g} is impossible; it must be above zero")
 
 
-def _friction(content: TwinFile) -> Iterator[Fault]:
+def _check_friction(content: TwinFile) -> Iterator[Fault]:
     """Curves belong to elements of the file and run over slips that increase."""
     elements = content.transmission.elements
     for name, curve in content.friction.items():
         key = f"friction.{name}"
         if name not in elements:
-            yield Fault(key, f"no element {name!r}{did_you_mean(name, elements)}")
+            yield Fault(key, f"no element {name!r}{suggest_spelling(name, elements)}")
         if any(a >= b for a, b in zip(curve.slip, curve.slip[1:], strict=False)):
             yield Fault(f"{key}.slip", "the slips do not increase")
         if curve.stribeck is not None and curve.stribeck.v_s <= 0.0:

@@ -16,12 +16,12 @@ from time import monotonic, sleep
 from typing import Any
 from uuid import uuid4
 
-from drivetwin._util.optional_dependencies import require
+from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.errors import SchedulerError, Where
 from drivetwin.fleet.events import Listener, Noted
-from drivetwin.fleet.guarded_worker import Cell
+from drivetwin.fleet.guarded_worker import GuardedWorker
 from drivetwin.fleet.pool import AHEAD
-from drivetwin.fleet.task import Lost, Reply, Task, WorkerSpec
+from drivetwin.fleet.task import Reply, Task, WorkerLost, WorkerSpec
 
 _FIRST_CONTACT = 10.0
 """Time [s] in which a scheduler must answer at the start ..."""
@@ -34,11 +34,11 @@ _COUNT_EVERY = 5.0
 _cells = threading.local()
 
 
-def run_in_cell(task: str, spec: WorkerSpec) -> Reply:
+def run_guarded(task: str, spec: WorkerSpec) -> Reply:
     """Run a task on a Dask worker, in the guarded process of this thread."""
     if getattr(_cells, "spec", None) != spec:
-        _cells.spec, _cells.cell = spec, Cell(spec)
-    cell: Cell = _cells.cell
+        _cells.spec, _cells.cell = spec, GuardedWorker(spec)
+    cell: GuardedWorker = _cells.cell
     return cell.run(Task.from_json(task))
 
 
@@ -51,7 +51,7 @@ class DaskPool:
     def __init__(
         self, address: str, spec: WorkerSpec, tell: Listener, patience: float = _PATIENCE
     ) -> None:
-        self._distributed = _quiet_distributed(address)
+        self._distributed = _import_distributed_quietly(address)
         self._scheduler = address
         self._spec = spec
         self._tell = tell
@@ -87,7 +87,7 @@ class DaskPool:
         self._out[number] = (task, None)
         try:
             future = self._client.submit(
-                run_in_cell, task.to_json(), self._spec, key=f"{task.log}-{self._run}-{number}",
+                run_guarded, task.to_json(), self._spec, key=f"{task.log}-{self._run}-{number}",
                 pure=False, retries=0,
             )  # fmt: skip
         except Exception as fault:
@@ -112,8 +112,8 @@ class DaskPool:
         if task is None:  # it was given up before, and is done again
             return None
         if isinstance(done, Exception):
-            return task, Lost("the scheduler went away", blame=False)
-        return task, _reply(done)
+            return task, WorkerLost("the scheduler went away", blame=False)
+        return task, _get_reply(done)
 
     def close(self) -> None:
         """Give back what is not done and leave the cluster."""
@@ -121,9 +121,9 @@ class DaskPool:
             self._client.cancel(
                 [future for _, future in self._out.values() if future is not None], force=True
             )
-        self._leave()
+        self._disconnect()
 
-    def _leave(self) -> None:
+    def _disconnect(self) -> None:
         with contextlib.suppress(Exception):
             self._client.close(timeout=2.0)
 
@@ -146,7 +146,7 @@ class DaskPool:
     def _reconnect(self) -> None:
         """Wait for a scheduler, and submit all tasks in flight again."""
         self._tell(Noted(f"lost the scheduler at {self._scheduler}; waiting for it"))
-        self._leave()
+        self._disconnect()
         self._client = self._connect(self._patience)
         for number in self._out:
             self._replies.put((number, ConnectionError()))
@@ -154,15 +154,15 @@ class DaskPool:
         self._tell(Noted("the scheduler is back"))
 
 
-def _quiet_distributed(address: str) -> Any:
+def _import_distributed_quietly(address: str) -> Any:
     """Import Dask with its connection-loss log messages disabled; the run reports such losses."""
-    dask = require("dask", "fleet", "a Dask cluster", Path(address))
+    dask = import_extra("dask", "fleet", "a Dask cluster", Path(address))
     silent = {"distributed": "critical", "distributed.client": "critical"}
     dask.config.set({"logging": silent})
-    return require("distributed", "fleet", "a Dask cluster", Path(address))
+    return import_extra("distributed", "fleet", "a Dask cluster", Path(address))
 
 
-def _reply(done: Any) -> Reply:
+def _get_reply(done: Any) -> Reply:
     """Return the reply of a finished Dask future."""
     try:
         if done.status == "finished":
@@ -170,7 +170,7 @@ def _reply(done: Any) -> Reply:
             return reply
         if done.status == "error":
             fault = done.exception(timeout=_FIRST_CONTACT)
-            return Lost(f"was lost by the cluster ({type(fault).__name__}: {fault})"[:300])
+            return WorkerLost(f"was lost by the cluster ({type(fault).__name__}: {fault})"[:300])
     except (OSError, TimeoutError, CancelledError):
-        return Lost("the scheduler went away with the answer", blame=False)
-    return Lost("the cluster took the task back", blame=False)
+        return WorkerLost("the scheduler went away with the answer", blame=False)
+    return WorkerLost("the cluster took the task back", blame=False)

@@ -14,10 +14,19 @@ from drivetwin.errors import StoreError, Where
 from drivetwin.fleet.events import Listener, Retried, Settled, Started, Summary
 from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.pool import Pool
-from drivetwin.fleet.scan import Scan, Scanned, Skipped, settings_document
+from drivetwin.fleet.scan import Scan, Scanned, Skipped, make_settings_document
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import Finished, Lost, Outcome, Recipe, Reply, State, Stopped, Task
+from drivetwin.fleet.task import (
+    Aborted,
+    Completed,
+    Outcome,
+    Reply,
+    State,
+    Task,
+    TaskSpec,
+    WorkerLost,
+)
 
 _COMMIT_EVERY = 1.0
 """Time [s] after which what was learnt is made last. A run that is killed does not compute more
@@ -28,7 +37,7 @@ _BACK_OFF = 0.5
 
 
 @dataclass(frozen=True)
-class Wishes:
+class RunOptions:
     """Options of a fleet run.
 
     `attempts` is the number of tries of a log after lost workers. `retry` selects the quarantined
@@ -44,7 +53,7 @@ class Wishes:
 class Coordinator:
     """Scheduler of one run: `run` processes the files of `sources` into `store`."""
 
-    def __init__(self, store: Store, pool: Pool, wishes: Wishes, tell: Listener) -> None:
+    def __init__(self, store: Store, pool: Pool, wishes: RunOptions, tell: Listener) -> None:
         self._store = store
         self._index = store.index
         self._pool = pool
@@ -68,8 +77,8 @@ class Coordinator:
         files = sources.count()
         self._tell(Started(files, str(self._store.folder), self._pool.address))
         try:
-            with closing(self._tasks(scan, sources)) as tasks:
-                self._work(tasks)
+            with closing(self._iterate_tasks(scan, sources)) as tasks:
+                self._run_tasks(tasks)
             complete = True
             self._store.compact()
         except KeyboardInterrupt:
@@ -84,11 +93,11 @@ class Coordinator:
         self._tell(summary)
         return summary
 
-    def _work(self, tasks: Generator[Task]) -> None:
+    def _run_tasks(self, tasks: Generator[Task]) -> None:
         more = True
         while more or self._out:
             while len(self._out) - len(self._later) < self._pool.capacity:
-                task = self._due()
+                task = self._get_due_task()
                 if task is None and more and len(self._later) < self._pool.capacity:
                     task = next(tasks, None)
                     more = task is not None
@@ -97,17 +106,17 @@ class Coordinator:
                 self._pool.submit(task)
             answer = self._pool.next(_TICK)
             if answer is not None:
-                self._take(*answer)
+                self._handle_reply(*answer)
             self._commit_if_due()
 
-    def _due(self) -> Task | None:
+    def _get_due_task(self) -> Task | None:
         """Return the next task to retry, unless its lost worker has written the result."""
         while self._later and self._later[0][0] <= monotonic():
             task = heapq.heappop(self._later)[2]
-            outcome = self._store.written(task.log)
-            if outcome is None or self._store.misses(task):
+            outcome = self._store.read_part_outcome(task.log)
+            if outcome is None or self._store.has_missing_files(task):
                 return task
-            self._finish(task, Finished(outcome, 0.0))
+            self._record_completion(task, Completed(outcome, 0.0))
         return None
 
     def _commit_if_due(self) -> None:
@@ -115,100 +124,108 @@ class Coordinator:
             self._index.commit()
             self._committed = monotonic()
 
-    def _tasks(self, scan: Scan, sources: Sources) -> Generator[Task]:
+    def _iterate_tasks(self, scan: Scan, sources: Sources) -> Generator[Task]:
         """Tasks of the files that still need work; the others are settled on the way."""
-        with closing(scan.scanned(sources, self._index.file)) as found:
+        with closing(scan.scan_files(sources, self._index.get_file)) as found:
             for one in found:
                 self._commit_if_due()
                 if isinstance(one, Skipped):
                     self._skipped += 1
-                elif not self._index.seen_in_this_run(one.file.path):
-                    self._index.put_file(one.file)
-                    task = self._task(one)
+                elif not self._index.has_file_from_this_run(one.file.path):
+                    self._index.set_file(one.file)
+                    task = self._make_task(one)
                     if task is not None:
                         yield task
 
-    def _task(self, one: Scanned) -> Task | None:
+    def _make_task(self, one: Scanned) -> Task | None:
         """Create the task of a file; None if its outcome exists or its task is in flight."""
         file = one.file
         version = "" if one.recipe is None else one.recipe.version
         if one.recipe is not None and one.settings not in self._settings:
             self._settings.add(one.settings)
-            self._index.put_settings(one.settings, version, settings_document(one.recipe))
+            self._index.set_settings(one.settings, version, make_settings_document(one.recipe))
         if file.log in self._out:
             self._out[file.log].append(file)
             return None
-        self._index.put_waiting(file.log, file.content, one.settings, version)
+        self._index.add_waiting_log(file.log, file.content, one.settings, version)
         if one.recipe is None:
             assert one.fault is not None
-            self._settle(file.log, [file], Finished(one.fault, 0.0), computed=False)
+            self._record_outcome(file.log, [file], Completed(one.fault, 0.0), computed=False)
             return None
-        task = self._task_of(file, one.recipe)
-        if self._known(task, file):
+        task = self._build_task(file, one.recipe)
+        if self._reuse_outcome(task, file):
             return None
         self._out[file.log] = [file]
         return task
 
-    def _task_of(self, file: FileRow, recipe: Recipe) -> Task:
+    def _build_task(self, file: FileRow, recipe: TaskSpec) -> Task:
         store, log = self._store, file.log
         return Task(
-            log, file.path, file.content, recipe, str(store.part(log)),
-            report=str(store.report(log)) if self._wishes.reports else None,
-            traces=str(store.traces(log)) if self._wishes.traces else None,
+            log, file.path, file.content, recipe, str(store.get_part_path(log)),
+            report=str(store.get_report_path(log)) if self._wishes.reports else None,
+            traces=str(store.get_traces_path(log)) if self._wishes.traces else None,
         )  # fmt: skip
 
-    def _known(self, task: Task, file: FileRow) -> bool:
+    def _reuse_outcome(self, task: Task, file: FileRow) -> bool:
         """Reuse the stored outcome of a log if all its files exist; return True if reused."""
         log = task.log
-        state = self._index.state(log)
+        state = self._index.get_state(log)
         if state is State.QUARANTINED and self._wishes.retry:
             self._index.reset([log])
             return False
         if state is State.WAITING:
-            outcome = self._store.written(log)
-            if outcome is None or (outcome.state is State.DONE and self._store.misses(task)):
+            outcome = self._store.read_part_outcome(log)
+            if outcome is None or (
+                outcome.state is State.DONE and self._store.has_missing_files(task)
+            ):
                 return False
-            self._settle(log, [file], Finished(outcome, 0.0), computed=False)
+            self._record_outcome(log, [file], Completed(outcome, 0.0), computed=False)
             return True
-        if state is State.DONE and self._store.misses(task):
+        if state is State.DONE and self._store.has_missing_files(task):
             return False
-        self._announce(file, self._index.outcome(log), 0.0, computed=False)
+        self._notify_outcome(file, self._index.get_outcome(log), 0.0, computed=False)
         return True
 
-    def _take(self, task: Task, reply: Reply) -> None:
+    def _handle_reply(self, task: Task, reply: Reply) -> None:
         """Handle the reply of a worker."""
-        if isinstance(reply, Stopped):
+        if isinstance(reply, Aborted):
             raise StoreError(reply.what, reply.remedy, Where(file=str(self._store.folder)))
-        if isinstance(reply, Lost):
-            self._lost(task, reply)
+        if isinstance(reply, WorkerLost):
+            self._handle_loss(task, reply)
             return
         self._tries[task.log] += 1
-        self._finish(task, reply)
+        self._record_completion(task, reply)
 
-    def _finish(self, task: Task, reply: Finished) -> None:
-        self._index.put_attempts(task.log, self._tries.pop(task.log, 0))
-        self._settle(task.log, self._out.pop(task.log), reply, computed=True)
+    def _record_completion(self, task: Task, reply: Completed) -> None:
+        self._index.set_attempts(task.log, self._tries.pop(task.log, 0))
+        self._record_outcome(task.log, self._out.pop(task.log), reply, computed=True)
 
-    def _lost(self, task: Task, loss: Lost) -> None:
+    def _handle_loss(self, task: Task, loss: WorkerLost) -> None:
         """Schedule a retry of a log, or quarantine the log after too many lost workers."""
         wait = 0.0
         if loss.blame:
             self._tries[task.log] += 1
             tries = self._tries[task.log]
             if tries >= self._wishes.attempts:
-                self._finish(task, Finished(_worker_killer(tries, loss.reason), 0.0))
+                self._record_completion(
+                    task, Completed(_make_quarantine_outcome(tries, loss.reason), 0.0)
+                )
                 return
             wait = _BACK_OFF * 2.0 ** (tries - 1)
         heapq.heappush(self._later, (monotonic() + wait, task.log, task))
         self._tell(Retried(task.log, loss.reason, wait))
 
-    def _settle(self, log: str, files: list[FileRow], reply: Finished, *, computed: bool) -> None:
-        self._index.put_outcome(log, reply.outcome, reply.seconds)
+    def _record_outcome(
+        self, log: str, files: list[FileRow], reply: Completed, *, computed: bool
+    ) -> None:
+        self._index.set_outcome(log, reply.outcome, reply.seconds)
         self._computed += computed
         for file in files:
-            self._announce(file, reply.outcome, reply.seconds, computed=computed)
+            self._notify_outcome(file, reply.outcome, reply.seconds, computed=computed)
 
-    def _announce(self, file: FileRow, outcome: Outcome, seconds: float, *, computed: bool) -> None:
+    def _notify_outcome(
+        self, file: FileRow, outcome: Outcome, seconds: float, *, computed: bool
+    ) -> None:
         self._states[outcome.state] += 1
         if outcome.error:
             self._failures[outcome.error] += 1
@@ -226,7 +243,7 @@ class Coordinator:
         )
 
 
-def _worker_killer(tries: int, reason: str) -> Outcome:
+def _make_quarantine_outcome(tries: int, reason: str) -> Outcome:
     return Outcome(
         State.QUARANTINED,
         error="WorkerLost",

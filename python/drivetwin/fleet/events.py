@@ -76,6 +76,6 @@ Event = Started | Settled | Retried | Noted | Summary
 Listener = Callable[[Event], None]
 
 
-def document(event: Event) -> dict[str, Any]:
+def to_document(event: Event) -> dict[str, Any]:
     """For a line of JSON."""
     return {"event": event.event, **asdict(event)}

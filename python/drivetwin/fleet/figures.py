@@ -7,28 +7,28 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from drivetwin._util.display_units import display_of
+from drivetwin._util.display_units import get_display_unit
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fleet.mixed_model.mixed import FloatArray
 from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, UnitValue
-from drivetwin.fleet.readings import moment, reading_text
+from drivetwin.fleet.readings import format_reading, to_datetime
 from drivetwin.fleet.rules import is_date
-from drivetwin.report.labels import parameter_label
-from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, axis, layout
+from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, make_axis, make_layout
 
 _MOST_POINTS = 4000
 _BAND = "rgba(213,94,0,0.18)"
 
 
-def drift_figure(one: JointEstimate) -> go.Figure:
+def plot_drift(one: JointEstimate) -> go.Figure:
     """Every log over the first field, with the shared line, its 95 % band, changes and outliers.
 
     Of very many logs every n-th is drawn.
     """
-    display = display_of(one.si_unit)
+    display = get_display_unit(one.si_unit)
     drift, points = one.drifts[0], one.points
     out = np.isin(points.value, [outlier.value for outlier in one.outliers])
-    after = _after_change(one) & ~out
+    after = _mask_after_change(one) & ~out
     stride = -(-points.value.size // _MOST_POINTS)
     kept = np.arange(0, points.value.size, stride)
     figure = go.Figure()
@@ -39,8 +39,8 @@ def drift_figure(one: JointEstimate) -> go.Figure:
     ):
         if picked.size:
             figure.add_scatter(
-                x=_shown(drift.field, points.reading[picked]),
-                y=display.of(points.value[picked]),
+                x=_convert_readings(drift.field, points.reading[picked]),
+                y=display.to_display(points.value[picked]),
                 text=[points.unit[k] for k in picked],
                 mode="markers",
                 name=name,
@@ -50,20 +50,22 @@ def drift_figure(one: JointEstimate) -> go.Figure:
             )  # fmt: skip
     _add_line(figure, one, drift)
     for change in one.changes:
-        place = _shown(drift.field, np.array([0.5 * (change.before + change.after)]))[0]
+        place = _convert_readings(drift.field, np.array([0.5 * (change.before + change.after)]))[0]
         figure.add_vline(x=place, line={"color": SECOND, "width": 1.5, "dash": "dash"})
     figure.update_layout(
-        layout(
+        make_layout(
             380,
-            xaxis=axis(drift.field),
-            yaxis=axis(f"{parameter_label(one.parameter)} [{display.label}]", exponentformat="e"),
+            xaxis=make_axis(drift.field),
+            yaxis=make_axis(
+                f"{get_parameter_label(one.parameter)} [{display.label}]", exponentformat="e"
+            ),
             hovermode="closest",
         )
     )
     return figure
 
 
-def _after_change(one: JointEstimate) -> NDArray[np.bool_]:
+def _mask_after_change(one: JointEstimate) -> NDArray[np.bool_]:
     """Return the mask of points that belong to a changed unit after its change."""
     units, found = np.array(one.points.unit), np.zeros(one.points.value.size, np.bool_)
     for change in one.changes:
@@ -73,17 +75,17 @@ def _after_change(one: JointEstimate) -> NDArray[np.bool_]:
 
 def _add_line(figure: go.Figure, one: JointEstimate, drift: Drift) -> None:
     """The shared line through the reference, and the band of its level and slope together."""
-    display = display_of(one.si_unit)
+    display = get_display_unit(one.si_unit)
     ends = np.linspace(np.min(one.points.reading), np.max(one.points.reading), 41)
     away = ends - drift.reference
     middle = one.value + drift.slope * away
     level = 0.5 * (one.ci95[1] - one.ci95[0])
     slope = 0.5 * (drift.ci95[1] - drift.ci95[0])
     half = np.hypot(level, slope * away)
-    x = _shown(drift.field, ends)
+    x = _convert_readings(drift.field, ends)
     figure.add_scatter(
         x=np.concatenate((x, x[::-1])),
-        y=display.of(np.concatenate((middle + half, (middle - half)[::-1]))),
+        y=display.to_display(np.concatenate((middle + half, (middle - half)[::-1]))),
         fill="toself",
         fillcolor=_BAND,
         line={"width": 0},
@@ -91,13 +93,17 @@ def _add_line(figure: go.Figure, one: JointEstimate, drift: Drift) -> None:
         hoverinfo="skip",
     )
     figure.add_scatter(
-        x=x, y=display.of(middle), mode="lines", name="fleet", line={"color": FITTED, "width": 2.2}
+        x=x,
+        y=display.to_display(middle),
+        mode="lines",
+        name="fleet",
+        line={"color": FITTED, "width": 2.2},
     )
 
 
-def units_figure(one: JointEstimate) -> go.Figure:
+def plot_units(one: JointEstimate) -> go.Figure:
     """Plot the sorted deviations of the units with 95 % intervals; highlight the outliers."""
-    display = display_of(one.si_unit)
+    display = get_display_unit(one.si_unit)
     units = sorted(one.units, key=lambda unit: unit.deviation)
     figure = go.Figure()
     for odd, colour, name in ((False, MEASURED, "unit"), (True, ACCENT, "beyond chance")):
@@ -113,26 +119,26 @@ def units_figure(one: JointEstimate) -> go.Figure:
                 "thickness": 1,
                 "width": 0,
             },
-            text=[unit_label(one, unit) for _, unit in picked],
+            text=[format_unit(one, unit) for _, unit in picked],
             mode="markers",
             name=name,
             marker={"color": colour, "size": 6},
             hovertemplate="unit %{text}: %{y:.3g}<extra></extra>",
         )
     few = len(units) <= 80
-    ticks = [unit_label(one, unit) for unit in units] if few else None
+    ticks = [format_unit(one, unit) for unit in units] if few else None
     figure.update_layout(
-        layout(
+        make_layout(
             340,
-            xaxis=axis(
+            xaxis=make_axis(
                 "unit, from low to high",
                 tickvals=list(range(len(units))) if few else None,
                 ticktext=ticks,
                 showticklabels=few,
                 tickfont={"size": 9},
             ),
-            yaxis=axis(
-                f"deviation of {parameter_label(one.parameter)} [{display.label}]",
+            yaxis=make_axis(
+                f"deviation of {get_parameter_label(one.parameter)} [{display.label}]",
                 exponentformat="e",  # a prefix μ would be taken for friction
             ),
             hovermode="closest",
@@ -141,17 +147,17 @@ def units_figure(one: JointEstimate) -> go.Figure:
     return figure
 
 
-def unit_label(one: JointEstimate, unit: UnitValue) -> str:
+def format_unit(one: JointEstimate, unit: UnitValue) -> str:
     """Format the label of a unit, before or after a change."""
     if unit.since is None:
         return unit.unit
-    return f"{unit.unit} from {reading_text(one.drifts[0].field, unit.since)}"
+    return f"{unit.unit} from {format_reading(one.drifts[0].field, unit.since)}"
 
 
-def _shown(
+def _convert_readings(
     field: str, readings: FloatArray
 ) -> FloatArray | np.ndarray[tuple[int], np.dtype[np.object_]]:
     """Convert readings for plotting; date fields become dates."""
     if not is_date(field):
         return readings
-    return np.array([moment(each) for each in readings], dtype=object)
+    return np.array([to_datetime(each) for each in readings], dtype=object)

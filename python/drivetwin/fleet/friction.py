@@ -16,24 +16,24 @@ _LEAST = 5
 """Logs that must reach a slip."""
 
 
-def fleet_friction(store: Store) -> dict[str, FrictionCurve]:
+def compute_fleet_friction(store: Store) -> dict[str, FrictionCurve]:
     """Median μ over slip of each element, and the band from 2.5 to 97.5 % of all logs' curves."""
     import pyarrow.compute as pc
 
-    rows = store.rows(RowKind.FRICTION).select(["log", "name", "value", "at"])
+    rows = store.read_rows(RowKind.FRICTION).select(["log", "name", "value", "at"])
     found = {}
     for element in sorted(set(rows.column("name").to_pylist())):
         picked = rows.filter(pc.equal(rows.column("name"), element))
         logs, slip, mu = (np.asarray(picked.column(name)) for name in ("log", "at", "value"))
         ends = np.flatnonzero(logs[1:] != logs[:-1]) + 1
         curves = list(zip(np.split(slip, ends), np.split(mu, ends), strict=True))
-        curve = _curve(curves)
+        curve = _compute_percentiles(curves)
         if curve is not None:
             found[element] = curve
     return found
 
 
-def _curve(curves: Sequence[tuple[FloatArray, FloatArray]]) -> FrictionCurve | None:
+def _compute_percentiles(curves: Sequence[tuple[FloatArray, FloatArray]]) -> FrictionCurve | None:
     """Percentiles over the curves (slip, μ) at slips that enough of them reach."""
     grid = np.linspace(
         min(slip[0] for slip, _ in curves), max(slip[-1] for slip, _ in curves), _POINTS

@@ -16,16 +16,16 @@ from time import monotonic, sleep
 from typing import IO
 
 from drivetwin.fleet.task import (
-    Finished,
+    Aborted,
+    Completed,
     Limits,
-    Lost,
     Outcome,
     Reply,
     State,
-    Stopped,
     Task,
+    WorkerLost,
     WorkerSpec,
-    memory_exceeded,
+    make_memory_outcome,
 )
 
 _LOOK = 0.1
@@ -54,7 +54,7 @@ class _GoneError(Exception):
     """The worker ended without an answer."""
 
 
-class Cell:
+class GuardedWorker:
     """Worker process, started on demand and restarted after its end.
 
     For use by one thread; only `kill` may be called by others.
@@ -74,16 +74,16 @@ class Cell:
             return fault
         try:
             self._send(task)
-            reply = self._line(monotonic() + limits.seconds, limits.memory)
+            reply = self._read_line(monotonic() + limits.seconds, limits.memory)
         except _GoneError:
-            return Lost(self._end(_GRACE))
+            return WorkerLost(self._stop_process(_GRACE))
         if isinstance(reply, Outcome):
-            self._end()
-            return Finished(reply, limits.seconds)
+            self._stop_process()
+            return Completed(reply, limits.seconds)
         tree = json.loads(reply)
         if "stop" in tree:
-            return Stopped(tree["stop"], tree["remedy"])
-        return Finished(Outcome.of(tree["outcome"]), tree["seconds"])
+            return Aborted(tree["stop"], tree["remedy"])
+        return Completed(Outcome.from_tree(tree["outcome"]), tree["seconds"])
 
     def kill(self) -> None:
         """End a log in progress, from any thread; no worker is made again."""
@@ -96,9 +96,9 @@ class Cell:
         """End the worker, if there is one, from the thread that uses the cell."""
         self._closed = True
         if self._process is not None:
-            self._end()
+            self._stop_process()
 
-    def _start(self) -> Lost | Stopped | None:
+    def _start(self) -> WorkerLost | Aborted | None:
         """Start a worker and wait until it is ready; a failed start is not counted against the log.
 
         One that ends by itself will do so again; one that was killed may have been unlucky.
@@ -106,22 +106,22 @@ class Cell:
         why = ""
         for pause in _PAUSES:
             if self._closed:
-                return Lost("the run was ended", blame=False)
+                return WorkerLost("the run was ended", blame=False)
             if self._process is not None:
                 return None
             try:
                 self._spawn()
-                if not isinstance(self._line(monotonic() + _START, sys.maxsize), Outcome):
+                if not isinstance(self._read_line(monotonic() + _START, sys.maxsize), Outcome):
                     return None
-                why = self._end()
+                why = self._stop_process()
             except _GoneError:
-                why = self._end(_GRACE)
+                why = self._stop_process(_GRACE)
             except OSError as fault:
                 why = str(fault.strerror)
             if why.startswith(_BY_ITSELF):
                 break
             sleep(pause)
-        return Stopped(
+        return Aborted(
             f"no worker starts: it {why}", "see whether `drivetwin identify` runs on this machine"
         )
 
@@ -146,7 +146,7 @@ class Cell:
             self._process.stdin.write(task.to_json().encode() + b"\n")
             self._process.stdin.flush()
 
-    def _line(self, deadline: float, memory: int) -> bytes | Outcome:
+    def _read_line(self, deadline: float, memory: int) -> bytes | Outcome:
         """The worker's next line, or what it went beyond. Raises _GoneError at its end."""
         assert self._process is not None
         assert self._process.stdout is not None
@@ -159,13 +159,13 @@ class Cell:
                     raise _GoneError
                 self._pending += data
             elif monotonic() > deadline:
-                return time_exceeded(self._spec.limits)
-            elif _resident(self._process.pid) > memory:
-                return memory_exceeded(memory)
+                return make_timeout_outcome(self._spec.limits)
+            elif _read_resident_memory(self._process.pid) > memory:
+                return make_memory_outcome(memory)
         line, _, self._pending = self._pending.partition(b"\n")
         return line
 
-    def _end(self, grace: float = 0.0) -> str:
+    def _stop_process(self, grace: float = 0.0) -> str:
         """End the worker for good, after `grace` [s] to end by itself; how it ended."""
         process, self._process = self._process, None
         assert process is not None
@@ -178,12 +178,12 @@ class Cell:
             assert pipe is not None
             with contextlib.suppress(BrokenPipeError):
                 pipe.close()
-        last = self._last_words()
+        last = self._read_last_stderr()
         if code < 0:
             return f"was killed by {signal.Signals(-code).name}{last}"
         return f"{_BY_ITSELF} {code}{last}"
 
-    def _last_words(self) -> str:
+    def _read_last_stderr(self) -> str:
         assert self._stderr is not None
         with self._stderr as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - 2000))
@@ -191,7 +191,7 @@ class Cell:
         return f": {lines[-1][:300]}" if lines else ""
 
 
-def time_exceeded(limits: Limits) -> Outcome:
+def make_timeout_outcome(limits: Limits) -> Outcome:
     """Return the outcome of a log that exceeded the time limit."""
     return Outcome(
         State.QUARANTINED,
@@ -202,7 +202,7 @@ def time_exceeded(limits: Limits) -> Outcome:
     )
 
 
-def _resident(pid: int) -> int:
+def _read_resident_memory(pid: int) -> int:
     """Read the resident memory [bytes] of a process; 0 if the system does not report it."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])

@@ -16,19 +16,19 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, InputError, MissingChannelError, StoreError, Where
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
-from drivetwin.estimation.result.verdict import judge
-from drivetwin.fleet.mixed_model.remove_priors import free_friction
-from drivetwin.fleet.parts import writing
+from drivetwin.estimation.result.verdict import assess
+from drivetwin.fleet.mixed_model.remove_priors import remove_friction_prior
+from drivetwin.fleet.parts import convert_write_errors
 from drivetwin.fleet.rows import MU, Found, Row, RowKind
-from drivetwin.fleet.scan import inputs_of
-from drivetwin.fleet.task import Recipe, ShiftRow, Task
+from drivetwin.fleet.scan import compute_input_hashes
+from drivetwin.fleet.task import ShiftRow, Task, TaskSpec
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.read import read_log
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import FoundShifts, usable_shifts
+from drivetwin.shifts.detect import FoundShifts, require_shifts
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import validated
+from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import VehicleCard, load_card
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def identify_log(task: Task) -> Found:
     """
     recipe = task.recipe
     _check_inputs(recipe)  # before, for what is broken by now is not the log's fault
-    card = _card(recipe)
+    card = _load_card(recipe)
     mapping = None if recipe.channels is None else Path(recipe.channels)
     log = read_log(Path(task.path), card, mapping)
     _check_inputs(recipe)
@@ -57,25 +57,25 @@ def identify_log(task: Task) -> Found:
             "run the same command again when it is complete",
             Where(file=task.path),
         )
-    found_shifts = usable_shifts(log, card)
+    found_shifts = require_shifts(log, card)
     found = identify(log, card, found_shifts, recipe.method)
     twin = build_twin(found, card)
-    found = validated(found, twin, log)
-    _artefacts(task, found, log)
-    rows = [*_means(task, mapping), *result_rows(found, card, recipe.mu_slip)]
-    return Found(rows, shift_rows(found_shifts))
+    found = attach_validation(found, twin, log)
+    _write_artefacts(task, found, log)
+    rows = [*_compute_channel_means(task, mapping), *make_result_rows(found, card, recipe.mu_slip)]
+    return Found(rows, make_shift_rows(found_shifts))
 
 
 @lru_cache(_CARDS)
-def _card(recipe: Recipe) -> VehicleCard:
+def _load_card(recipe: TaskSpec) -> VehicleCard:
     """The card of a recipe, which holds the file's hash: a changed card is another recipe."""
     return load_card(Path(recipe.vehicle))
 
 
-def _check_inputs(recipe: Recipe) -> None:
+def _check_inputs(recipe: TaskSpec) -> None:
     """Raise StoreError if card or mapping changed after the log's key was computed."""
     try:
-        same = inputs_of(recipe.vehicle, recipe.channels) == recipe.inputs
+        same = compute_input_hashes(recipe.vehicle, recipe.channels) == recipe.inputs
     except (OSError, InputError):
         same = False
     if not same:
@@ -86,21 +86,21 @@ def _check_inputs(recipe: Recipe) -> None:
         )
 
 
-def _artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
+def _write_artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
     """Write the report and the traces that are wanted besides. Raises StoreError."""
     if task.report is not None:
         from drivetwin.fleet.pages import save_single
 
-        with writing():
+        with convert_write_errors():
             save_single(Path(task.report), found, log)
     if task.traces is not None:
         from drivetwin.fleet.pages import save_traces
 
-        with writing():
+        with convert_write_errors():
             save_traces(Path(task.traces), found)
 
 
-def _means(task: Task, mapping: Path | None) -> Iterator[Row]:
+def _compute_channel_means(task: Task, mapping: Path | None) -> Iterator[Row]:
     """Mean of each channel that is a field of the log, in the file's unit.
 
     A channel without any value has no mean and gets a warning. Raises MissingChannelError.
@@ -128,7 +128,7 @@ def _means(task: Task, mapping: Path | None) -> Iterator[Row]:
             yield Row(RowKind.FIELD, field, float(np.mean(known)), si_unit=unit)
 
 
-def shift_rows(found: FoundShifts) -> list[ShiftRow]:
+def make_shift_rows(found: FoundShifts) -> list[ShiftRow]:
     """Used shifts, then refused ones."""
     used = [
         ShiftRow(
@@ -147,12 +147,16 @@ def shift_rows(found: FoundShifts) -> list[ShiftRow]:
     return [*used, *refused]
 
 
-def result_rows(found: Identification, card: VehicleCard, mu_slip: float) -> list[Row]:
+def make_result_rows(found: Identification, card: VehicleCard, mu_slip: float) -> list[Row]:
     """All rows of an identification; `mu_slip` [rad/s] is where friction is compared."""
     return [
-        *_parameter_rows(found, card, mu_slip),
-        *(row for name, curve in found.friction.items() for row in _friction_rows(name, curve)),
-        *_fit_rows(found),
+        *_make_parameter_rows(found, card, mu_slip),
+        *(
+            row
+            for name, curve in found.friction.items()
+            for row in _make_friction_rows(name, curve)
+        ),
+        *_make_fit_rows(found),
         *(
             Row(RowKind.QUALITY, name, float(value), shift=number)
             for number, shift in enumerate(found.shifts)
@@ -162,14 +166,14 @@ def result_rows(found: Identification, card: VehicleCard, mu_slip: float) -> lis
     ]
 
 
-def _parameter_rows(found: Identification, card: VehicleCard, slip: float) -> list[Row]:
+def _make_parameter_rows(found: Identification, card: VehicleCard, slip: float) -> list[Row]:
     """All estimates, with μ at one slip of every element whose curve reaches it."""
-    rows = {one.id: _estimate_row(one) for one in found.estimates.values()}
+    rows = {one.id: _make_estimate_row(one) for one in found.estimates.values()}
     for element, curve in found.friction.items():
         mu, fill = MU + element, f"P0.{element}"
-        free = free_friction(found, card, element, slip)
+        free = remove_friction_prior(found, card, element, slip)
         if curve.slip[0] <= slip <= curve.slip[-1]:
-            rows[mu] = _mu_row(mu, curve, slip)
+            rows[mu] = _make_mu_row(mu, curve, slip)
             if free is not None:
                 rows[mu] = replace(rows[mu], free_value=free.mu, free_std=free.mu_std)
         if free is not None and fill in rows:
@@ -177,7 +181,7 @@ def _parameter_rows(found: Identification, card: VehicleCard, slip: float) -> li
     return list(rows.values())
 
 
-def _estimate_row(one: Estimate) -> Row:
+def _make_estimate_row(one: Estimate) -> Row:
     low, high = one.ci95_total or (None, None)
     return Row(
         RowKind.PARAMETER, one.id, one.value, one.std_noise, one.std_total, low, high,
@@ -185,12 +189,12 @@ def _estimate_row(one: Estimate) -> Row:
     )  # fmt: skip
 
 
-def _mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
+def _make_mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
     """μ at one slip of a curve, judged like any estimate by the width of its band.
 
     The band holds all errors: what noise alone does to μ is no part of a curve.
     """
-    spec = spec_of(name)
+    spec = get_parameter_spec(name)
     mu, low, high = (
         float(np.interp(slip, curve.slip, values))
         for values in (curve.mu, curve.mu_lo, curve.mu_hi)
@@ -202,11 +206,11 @@ def _mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
             method=curve.method_text, at=slip,
         )  # fmt: skip
     std = (high - low) / (2.0 * Z95)
-    one = judge(name, mu, std, curve.method_text)
-    return replace(_estimate_row(one), std_noise=None, at=slip)
+    one = assess(name, mu, std, curve.method_text)
+    return replace(_make_estimate_row(one), std_noise=None, at=slip)
 
 
-def _friction_rows(element: str, curve: FrictionCurve) -> Iterator[Row]:
+def _make_friction_rows(element: str, curve: FrictionCurve) -> Iterator[Row]:
     bands = zip(curve.slip, curve.mu, curve.mu_lo, curve.mu_hi, strict=True)
     for slip, mu, low, high in bands:
         ends = (float(low), float(high)) if np.isfinite([low, high]).all() else (None, None)
@@ -216,7 +220,7 @@ def _friction_rows(element: str, curve: FrictionCurve) -> Iterator[Row]:
         )  # fmt: skip
 
 
-def _fit_rows(found: Identification) -> Iterator[Row]:
+def _make_fit_rows(found: Identification) -> Iterator[Row]:
     for signal, phases in found.fit.items():
         for phase, fit in phases.items():
             for figure, value in vars(fit).items():

@@ -85,22 +85,22 @@ class Index:
     def __init__(self, path: Path, *, write: bool) -> None:
         self._path = path
         mode = "rwc" if write else "ro"
-        with self._told():
+        with self._convert_errors():
             uri = f"{path.absolute().as_uri()}?mode={mode}"
             self._db = sqlite3.connect(uri, uri=True, timeout=30.0, isolation_level=None)
             if write:
                 self._prepare()
             self._check_format()
-        self.run = self._one("SELECT coalesce(max(run), 0) FROM files") + 1
+        self.run = self._fetch_value("SELECT coalesce(max(run), 0) FROM files") + 1
 
     def _prepare(self) -> None:
         self._db.execute("PRAGMA journal_mode = DELETE")
         self._db.execute("PRAGMA synchronous = FULL")
-        if not self._one("SELECT count(*) FROM sqlite_schema"):
+        if not self._fetch_value("SELECT count(*) FROM sqlite_schema"):
             self._db.executescript(f"BEGIN; {_SCHEMA} PRAGMA user_version = {_FORMAT}; COMMIT;")
 
     def _check_format(self) -> None:
-        version = self._one("PRAGMA user_version")
+        version = self._fetch_value("PRAGMA user_version")
         if version != _FORMAT:
             raise StoreError(
                 f"the index has format {version}, this program knows {_FORMAT}",
@@ -110,7 +110,7 @@ class Index:
 
     def close(self) -> None:
         """Commit and close."""
-        with self._told():
+        with self._convert_errors():
             try:
                 self.commit()
             finally:
@@ -118,26 +118,26 @@ class Index:
 
     def commit(self) -> None:
         """Commit all writes."""
-        with self._told():
+        with self._convert_errors():
             if self._db.in_transaction:
                 self._db.execute("COMMIT")
 
     def select(self, sql: str, *values: object) -> Iterator[tuple[Any, ...]]:
         """Rows of a query."""
-        with self._told():
+        with self._convert_errors():
             yield from self._db.execute(sql, values)
 
-    def named(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+    def fetch_table(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Names of the columns, and all rows, of a query."""
-        with self._told():
+        with self._convert_errors():
             cursor = self._db.execute(sql)
             return [column[0] for column in cursor.description], cursor.fetchall()
 
-    def columns(self, table: str) -> list[str]:
+    def list_columns(self, table: str) -> list[str]:
         """Names of a table's columns."""
         return [row[1] for row in self.select(f"PRAGMA table_info({table})")]
 
-    def file(self, path: str) -> FileRow | None:
+    def get_file(self, path: str) -> FileRow | None:
         """The file as last seen, None for a new one."""
         sql = "SELECT path, log, content, size, modified, rule, unit, fields FROM files"
         for *known, text in self.select(f"{sql} WHERE path = ?", path):
@@ -145,13 +145,15 @@ class Index:
             return FileRow(place, log, content, size, modified, rule, unit, json.loads(text))
         return None
 
-    def seen_in_this_run(self, path: str) -> bool:
-        """Return True if `put_file` was called for the path since this index was opened."""
+    def has_file_from_this_run(self, path: str) -> bool:
+        """Return True if `set_file` was called for the path since this index was opened."""
         return bool(
-            self._one("SELECT count(*) FROM files WHERE path = ? AND run = ?", path, self.run)
+            self._fetch_value(
+                "SELECT count(*) FROM files WHERE path = ? AND run = ?", path, self.run
+            )
         )
 
-    def put_file(self, file: FileRow) -> None:
+    def set_file(self, file: FileRow) -> None:
         """Store a file; replace the earlier entry of its path."""
         fields = json.dumps(dict(file.fields))
         values = (file.path, file.log, file.content, file.size, file.modified, file.rule, file.unit)
@@ -160,33 +162,33 @@ class Index:
             [(*values, fields, self.run)],
         )
 
-    def state(self, log: str) -> State | None:
+    def get_state(self, log: str) -> State | None:
         """Return the state of a log; None if the log is not in the index."""
         for (state,) in self.select("SELECT state FROM logs WHERE log = ?", log):
             return State(state)
         return None
 
-    def outcome(self, log: str) -> Outcome:
+    def get_outcome(self, log: str) -> Outcome:
         """Return the outcome of a log, without its shifts."""
         (row,) = self.select("SELECT state, error, what, remedy FROM logs WHERE log = ?", log)
         return Outcome(State(row[0]), (), *row[1:])
 
-    def put_settings(self, settings: str, version: str, document: str) -> None:
+    def set_settings(self, settings: str, version: str, document: str) -> None:
         """Store the settings of a hash."""
         row = (settings, version, document)
         self._write("INSERT OR IGNORE INTO settings VALUES (?, ?, ?)", [row])
 
-    def put_waiting(self, log: str, content: str, settings: str, version: str) -> None:
+    def add_waiting_log(self, log: str, content: str, settings: str, version: str) -> None:
         """Add a log in the waiting state; an existing log is unchanged."""
         sql = "INSERT OR IGNORE INTO logs (log, content, settings, version, state)"
         values = (log, content, settings, version, State.WAITING.value)
         self._write(f"{sql} VALUES (?, ?, ?, ?, ?)", [values])
 
-    def put_attempts(self, log: str, attempts: int) -> None:
+    def set_attempts(self, log: str, attempts: int) -> None:
         """Store the number of attempts of a log."""
         self._write("UPDATE logs SET attempts = ? WHERE log = ?", [(attempts, log)])
 
-    def put_outcome(self, log: str, outcome: Outcome, seconds: float) -> None:
+    def set_outcome(self, log: str, outcome: Outcome, seconds: float) -> None:
         """Store the outcome of a log, and its shifts."""
         self._write(
             "UPDATE logs SET state = ?, error = ?, what = ?, remedy = ?, seconds = ? WHERE log = ?",
@@ -196,7 +198,7 @@ class Index:
         self._write(
             "INSERT INTO shifts SELECT log, ?, content, settings, version, "
             "?, ?, ?, ?, ?, ?, ?, ?, ? FROM logs WHERE log = ?",
-            [(number, *_shift(row), log) for number, row in enumerate(outcome.shifts)],
+            [(number, *_make_shift_values(row), log) for number, row in enumerate(outcome.shifts)],
         )
 
     def reset(self, logs: Iterable[str]) -> None:
@@ -205,36 +207,36 @@ class Index:
         values = [(State.WAITING.value, log) for log in logs]
         self._write(f"{sql} WHERE log = ?", values)
 
-    def done(self, prefix: str = "") -> Iterator[tuple[str, str]]:
+    def iterate_done_logs(self, prefix: str = "") -> Iterator[tuple[str, str]]:
         """Iterate over key and large part of the done logs whose keys have the prefix, by key."""
         sql = "SELECT log, part FROM logs WHERE state = ? AND log >= ? AND log < ? ORDER BY log"
         yield from self.select(sql, State.DONE.value, prefix, prefix + _AFTER_HEX)
 
-    def put_part(self, prefix: str, part: str) -> None:
+    def set_part(self, prefix: str, part: str) -> None:
         """Assign `part` to all done logs whose keys have the prefix."""
         sql = "UPDATE logs SET part = ? WHERE state = ? AND log >= ? AND log < ?"
         self._write(sql, [(part, State.DONE.value, prefix, prefix + _AFTER_HEX)])
 
-    def large_parts(self) -> set[str]:
+    def list_large_parts(self) -> set[str]:
         """Names of the large parts."""
         return {part for (part,) in self.select("SELECT DISTINCT part FROM logs WHERE part != ''")}
 
     def count(self, state: State) -> int:
         """Count the logs in a state."""
-        return int(self._one("SELECT count(*) FROM logs WHERE state = ?", state.value))
+        return int(self._fetch_value("SELECT count(*) FROM logs WHERE state = ?", state.value))
 
     def _write(self, sql: str, values: list[tuple[Any, ...]]) -> None:
-        with self._told():
+        with self._convert_errors():
             if not self._db.in_transaction:
                 self._db.execute("BEGIN IMMEDIATE")
             self._db.executemany(sql, values)
 
-    def _one(self, sql: str, *values: object) -> Any:
+    def _fetch_value(self, sql: str, *values: object) -> Any:
         (row,) = self.select(sql, *values)
         return row[0]
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _convert_errors(self) -> Iterator[None]:
         """Convert SQLite errors to StoreError."""
         try:
             yield
@@ -250,7 +252,7 @@ class Index:
             raise StoreError(text, remedy, Where(file=str(self._path))) from None
 
 
-def _shift(row: ShiftRow) -> tuple[object, ...]:
+def _make_shift_values(row: ShiftRow) -> tuple[object, ...]:
     state = "used" if row.used else "refused"
     gears = (row.start_gear, row.end_gear, row.kind, row.offgoing, row.oncoming)
     return (state, row.reason, row.start, row.end, *gears)

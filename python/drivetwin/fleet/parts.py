@@ -18,7 +18,7 @@ from typing import Any
 
 from drivetwin._util.atomic import write_bytes
 from drivetwin.errors import StoreError, Where
-from drivetwin.fleet.rows import Row, RowKind, schema, table
+from drivetwin.fleet.rows import Row, RowKind, make_arrow_table, make_schema
 from drivetwin.fleet.task import GO_ON, Outcome
 
 INBOX, ROWS = "inbox", "rows"
@@ -30,21 +30,21 @@ _LOGS_PER_PART = 512
 _HEX = "0123456789abcdef"
 
 
-def part_of(log: str) -> str:
+def get_part_name(log: str) -> str:
     """Name of a log's own part below the store; a folder holds 1/256 of them."""
     return f"{INBOX}/{log[:2]}/{log}.parquet"
 
 
 def write_part(path: Path, log: str, outcome: Outcome, rows: Sequence[Row]) -> None:
     """Write a log's own part; it appears whole or not at all. Raises OSError."""
-    made = table(log, rows).replace_schema_metadata(
-        {_OUTCOME: json.dumps(outcome.tree(), sort_keys=True)}
+    made = make_arrow_table(log, rows).replace_schema_metadata(
+        {_OUTCOME: json.dumps(outcome.to_tree(), sort_keys=True)}
     )
-    write_bytes(path, _bytes(made))
+    write_bytes(path, _encode_rows(made))
 
 
 @contextmanager
-def writing() -> Iterator[None]:
+def convert_write_errors() -> Iterator[None]:
     """Convert a worker's write error to a StoreError: no log caused it, and the run stops."""
     try:
         yield
@@ -60,7 +60,7 @@ def read_outcome(path: Path) -> Outcome | None:
 
     try:
         metadata = pq.read_schema(path).metadata or {}
-        return Outcome.of(json.loads(metadata[_OUTCOME]))
+        return Outcome.from_tree(json.loads(metadata[_OUTCOME]))
     except (OSError, KeyError, ValueError, TypeError, pa.ArrowException):
         return None
 
@@ -75,7 +75,7 @@ def read_rows(path: Path, kinds: Sequence[RowKind] = ()) -> Any:
         # Not read_table, which brings the whole of Arrow's data sets along for one small file.
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             rows = file.read(use_threads=False).replace_schema_metadata()
-        if rows.schema != schema():
+        if rows.schema != make_schema():
             raise pa.ArrowInvalid("its columns are not those of a part")
     except (OSError, pa.ArrowException) as fault:
         raise StoreError(
@@ -88,7 +88,7 @@ def read_rows(path: Path, kinds: Sequence[RowKind] = ()) -> Any:
     return rows.filter(pc.is_in(rows.column("kind"), pa.array([kind.value for kind in kinds])))
 
 
-def prefixes(count: int) -> list[str]:
+def make_prefixes(count: int) -> list[str]:
     """Return the prefixes by which the keys of `count` logs are divided into large parts.
 
     The prefixes depend on the number alone, so that the same logs end in the same parts in any
@@ -100,7 +100,7 @@ def prefixes(count: int) -> list[str]:
     return found
 
 
-def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path]) -> str:
+def merge_parts(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path]) -> str:
     """Write the large part of `logs` (sorted keys) from the parts that hold them; its name.
 
     The name is a hash of its logs, so that a part of the same logs is never written twice.
@@ -111,14 +111,14 @@ def merge(folder: Path, prefix: str, logs: Sequence[str], sources: Sequence[Path
     digest = hashlib.sha256("\n".join(logs).encode()).hexdigest()[:16]
     name = f"{ROWS}/{prefix or 'all'}-{digest}.parquet"
     if not (folder / name).is_file():
-        found = {log: rows for source in sources for log, rows in _by_log(read_rows(source))}
-        whole = pa.Table.from_batches([found[log] for log in logs if log in found], schema())
-        write_bytes(folder / name, _bytes(whole))
+        found = {log: rows for source in sources for log, rows in _iterate_logs(read_rows(source))}
+        whole = pa.Table.from_batches([found[log] for log in logs if log in found], make_schema())
+        write_bytes(folder / name, _encode_rows(whole))
         sync_folder(folder / ROWS)
     return name
 
 
-def _by_log(rows: Any) -> Iterator[tuple[str, Any]]:
+def _iterate_logs(rows: Any) -> Iterator[tuple[str, Any]]:
     """Iterate over the adjacent rows of each log of a part, as record batches without a copy."""
     import pyarrow.compute as pc
 
@@ -130,7 +130,7 @@ def _by_log(rows: Any) -> Iterator[tuple[str, Any]]:
             start = end
 
 
-def _bytes(whole: Any) -> bytes:
+def _encode_rows(whole: Any) -> bytes:
     import pyarrow.parquet as pq
 
     buffer = BytesIO()

@@ -8,7 +8,7 @@ import threading
 from queue import Empty, SimpleQueue
 from typing import Protocol
 
-from drivetwin.fleet.guarded_worker import Cell
+from drivetwin.fleet.guarded_worker import GuardedWorker
 from drivetwin.fleet.task import Reply, Task, WorkerSpec
 
 AHEAD = 2
@@ -36,7 +36,7 @@ class Pool(Protocol):
         """End all work at once."""
 
 
-def usable_cores() -> int:
+def count_usable_cores() -> int:
     """Processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
@@ -52,14 +52,15 @@ class LocalPool:
         self.capacity = AHEAD * workers
         self._tasks: SimpleQueue[Task | None] = SimpleQueue()
         self._replies: SimpleQueue[tuple[Task, Reply]] = SimpleQueue()
-        self._cells = [Cell(spec) for _ in range(workers)]
+        self._cells = [GuardedWorker(spec) for _ in range(workers)]
         self._threads = [
-            threading.Thread(target=self._serve, args=(cell,), daemon=True) for cell in self._cells
+            threading.Thread(target=self._run_tasks, args=(cell,), daemon=True)
+            for cell in self._cells
         ]
         for thread in self._threads:
             thread.start()
 
-    def _serve(self, cell: Cell) -> None:
+    def _run_tasks(self, cell: GuardedWorker) -> None:
         while (task := self._tasks.get()) is not None:
             self._replies.put((task, cell.run(task)))
         cell.close()

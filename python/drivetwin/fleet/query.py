@@ -10,11 +10,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.optional_dependencies import require
+from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.errors import QueryError
 from drivetwin.fleet.index import ONE_FILE_EACH, Index
-from drivetwin.fleet.readings import moment
-from drivetwin.fleet.rows import RowKind, schema
+from drivetwin.fleet.readings import to_datetime
+from drivetwin.fleet.rows import RowKind, make_schema
 from drivetwin.fleet.rules import FILE_COLUMNS, is_date
 from drivetwin.fleet.store import Store
 
@@ -32,7 +32,7 @@ class Answer:
     rows: Sequence[tuple[Any, ...]]
 
 
-def ask(store: Store, sql: str) -> Answer:
+def query_store(store: Store, sql: str) -> Answer:
     """Answer a question in SQL. The tables are
 
     `rows`, all numbers of all logs; `files`, with a column for each field; `logs`, `shifts` and
@@ -40,7 +40,7 @@ def ask(store: Store, sql: str) -> Answer:
     row, `parameters`, `frictions`, `fits`, `qualities` and `warnings`. Raises QueryError for a
     question that DuckDB does not take, MissingExtraError without DuckDB.
     """
-    duckdb = require("duckdb", "query", "a query", store.folder)
+    duckdb = import_extra("duckdb", "query", "a query", store.folder)
     with duckdb.connect(config={"autoinstall_known_extensions": "false"}) as database:
         _make_tables(database, store)
         try:
@@ -57,16 +57,18 @@ def ask(store: Store, sql: str) -> Answer:
 def _make_tables(database: Any, store: Store) -> None:
     import pyarrow as pa
 
-    names = [str(path) for path in store.parts()]
+    names = [str(path) for path in store.list_parts()]
     if names:
         database.from_parquet(names).create_view("rows")
     else:
-        database.register("rows", schema().empty_table())
+        database.register("rows", make_schema().empty_table())
     for table in _TABLES:
-        database.register(table, _table(store.index, f"SELECT * FROM {table}"))
+        database.register(table, _fetch_arrow_table(store.index, f"SELECT * FROM {table}"))
     for name, condition in (("files", "1"), (_PLACED, ONE_FILE_EACH)):
-        files = _files(store.index, condition)
-        database.register(name, pa.Table.from_pylist(files) if files else _table(store.index, _NO))
+        files = _list_files(store.index, condition)
+        database.register(
+            name, pa.Table.from_pylist(files) if files else _fetch_arrow_table(store.index, _NO)
+        )
     for kind in _VIEWS:
         plural = {"quality": "qualities"}.get(kind.value, f"{kind.value}s")
         database.execute(
@@ -79,31 +81,31 @@ _FILES = f"SELECT {', '.join(FILE_COLUMNS)}"
 _NO = f"{_FILES} FROM files WHERE 0"
 
 
-def _table(index: Index, sql: str) -> Any:
+def _fetch_arrow_table(index: Index, sql: str) -> Any:
     """Arrow table of a query of the index."""
     import pyarrow as pa
 
-    names, rows = index.named(sql)
+    names, rows = index.fetch_table(sql)
     return pa.table({name: [row[k] for row in rows] for k, name in enumerate(names)})
 
 
-def _files(index: Index, condition: str) -> list[dict[str, Any]]:
+def _list_files(index: Index, condition: str) -> list[dict[str, Any]]:
     """One row for each file of which the condition holds, with its fields as columns; a field may
     be absent.
     """
     sql = f"{_FILES}, fields FROM files WHERE {condition} ORDER BY path"
     found = [
-        {**dict(zip(FILE_COLUMNS, known, strict=True)), **_readings(fields)}
+        {**dict(zip(FILE_COLUMNS, known, strict=True)), **_convert_fields(fields)}
         for *known, fields in index.select(sql)
     ]
     columns = dict.fromkeys(name for row in found for name in row)
     return [{name: row.get(name) for name in columns} for row in found]
 
 
-def _readings(fields: str) -> dict[str, float | datetime]:
+def _convert_fields(fields: str) -> dict[str, float | datetime]:
     """Fields by name; a date as a point in time (UTC), with which SQL can reckon."""
     return {
-        name: moment(reading).replace(tzinfo=None) if is_date(name) else reading
+        name: to_datetime(reading).replace(tzinfo=None) if is_date(name) else reading
         for name, reading in json.loads(fields).items()
     }
 

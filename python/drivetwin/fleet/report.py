@@ -11,21 +11,26 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin._util.atomic import write_text
-from drivetwin._util.display_units import display_of, significant, with_uncertainty
+from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.fleet.figures import drift_figure, unit_label, units_figure
-from drivetwin.fleet.friction import fleet_friction
-from drivetwin.fleet.mixed_model.estimate import joint_estimates, untold
+from drivetwin.fleet.figures import format_unit, plot_drift, plot_units
+from drivetwin.fleet.friction import compute_fleet_friction
+from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
 from drivetwin.fleet.mixed_model.result import Interval, JointEstimate, Outlier
-from drivetwin.fleet.mixed_model.single_unit import MOST_ROWS, cut, single, singles
+from drivetwin.fleet.mixed_model.single_unit import (
+    MOST_ROWS,
+    build_single_logs_section,
+    make_report_link,
+    make_truncation_caption,
+)
 from drivetwin.fleet.pages import LIBRARY
-from drivetwin.fleet.readings import drift_unit, span_text
+from drivetwin.fleet.readings import format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
-from drivetwin.parameters import spec_of
-from drivetwin.report.figures.friction import friction_figure
+from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.figures.friction import plot_friction
 from drivetwin.report.html import render_page
-from drivetwin.report.labels import parameter_label
+from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -36,7 +41,7 @@ from drivetwin.report.sections.blocks import (
     Tile,
     TilesBlock,
     Tone,
-    cells,
+    make_cells,
 )
 
 PAGE = "report.html"
@@ -47,7 +52,7 @@ def save_fleet_report(store: Store, path: Path) -> list[JointEstimate]:
 
     Within the store it uses the library that the single reports share, where there is one.
     """
-    found = joint_estimates(store)
+    found = estimate_fleet(store)
     shared = store.folder / REPORTS / LIBRARY
     folder = path.absolute().parent
     inside = folder == store.folder and shared.is_file()
@@ -60,14 +65,14 @@ def render_fleet(
 ) -> str:
     """Return the HTML text of the page; links are relative to `folder`."""
     sections = [
-        _overview(store),
-        _parameters(found, untold(store, found)),
-        _odd(store, found, folder),
-        ageing(found),
-        _friction(store),
-        singles(store, folder),
-        _failed(store),
-        _settings(store),
+        _build_overview(store),
+        _build_parameters_section(found, list_missing_estimates(store, found)),
+        _build_outlier_section(store, found, folder),
+        build_ageing_section(found),
+        _build_friction_section(store),
+        build_single_logs_section(store, folder),
+        _build_failure_section(store),
+        _build_settings_section(store),
     ]
     files = _count(store, "SELECT count(*) FROM files")
     units = _count(store, "SELECT count(DISTINCT unit) FROM files")
@@ -87,7 +92,7 @@ def _count(store: Store, sql: str, *values: object) -> int:
 _STATES = "SELECT count(*) FROM files JOIN logs USING (log) WHERE state = ?"
 
 
-def _overview(store: Store) -> Section:
+def _build_overview(store: Store) -> Section:
     counts = {state: _count(store, _STATES, state.value) for state in State}
     failed = counts[State.BAD] + counts[State.QUARANTINED]
     tiles = [
@@ -110,7 +115,7 @@ def _overview(store: Store) -> Section:
     ]
     blocks: list[Block] = [TilesBlock(tiles)]
     if rows:
-        head = (*cells("reason"), Cell("logs", number=True), *cells("for example"))
+        head = (*make_cells("reason"), Cell("logs", number=True), *make_cells("for example"))
         blocks.append(TableBlock("Why logs failed.", head, rows))
     return Section("fleet", "The fleet", "What was there, and what became of it.", blocks)
 
@@ -118,12 +123,12 @@ def _overview(store: Store) -> Section:
 _SHIFTS = "SELECT count(*) FROM shifts WHERE state = 'used' AND log IN (SELECT log FROM files)"
 
 
-def _parameters(found: Sequence[JointEstimate], missing: Sequence[str]) -> Section:
-    several = _several_rules(found)
-    per = " or ".join({drift_unit(one.drifts[0].field)[1]: 0 for one in found if one.drifts})
+def _build_parameters_section(found: Sequence[JointEstimate], missing: Sequence[str]) -> Section:
+    several = _has_several_rules(found)
+    per = " or ".join({get_drift_unit(one.drifts[0].field)[1]: 0 for one in found if one.drifts})
     notes = dict.fromkeys(note for one in found for note in one.notes)
     shared = [note for note in notes if all(note in one.notes for one in found)]
-    rows = [_parameter_row(one, shared, several=several) for one in found]
+    rows = [_build_parameter_row(one, shared, several=several) for one in found]
     head = (
         Cell("parameter"), Cell("logs", number=True), Cell("fleet's mean", number=True),
         Cell("± 95 %", number=True), Cell("unit"), Cell("spread of units, 1 σ", number=True),
@@ -135,7 +140,7 @@ def _parameters(found: Sequence[JointEstimate], missing: Sequence[str]) -> Secti
     if shared:
         blocks.append(NotesBlock("Of all parameters", shared))
     if missing:
-        names = ", ".join(map(parameter_label, missing))
+        names = ", ".join(map(get_parameter_label, missing))
         blocks.append(NotesBlock("Too few logs tell a value of their own", [names]))
     return Section(
         "parameters",
@@ -146,31 +151,34 @@ def _parameters(found: Sequence[JointEstimate], missing: Sequence[str]) -> Secti
     )
 
 
-def _several_rules(found: Sequence[JointEstimate]) -> bool:
+def _has_several_rules(found: Sequence[JointEstimate]) -> bool:
     return len({one.rule for one in found}) > 1
 
 
-def _parameter_row(one: JointEstimate, shared: Sequence[str], *, several: bool) -> tuple[Cell, ...]:
-    display = display_of(one.si_unit)
-    value, half = with_uncertainty(
+def _build_parameter_row(
+    one: JointEstimate, shared: Sequence[str], *, several: bool
+) -> tuple[Cell, ...]:
+    display = get_display_unit(one.si_unit)
+    value, half = format_uncertainty(
         one.value * display.factor, 0.5 * (one.ci95[1] - one.ci95[0]) * display.factor
     )
     spread, between = "", ""
     if one.spread is not None and one.spread_ci95 is not None:
-        spread = significant(one.spread * display.factor, 2)
-        between = _between(one.spread_ci95, display.factor)
+        spread = format_significant(one.spread * display.factor, 2)
+        between = _format_interval(one.spread_ci95, display.factor)
     slope, note = "", ""
     if one.drifts:
-        factor = display.factor * drift_unit(one.drifts[0].field)[0]
+        factor = display.factor * get_drift_unit(one.drifts[0].field)[0]
         ends = one.drifts[0].ci95
-        slope, note = with_uncertainty(
+        slope, note = format_uncertainty(
             one.drifts[0].slope * factor, 0.5 * (ends[1] - ends[0]) * factor
         )
         note = f"± {note}"
-    meaning = spec_of(one.parameter).meaning
+    meaning = get_parameter_spec(one.parameter).meaning
     return (
         Cell(
-            parameter_label(one.parameter), note=f"{meaning} · {one.rule}" if several else meaning
+            get_parameter_label(one.parameter),
+            note=f"{meaning} · {one.rule}" if several else meaning,
         ),
         Cell(str(one.logs), number=True),
         Cell(value, number=True),
@@ -178,21 +186,21 @@ def _parameter_row(one: JointEstimate, shared: Sequence[str], *, several: bool) 
         Cell(display.label),
         Cell(spread, number=True, note=between),
         Cell(slope, number=True, note=note),
-        Cell(remark(one, shared)),
+        Cell(write_remark(one, shared)),
     )
 
 
-def _between(ci95: Interval, factor: float) -> str:
-    return f"{significant(ci95[0] * factor, 2)} to {significant(ci95[1] * factor, 2)}"
+def _format_interval(ci95: Interval, factor: float) -> str:
+    return f"{format_significant(ci95[0] * factor, 2)} to {format_significant(ci95[1] * factor, 2)}"
 
 
-def remark(one: JointEstimate, shared: Sequence[str] = ()) -> str:
+def write_remark(one: JointEstimate, shared: Sequence[str] = ()) -> str:
     """Return the remark on an estimate; `shared` is the remark made of all elsewhere."""
     parts = [note for note in one.notes if note not in shared]
-    if drift := _whole_drift(one):
-        parts.append(_drift_text(one, drift) + _small(drift, one))
-    if spread := _sure_spread(one):
-        parts.append("units differ" + _small(spread, one))
+    if drift := _compute_range_drift(one):
+        parts.append(_format_drift(one, drift) + _describe_small_effect(drift, one))
+    if spread := _get_significant_spread(one):
+        parts.append("units differ" + _describe_small_effect(spread, one))
     if one.left_out:
         parts.append(f"{one.left_out} logs tell nothing of it")
     if one.excess > 1.5:
@@ -200,53 +208,53 @@ def remark(one: JointEstimate, shared: Sequence[str] = ()) -> str:
     return "; ".join(parts)
 
 
-def _whole_drift(one: JointEstimate) -> float:
+def _compute_range_drift(one: JointEstimate) -> float:
     """Drift over the whole range of the first field, SI; 0 where its interval holds 0."""
     if not one.drifts or math.prod(one.drifts[0].ci95) <= 0.0:
         return 0.0
     return one.drifts[0].slope * float(np.ptp(one.points.reading))
 
 
-def _sure_spread(one: JointEstimate) -> float:
+def _get_significant_spread(one: JointEstimate) -> float:
     """Spread over units, SI; 0 where its interval reaches 0."""
     sure = one.spread is not None and one.spread_ci95 is not None and one.spread_ci95[0] > 0.0
     return one.spread or 0.0 if sure else 0.0
 
 
-def _drift_text(one: JointEstimate, whole: float) -> str:
+def _format_drift(one: JointEstimate, whole: float) -> str:
     field, readings = one.drifts[0].field, one.points.reading
-    ends = span_text(field, float(np.min(readings)), float(np.max(readings)))
+    ends = format_span(field, float(np.min(readings)), float(np.max(readings)))
     share = 100.0 * whole / one.value
-    return f"drifts by {significant(share, 2)} % between {ends}"
+    return f"drifts by {format_significant(share, 2)} % between {ends}"
 
 
-def _own(one: JointEstimate) -> float:
+def _compute_median_error(one: JointEstimate) -> float:
     """Return the median standard error of the logs."""
     return float(np.median(one.points.std))
 
 
-def _small(size: float, one: JointEstimate) -> str:
+def _describe_small_effect(size: float, one: JointEstimate) -> str:
     """Describe an effect that is significant but smaller than the error of one log."""
-    if abs(size) >= _own(one):
+    if abs(size) >= _compute_median_error(one):
         return ""
     return ", by less than one log's own error: an error of the method may look like that"
 
 
-def ageing(found: Sequence[JointEstimate]) -> Section:
+def build_ageing_section(found: Sequence[JointEstimate]) -> Section:
     """Every parameter over the first field, and by unit where units differ."""
-    several = _several_rules(found)
+    several = _has_several_rules(found)
     blocks: list[Block] = []
-    for one in sorted(found, key=_effect, reverse=True):
-        name = parameter_label(one.parameter) + (f" of {one.rule}" if several else "")
+    for one in sorted(found, key=_compute_relative_effect, reverse=True):
+        name = get_parameter_label(one.parameter) + (f" of {one.rule}" if several else "")
         if one.drifts:
             text = f"{name}: every log; the shared line with its 95 % band."
             if one.changes:
                 units = ", ".join(dict.fromkeys(change.unit for change in one.changes))
                 text += f" Dashed: unit {units} changed there."
-            blocks.append(FigureBlock(drift_figure(one), text))
-        if _sure_spread(one) or any(unit.odd for unit in one.units):
+            blocks.append(FigureBlock(plot_drift(one), text))
+        if _get_significant_spread(one) or any(unit.odd for unit in one.units):
             text = f"{name}: how far each unit is from the shared value, with 95 % intervals."
-            blocks.append(FigureBlock(units_figure(one), text))
+            blocks.append(FigureBlock(plot_units(one), text))
     intro = (
         "What drifts or differs most, measured by one log's own error, comes first. Units are "
         "shown where they differ beyond the errors of their logs."
@@ -254,47 +262,53 @@ def ageing(found: Sequence[JointEstimate]) -> Section:
     return Section("ageing", "Ageing and units", intro, blocks)
 
 
-def _effect(one: JointEstimate) -> float:
+def _compute_relative_effect(one: JointEstimate) -> float:
     """Return the size of the significant drift and spread, relative to the error of one log."""
-    return max(abs(_whole_drift(one)), _sure_spread(one)) / _own(one)
+    return max(
+        abs(_compute_range_drift(one)), _get_significant_spread(one)
+    ) / _compute_median_error(one)
 
 
-def _odd(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
+def _build_outlier_section(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
     """Changes of units, units beyond chance, logs that do not fit."""
     blocks: list[Block] = []
     changes = [
-        cells(
-            change.unit, parameter_label(one.parameter),
-            "between " + span_text(change.field, change.before, change.after),
-            _with_error(one, change.size, change.std),
+        make_cells(
+            change.unit, get_parameter_label(one.parameter),
+            "between " + format_span(change.field, change.before, change.after),
+            _format_deviation(one, change.size, change.std),
         )
         for one in found for change in one.changes
     ]  # fmt: skip
     if changes:
-        head = cells("unit", "parameter", "where", "step ± 95 %")
+        head = make_cells("unit", "parameter", "where", "step ± 95 %")
         blocks.append(TableBlock("Units that changed, as after a repair.", head, changes))
     units = [
-        cells(
-            unit_label(one, unit), parameter_label(one.parameter),
-            _with_error(one, unit.deviation, unit.std), f"{unit.score:.1f}",
+        make_cells(
+            format_unit(one, unit), get_parameter_label(one.parameter),
+            _format_deviation(one, unit.deviation, unit.std), f"{unit.score:.1f}",
         )
         for one in found for unit in one.units if unit.odd
     ]  # fmt: skip
     if units:
-        head = cells("unit", "parameter", "deviation ± 95 %", "standard deviations of the units")
+        head = make_cells(
+            "unit", "parameter", "deviation ± 95 %", "standard deviations of the units"
+        )
         caption = "Units beyond what chance makes. They count in shared value and spread."
         blocks.append(TableBlock(caption, head, units))
     logs = [
         (
-            Cell(Path(outlier.path).name, href=single(store, outlier.log, folder)),
-            *cells(parameter_label(one.parameter), *_values(one, outlier), outlier.reason),
+            Cell(Path(outlier.path).name, href=make_report_link(store, outlier.log, folder)),
+            *make_cells(
+                get_parameter_label(one.parameter), *_format_values(one, outlier), outlier.reason
+            ),
         )
         for one in found
         for outlier in one.outliers
     ]
     if logs:
-        caption = f"Logs that do not fit{cut(len(logs))}."
-        head = cells("log", "parameter", "value", "expected", "reason")
+        caption = f"Logs that do not fit{make_truncation_caption(len(logs))}."
+        head = make_cells("log", "parameter", "value", "expected", "reason")
         blocks.append(TableBlock(caption, head, logs[:MOST_ROWS]))
     intro = (
         "Logs that do not fit are left out of the shared values above; a unit that changed counts "
@@ -303,31 +317,33 @@ def _odd(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
     return Section("odd", "What is odd", intro, blocks)
 
 
-def _values(one: JointEstimate, outlier: Outlier) -> tuple[str, str]:
+def _format_values(one: JointEstimate, outlier: Outlier) -> tuple[str, str]:
     """Return the value of a log and the value expected from its unit and fields."""
-    display = display_of(one.si_unit)
-    value = f"{significant(outlier.value * display.factor)} {display.label}".removesuffix(" –")
-    return value, significant(outlier.expected * display.factor)
+    display = get_display_unit(one.si_unit)
+    value = f"{format_significant(outlier.value * display.factor)} {display.label}".removesuffix(
+        " –"
+    )
+    return value, format_significant(outlier.expected * display.factor)
 
 
-def _with_error(one: JointEstimate, value: float, std: float) -> str:
-    display = display_of(one.si_unit)
-    text, half = with_uncertainty(value * display.factor, Z95 * std * display.factor)
+def _format_deviation(one: JointEstimate, value: float, std: float) -> str:
+    display = get_display_unit(one.si_unit)
+    text, half = format_uncertainty(value * display.factor, Z95 * std * display.factor)
     return f"{text} ± {half} {display.label}".removesuffix(" –")
 
 
-def _friction(store: Store) -> Section:
+def _build_friction_section(store: Store) -> Section:
     blocks: list[Block] = [
         FigureBlock(
-            friction_figure(element, curve),
+            plot_friction(element, curve),
             f"Friction of {element}: median of all logs; the band holds 95 % of them.",
         )
-        for element, curve in fleet_friction(store).items()
+        for element, curve in compute_fleet_friction(store).items()
     ]
     return Section("friction", "Friction of the fleet", "μ over slip of every log.", blocks)
 
 
-def _failed(store: Store) -> Section:
+def _build_failure_section(store: Store) -> Section:
     sql = (
         "SELECT path, unit, state, error, what, remedy FROM files JOIN logs USING (log) "
         "WHERE error != '' ORDER BY path"
@@ -344,14 +360,14 @@ def _failed(store: Store) -> Section:
     ]
     blocks: list[Block] = []
     if rows:
-        caption = f"Logs without a result{cut(len(every))}."
+        caption = f"Logs without a result{make_truncation_caption(len(every))}."
         blocks.append(
-            TableBlock(caption, cells("log", "state", "reason", "what, and what to do"), rows)
+            TableBlock(caption, make_cells("log", "state", "reason", "what, and what to do"), rows)
         )
     return Section("failed", "Which logs failed, and why", "Nothing is left out silently.", blocks)
 
 
-def _settings(store: Store) -> Section:
+def _build_settings_section(store: Store) -> Section:
     """List the settings of the rows, with one note for each settings hash."""
     sql = (
         "SELECT settings, document, count(*) FROM files JOIN logs USING (log) "

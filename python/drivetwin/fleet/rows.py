@@ -70,7 +70,7 @@ class Found:
 
 
 @cache
-def schema() -> Any:
+def make_schema() -> Any:
     """Arrow schema of all parts; `log` is the key of the log's row in the index."""
     import pyarrow as pa
 
@@ -91,9 +91,9 @@ def schema() -> Any:
     )
 
 
-def table(log: str, rows: Sequence[Row]) -> Any:
+def make_arrow_table(log: str, rows: Sequence[Row]) -> Any:
     """Arrow table of a log's rows, in their order."""
     import pyarrow as pa
 
-    columns = {name: [getattr(row, name) for row in rows] for name in schema().names[1:]}
-    return pa.table({"log": [log] * len(rows), **columns}, schema=schema())
+    columns = {name: [getattr(row, name) for row in rows] for name in make_schema().names[1:]}
+    return pa.table({"log": [log] * len(rows), **columns}, schema=make_schema())

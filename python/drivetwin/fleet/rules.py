@@ -13,7 +13,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from drivetwin._util.toml import StrictModel, raise_faults, read_toml, schema_faults
+from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.errors import RulesError, Where
 from drivetwin.fleet.rows import ROW_COLUMNS
 from drivetwin.fleet.sources import Source
@@ -23,7 +23,7 @@ FILE_COLUMNS = ("path", "log", "rule", UNIT)
 """What a question in SQL finds of a file, beside its fields."""
 
 
-def _one_group(pattern: str) -> str:
+def _check_group_count(pattern: str) -> str:
     try:
         groups = re.compile(pattern).groups
     except re.error as fault:
@@ -33,7 +33,7 @@ def _one_group(pattern: str) -> str:
     return pattern
 
 
-Pattern = Annotated[str, AfterValidator(_one_group)]
+Pattern = Annotated[str, AfterValidator(_check_group_count)]
 
 
 class RuleTable(StrictModel):
@@ -53,12 +53,12 @@ class RuleTable(StrictModel):
     skip: bool = False
 
     @model_validator(mode="after")
-    def _card_or_skip(self) -> RuleTable:
+    def _check_card_or_skip(self) -> RuleTable:
         if (self.vehicle is None) != self.skip:
             raise ValueError("a rule names a vehicle card, or says skip = true")
         return self
 
-    def fits(self, path: str, unit: str, channels: frozenset[str]) -> bool:
+    def matches_log(self, path: str, unit: str, channels: frozenset[str]) -> bool:
         """Return True if the rule applies to a log with this path, unit and channel names."""
         if self.path is not None and not fnmatchcase(path, self.path):
             return False
@@ -79,7 +79,7 @@ class FieldTable(StrictModel):
     channel: str | None = None
 
     @model_validator(mode="after")
-    def _one_source(self) -> FieldTable:
+    def _check_source(self) -> FieldTable:
         if sum(each is not None for each in (self.pattern, self.column, self.channel)) != 1:
             raise ValueError("a field has exactly one of pattern, column and channel")
         return self
@@ -95,7 +95,7 @@ class RulesFile(StrictModel):
 
     @field_validator("fields")
     @classmethod
-    def _names_of_their_own(cls, fields: dict[str, FieldTable]) -> dict[str, FieldTable]:
+    def _check_field_names(cls, fields: dict[str, FieldTable]) -> dict[str, FieldTable]:
         """Check that field names differ from other columns; SQL ignores case."""
         taken = {*FILE_COLUMNS, *ROW_COLUMNS}
         for name in fields:
@@ -104,7 +104,7 @@ class RulesFile(StrictModel):
             taken.add(name.casefold())
         return fields
 
-    def unit_of(self, source: Source) -> str:
+    def get_unit(self, source: Source) -> str:
         """Id of the unit: the list's column `unit`, else the pattern's find, else the folder."""
         if UNIT in source.told:
             return source.told[UNIT]
@@ -118,7 +118,7 @@ class RulesFile(StrictModel):
             )
         return str(found[1])
 
-    def fields_of(self, source: Source) -> dict[str, float]:
+    def get_fields(self, source: Source) -> dict[str, float]:
         """Return the fields found in path and list, in the order of the rules."""
         found = {}
         for name, table in self.fields.items():
@@ -129,10 +129,10 @@ class RulesFile(StrictModel):
             elif table.column is not None:
                 text = source.told.get(table.column)
             if text is not None:
-                found[name] = field_value(name, text)
+                found[name] = parse_field_value(name, text)
         return found
 
-    def means(self) -> tuple[tuple[str, str], ...]:
+    def list_channel_means(self) -> tuple[tuple[str, str], ...]:
         """Field and channel of the fields that are means of channels."""
         pairs = ((name, table.channel) for name, table in self.fields.items())
         return tuple((name, channel) for name, channel in pairs if channel is not None)
@@ -143,7 +143,7 @@ def is_date(field: str) -> bool:
     return field == "date" or field.endswith("_date")
 
 
-def field_value(field: str, text: str) -> float:
+def parse_field_value(field: str, text: str) -> float:
     """A field's text as a finite number; a date in seconds since 1970. Raises RulesError."""
     try:
         if is_date(field):
@@ -170,13 +170,15 @@ def read_rules(path: Path) -> RulesFile:
     if "rules" not in document and "gears" in document:
         return RulesFile(rules=[RuleTable(name=path.stem, vehicle=str(path.absolute()))])
     remedy = "correct these keys of the rules; docs/howto/fleet.md shows a complete file"
-    raise_faults(schema_faults(document, RulesFile), RulesError, str(path), remedy)
+    raise_faults(validate_schema(document, RulesFile), RulesError, str(path), remedy)
     rules = RulesFile.model_validate(document)
-    placed = [_placed(each, number, path) for number, each in enumerate(rules.rules, start=1)]
+    placed = [
+        _resolve_paths(each, number, path) for number, each in enumerate(rules.rules, start=1)
+    ]
     return rules.model_copy(update={"rules": placed})
 
 
-def _placed(rule: RuleTable, number: int, file: Path) -> RuleTable:
+def _resolve_paths(rule: RuleTable, number: int, file: Path) -> RuleTable:
     """The rule with a name of its own, and with paths from the rules file's folder; a card that is
     missing is told at once.
     """
@@ -193,7 +195,7 @@ def _placed(rule: RuleTable, number: int, file: Path) -> RuleTable:
     return rule.model_copy(update=changed)
 
 
-def rule_for(
+def select_rule(
     rules: RulesFile, source: Source, unit: str, channels: Callable[[], frozenset[str]]
 ) -> RuleTable:
     """The first rule that fits; `channels` reads the log's, which only some rules need.
@@ -202,7 +204,7 @@ def rule_for(
     """
     path = source.path.as_posix()
     for rule in rules.rules:
-        if rule.fits(path, unit, channels() if rule.contains else frozenset()):
+        if rule.matches_log(path, unit, channels() if rule.contains else frozenset()):
             return rule
     raise RulesError(
         f"no rule takes this log of unit {unit!r}",

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.fleet.coordinator import Coordinator, Wishes
+from drivetwin.fleet.coordinator import Coordinator, RunOptions
 from drivetwin.fleet.events import Listener, Summary
-from drivetwin.fleet.pool import LocalPool, Pool, usable_cores
+from drivetwin.fleet.pool import LocalPool, Pool, count_usable_cores
 from drivetwin.fleet.rules import RulesFile
 from drivetwin.fleet.scan import Scan
 from drivetwin.fleet.sources import Sources
@@ -33,7 +33,7 @@ class FleetRun:
     workers: int | None = None
     scheduler: str | None = None
     worker: WorkerSpec = field(default_factory=WorkerSpec)
-    wishes: Wishes = field(default_factory=Wishes)
+    wishes: RunOptions = field(default_factory=RunOptions)
 
 
 def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
@@ -42,14 +42,14 @@ def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
     Raises StoreError, InputError where a name stands for no file, SchedulerError; what was learnt
     until then stays in the store.
     """
-    with Store(request.store, write=True) as store, closing(_pool(request, tell)) as pool:
+    with Store(request.store, write=True) as store, closing(_make_pool(request, tell)) as pool:
         scan = Scan(request.rules, request.method)
         return Coordinator(store, pool, request.wishes, tell).run(scan, request.sources)
 
 
-def _pool(request: FleetRun, tell: Listener) -> Pool:
+def _make_pool(request: FleetRun, tell: Listener) -> Pool:
     if request.scheduler is not None:
         from drivetwin.fleet.cluster import DaskPool
 
         return DaskPool(request.scheduler, request.worker, tell)
-    return LocalPool(request.workers or usable_cores(), request.worker)
+    return LocalPool(request.workers or count_usable_cores(), request.worker)

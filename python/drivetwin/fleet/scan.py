@@ -17,9 +17,9 @@ from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import DrivetwinError, FileFormatError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.index import FileRow
-from drivetwin.fleet.rules import RulesFile, rule_for
+from drivetwin.fleet.rules import RulesFile, select_rule
 from drivetwin.fleet.sources import Source, Sources
-from drivetwin.fleet.task import Outcome, Recipe, State
+from drivetwin.fleet.task import Outcome, State, TaskSpec
 from drivetwin.logs.formats.detect import open_recording
 
 ROWS_FORMAT = 2
@@ -38,7 +38,7 @@ class Scanned:
 
     file: FileRow
     settings: str
-    recipe: Recipe | None
+    recipe: TaskSpec | None
     fault: Outcome | None = None
 
 
@@ -70,7 +70,7 @@ class Scan:
         self._method = method
         self._recipe = lru_cache(self._read_recipe)
 
-    def scanned(self, sources: Sources, known: Known) -> Generator[Scanned | Skipped]:
+    def scan_files(self, sources: Sources, known: Known) -> Generator[Scanned | Skipped]:
         """Every file of `sources` in their order, read a little ahead.
 
         `known` finds what is known of a path: a file of the same size and time of change is not
@@ -80,99 +80,99 @@ class Scan:
         with ThreadPoolExecutor(_READERS) as readers:
             for source in sources:
                 waiting.append(
-                    (source, readers.submit(_content, source.path, known(str(source.path))))
+                    (source, readers.submit(_read_content, source.path, known(str(source.path))))
                 )
                 if len(waiting) >= _LOOKAHEAD:
-                    yield self._look(*waiting.popleft())
+                    yield self._scan_file(*waiting.popleft())
             while waiting:
-                yield self._look(*waiting.popleft())
+                yield self._scan_file(*waiting.popleft())
 
-    def _look(self, source: Source, reading: Future[_Content]) -> Scanned | Skipped:
+    def _scan_file(self, source: Source, reading: Future[_Content]) -> Scanned | Skipped:
         path = str(source.path)
         unit, content = "", _Content("", 0, 0)
         try:
             content = reading.result()
-            unit = self._rules.unit_of(source)
-            fields = self._rules.fields_of(source)
-            rule = rule_for(self._rules, source, unit, lambda: _channels(source.path))
+            unit = self._rules.get_unit(source)
+            fields = self._rules.get_fields(source)
+            rule = select_rule(self._rules, source, unit, lambda: _read_channel_names(source.path))
             if rule.vehicle is None:
                 return Skipped(path)
             recipe = self._recipe(rule.vehicle, rule.channels)
         except (OSError, DrivetwinError) as fault:
-            error = _unreadable(fault, path) if isinstance(fault, OSError) else fault
-            return _refused(path, unit, content, error)
-        settings = settings_of(recipe)
-        log = _key(content.digest, settings)
+            error = _make_read_error(fault, path) if isinstance(fault, OSError) else fault
+            return _make_refusal(path, unit, content, error)
+        settings = compute_settings_hash(recipe)
+        log = _compute_key(content.digest, settings)
         file = FileRow(
             path, log, content.digest, content.size, content.modified, rule.name, unit, fields
         )
         return Scanned(file, settings, recipe)
 
-    def _read_recipe(self, vehicle: str, channels: str | None) -> Recipe:
+    def _read_recipe(self, vehicle: str, channels: str | None) -> TaskSpec:
         """The recipe of a rule; its files are read once."""
-        return Recipe(
+        return TaskSpec(
             vehicle=vehicle,
             channels=channels,
             method=self._method,
-            inputs=inputs_of(vehicle, channels),
+            inputs=compute_input_hashes(vehicle, channels),
             version=program_version(),
-            means=self._rules.means(),
+            means=self._rules.list_channel_means(),
             mu_slip=self._rules.mu_slip_rad_s,
         )
 
 
-def inputs_of(vehicle: str, channels: str | None) -> tuple[tuple[str, str], ...]:
+def compute_input_hashes(vehicle: str, channels: str | None) -> tuple[tuple[str, str], ...]:
     """Compute the SHA-256 of a card, a channel mapping and the DBC files of the mapping."""
-    inputs = [("vehicle", _digest(Path(vehicle)))]
+    inputs = [("vehicle", _compute_digest(Path(vehicle)))]
     if channels is not None:
-        inputs.append(("channels", _digest(Path(channels))))
+        inputs.append(("channels", _compute_digest(Path(channels))))
         databases = read_mapping(Path(channels)).options.bus.databases
-        inputs += [("database", _digest(each)) for each in databases]
+        inputs += [("database", _compute_digest(each)) for each in databases]
     return tuple(inputs)
 
 
-def settings_document(recipe: Recipe) -> str:
+def make_settings_document(recipe: TaskSpec) -> str:
     """Return as JSON the settings that determine a log's rows; paths are not included."""
     tree = {k: v for k, v in asdict(recipe).items() if k not in ("vehicle", "channels")}
     return json.dumps({**tree, "rows": ROWS_FORMAT}, sort_keys=True)
 
 
 @lru_cache(64)
-def settings_of(recipe: Recipe) -> str:
-    """Hash of `settings_document`."""
-    return hashlib.sha256(settings_document(recipe).encode()).hexdigest()
+def compute_settings_hash(recipe: TaskSpec) -> str:
+    """Hash of `make_settings_document`."""
+    return hashlib.sha256(make_settings_document(recipe).encode()).hexdigest()
 
 
-def _key(*parts: str) -> str:
+def _compute_key(*parts: str) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:_KEY]
 
 
-def _content(path: Path, known: FileRow | None) -> _Content:
+def _read_content(path: Path, known: FileRow | None) -> _Content:
     status = path.stat()
     size, modified = status.st_size, status.st_mtime_ns
     if known is not None and (known.size, known.modified) == (size, modified) and known.content:
         return _Content(known.content, size, modified)
-    return _Content(_digest(path), size, modified)
+    return _Content(_compute_digest(path), size, modified)
 
 
-def _digest(path: Path) -> str:
+def _compute_digest(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _channels(path: Path) -> frozenset[str]:
+def _read_channel_names(path: Path) -> frozenset[str]:
     with open_recording(path) as recording:
         return frozenset(column.name for column in recording.columns)
 
 
-def _unreadable(fault: OSError, path: str) -> DrivetwinError:
+def _make_read_error(fault: OSError, path: str) -> DrivetwinError:
     what = f"cannot read the file: {fault.strerror or fault}"
     return FileFormatError(what, "check that it is there and may be read", Where(file=path))
 
 
-def _refused(path: str, unit: str, content: _Content, error: DrivetwinError) -> Scanned:
+def _make_refusal(path: str, unit: str, content: _Content, error: DrivetwinError) -> Scanned:
     """Return a file that cannot become a task; the next run scans it again."""
     outcome = Outcome(State.BAD, (), type(error).__name__, error.what, error.remedy)
-    log = _key("refused", content.digest or path, unit, error.what)
+    log = _compute_key("refused", content.digest or path, unit, error.what)
     file = FileRow(path, log, content.digest, content.size, content.modified, "", unit, {})
     return Scanned(file, "", None, outcome)

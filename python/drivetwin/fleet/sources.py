@@ -39,19 +39,19 @@ class Sources:
 
     def __iter__(self) -> Iterator[Source]:
         if self.listed is not None:
-            yield from _from_list(self.listed)
+            yield from _read_list(self.listed)
         for name in self.given:
-            yield from map(Source, _below(name))
+            yield from map(Source, _expand_name(name))
 
     def count(self) -> int:
         """Count the files. Raises InputError if a name matches no file."""
         return sum(1 for _ in self)
 
 
-def _below(name: str) -> Iterator[Path]:
+def _expand_name(name: str) -> Iterator[Path]:
     path = Path(name)
     if path.is_dir():
-        yield from _walk(path.absolute())
+        yield from _iterate_files(path.absolute())
     elif path.exists():
         yield path.absolute()
     else:
@@ -67,7 +67,7 @@ def _below(name: str) -> Iterator[Path]:
                 yield Path(one).absolute()
 
 
-def _walk(folder: Path) -> Iterator[Path]:
+def _iterate_files(folder: Path) -> Iterator[Path]:
     for place, folders, files in os.walk(folder):
         if INDEX in files:  # a store has Parquet files that are no logs
             folders.clear()
@@ -78,7 +78,7 @@ def _walk(folder: Path) -> Iterator[Path]:
                 yield Path(place, name)
 
 
-def _from_list(path: Path) -> Iterator[Source]:
+def _read_list(path: Path) -> Iterator[Source]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             head = file.readline()

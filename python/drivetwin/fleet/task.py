@@ -29,7 +29,7 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True)
-class Recipe:
+class TaskSpec:
     """Everything but the log's content that decides its rows; equal recipes give equal rows.
 
     `vehicle` and `channels` are absolute paths, `inputs` the SHA-256 of these files and of the DBC
@@ -57,7 +57,7 @@ class Task:
     log: str
     path: str
     content: str
-    recipe: Recipe
+    recipe: TaskSpec
     part: str
     report: str | None = None
     traces: str | None = None
@@ -72,7 +72,7 @@ class Task:
         tree = json.loads(text)
         recipe = tree["recipe"]
         recipe |= {name: tuple(map(tuple, recipe[name])) for name in ("inputs", "means")}
-        return cls(**{**tree, "recipe": Recipe(**{**recipe, "method": Method(recipe["method"])})})
+        return cls(**{**tree, "recipe": TaskSpec(**{**recipe, "method": Method(recipe["method"])})})
 
 
 @dataclass(frozen=True)
@@ -103,19 +103,19 @@ class Outcome:
     what: str = ""
     remedy: str = ""
 
-    def tree(self) -> dict[str, Any]:
+    def to_tree(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
 
     @classmethod
-    def of(cls, tree: Mapping[str, Any]) -> Outcome:
+    def from_tree(cls, tree: Mapping[str, Any]) -> Outcome:
         """Back from `tree`."""
         shifts = tuple(ShiftRow(**row) for row in tree["shifts"])
         return cls(**{**tree, "state": State(tree["state"]), "shifts": shifts})
 
 
 @dataclass(frozen=True)
-class Finished:
+class Completed:
     """Reply of a worker: the outcome and the computing time [s]."""
 
     outcome: Outcome
@@ -123,7 +123,7 @@ class Finished:
 
 
 @dataclass(frozen=True)
-class Lost:
+class WorkerLost:
     """The worker went away before it answered; the log may or may not be to blame.
 
     `blame`: whether the loss counts against the log, as that of its own worker does; the loss of
@@ -135,14 +135,14 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class Stopped:
+class Aborted:
     """Nothing can go on, by no fault of the log: no worker starts, or none can write its part."""
 
     what: str
     remedy: str
 
 
-Reply = Finished | Lost | Stopped
+Reply = Completed | WorkerLost | Aborted
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class WorkerSpec:
     limits: Limits = field(default_factory=Limits)
 
 
-def memory_exceeded(memory: int) -> Outcome:
+def make_memory_outcome(memory: int) -> Outcome:
     """The outcome of a log whose worker needed more than so many bytes."""
     return Outcome(
         State.QUARANTINED,

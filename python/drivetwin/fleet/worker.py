@@ -21,9 +21,9 @@ from typing import Any
 
 from drivetwin._util.version import program_version
 from drivetwin.errors import DrivetwinError, StoreError
-from drivetwin.fleet.parts import write_part, writing
+from drivetwin.fleet.parts import convert_write_errors, write_part
 from drivetwin.fleet.rows import Found
-from drivetwin.fleet.task import Outcome, State, Task, memory_exceeded
+from drivetwin.fleet.task import Outcome, State, Task, make_memory_outcome
 
 Work = Callable[[Task], Found]
 
@@ -32,7 +32,7 @@ _ROOM = 1.25
 for what grows too fast to be seen there."""
 
 
-def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
+def run_task(work: Work, task: Task, memory: int) -> dict[str, Any]:
     """Run a task, write its part, and return its outcome; see `GuardedWorker` for the keys."""
     started = perf_counter()
     if task.recipe.version != program_version():
@@ -42,25 +42,28 @@ def answer(work: Work, task: Task, memory: int) -> dict[str, Any]:
         found = work(task)
         outcome, rows = Outcome(State.DONE, tuple(found.shifts)), found.rows
     except MemoryError:
-        return {"outcome": memory_exceeded(memory).tree(), "seconds": perf_counter() - started}
+        return {
+            "outcome": make_memory_outcome(memory).to_tree(),
+            "seconds": perf_counter() - started,
+        }
     except StoreError as fault:
         return {"stop": fault.what, "remedy": fault.remedy}
     except DrivetwinError as error:
-        outcome, rows = _bad(error), ()
+        outcome, rows = _make_error_outcome(error), ()
     except OSError as fault:
-        return {"outcome": _unread(fault).tree(), "seconds": perf_counter() - started}
+        return {"outcome": _make_io_outcome(fault).to_tree(), "seconds": perf_counter() - started}
     except Exception as fault:
         # Whatever a log brings about must not end the run; it is named and the others go on.
-        outcome, rows = _unexpected(fault), ()
+        outcome, rows = _make_crash_outcome(fault), ()
     try:
-        with writing():
+        with convert_write_errors():
             write_part(Path(task.part), task.log, outcome, rows)
     except StoreError as fault:
         return {"stop": fault.what, "remedy": fault.remedy}
-    return {"outcome": outcome.tree(), "seconds": perf_counter() - started}
+    return {"outcome": outcome.to_tree(), "seconds": perf_counter() - started}
 
 
-def _unread(fault: OSError) -> Outcome:
+def _make_io_outcome(fault: OSError) -> Outcome:
     """I/O error while reading a log. Not recorded as its outcome, because a retry may succeed."""
     return Outcome(
         State.QUARANTINED,
@@ -70,14 +73,14 @@ def _unread(fault: OSError) -> Outcome:
     )
 
 
-def _bad(error: DrivetwinError) -> Outcome:
+def _make_error_outcome(error: DrivetwinError) -> Outcome:
     """Convert a typed error to an outcome without the path, which is not unique."""
     place = str(replace(error.where, file=None))
     what = f"{place}: {error.what}" if place else error.what
     return Outcome(State.BAD, error=type(error).__name__, what=what, remedy=error.remedy)
 
 
-def _unexpected(fault: Exception) -> Outcome:
+def _make_crash_outcome(fault: Exception) -> Outcome:
     remedy = "try `drivetwin identify` on the log; please report what it shows"
     return Outcome(State.BAD, error=type(fault).__name__, what=str(fault), remedy=remedy)
 
@@ -99,7 +102,7 @@ def limit_memory(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (wall, hard))
 
 
-def _listen(tasks: SimpleQueue[str]) -> None:
+def _read_tasks(tasks: SimpleQueue[str]) -> None:
     for line in sys.stdin:
         tasks.put(line)
     os._exit(0)
@@ -115,12 +118,12 @@ def main() -> None:
     import_module("pyarrow.parquet")  # or the first log would pay for it
     limit_memory(memory)
     tasks: SimpleQueue[str] = SimpleQueue()
-    threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
+    threading.Thread(target=_read_tasks, args=(tasks,), daemon=True).start()
     reply: dict[str, Any] = {"ready": os.getpid()}
     while True:
         replies.write(json.dumps(reply) + "\n")
         replies.flush()
-        reply = answer(work, Task.from_json(tasks.get()), memory)
+        reply = run_task(work, Task.from_json(tasks.get()), memory)
 
 
 if __name__ == "__main__":

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from drivetwin.gearbox.card import builtin_gearboxes, load_gearbox
+from drivetwin.gearbox.card import list_builtin_gearboxes, load_gearbox
 from drivetwin.gearbox.compare import Comparison, compare
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.estimate import estimate
-from drivetwin.gearbox.gears import GearStatics, gear_statics, ratio_remarks
-from drivetwin.gearbox.network import network_elements
+from drivetwin.gearbox.gears import GearStatics, describe_ratio_differences, solve_gear
+from drivetwin.gearbox.network import build_network_elements
 from drivetwin.gearbox.reduction import Reduction, reduce
 from drivetwin.gearbox.spec import Gearbox
 from drivetwin.gearbox.traces import CouplingError
@@ -20,12 +20,12 @@ __all__ = [
     "GearStatics",
     "Gearbox",
     "Reduction",
-    "builtin_gearboxes",
+    "build_network_elements",
     "compare",
+    "describe_ratio_differences",
     "estimate",
-    "gear_statics",
+    "list_builtin_gearboxes",
     "load_gearbox",
-    "network_elements",
-    "ratio_remarks",
     "reduce",
+    "solve_gear",
 ]

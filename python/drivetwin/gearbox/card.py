@@ -7,16 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.toml import did_you_mean, raise_faults, read_toml
+from drivetwin._util.toml import raise_faults, read_toml, suggest_spelling
 from drivetwin.errors import CardError
-from drivetwin.gearbox.check import gearbox_faults
+from drivetwin.gearbox.check import find_gearbox_faults
 from drivetwin.gearbox.schema import GearboxFile
 from drivetwin.gearbox.spec import Gearbox
 
 _CARDS = Path(__file__).parent / "cards"
 
 
-def builtin_gearboxes() -> tuple[str, ...]:
+def list_builtin_gearboxes() -> tuple[str, ...]:
     """Names of the built-in cards, in alphabetical order."""
     return tuple(sorted(path.stem for path in _CARDS.glob("*.toml")))
 
@@ -30,39 +30,39 @@ def load_gearbox(card: Path | str) -> Gearbox:
     path = _find(card)
     document = read_toml(path, CardError)
     raise_faults(
-        gearbox_faults(document),
+        find_gearbox_faults(document),
         CardError,
         str(card),
         "correct these keys of the gearbox card; docs/reference/gearbox-card.md describes them",
     )
-    return gearbox_of(document)
+    return build_gearbox(document)
 
 
 def _find(card: Path | str) -> Path:
     builtin = _CARDS / f"{card}.toml"
-    if str(card) in builtin_gearboxes():
+    if str(card) in list_builtin_gearboxes():
         return builtin
     path = Path(card)
     if path.suffix or path.exists():
         return path
     raise CardError(
-        f"no built-in gearbox {str(card)!r}{did_you_mean(str(card), builtin_gearboxes())}",
-        f"give a path to a card, or one of {', '.join(builtin_gearboxes())}",
+        f"no built-in gearbox {str(card)!r}{suggest_spelling(str(card), list_builtin_gearboxes())}",
+        f"give a path to a card, or one of {', '.join(list_builtin_gearboxes())}",
     )
 
 
-def gearbox_of(document: Mapping[str, Any]) -> Gearbox:
-    """Return the gearbox of a document that has no faults (see `gearbox_faults`)."""
+def build_gearbox(document: Mapping[str, Any]) -> Gearbox:
+    """Return the gearbox of a document that has no faults (see `find_gearbox_faults`)."""
     file = GearboxFile.model_validate(document)
     return Gearbox(
         name=file.name,
         input=file.input,
         output=file.output,
-        sets=tuple(table.spec(name) for name, table in file.sets.items()),
-        pairs=tuple(table.spec(name) for name, table in file.pairs.items()),
-        elements={name: e.spec(name, file.friction) for name, e in file.elements.items()},
-        gears=tuple(gear.spec() for gear in file.gears),
+        sets=tuple(table.to_spec(name) for name, table in file.sets.items()),
+        pairs=tuple(table.to_spec(name) for name, table in file.pairs.items()),
+        elements={name: e.to_spec(name, file.friction) for name, e in file.elements.items()},
+        gears=tuple(gear.to_spec() for gear in file.gears),
         inertias=dict(file.inertia_kgm2),
         source=file.source,
-        drive=None if file.drive is None else file.drive.spec(),
+        drive=None if file.drive is None else file.drive.to_spec(),
     )

@@ -6,21 +6,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from drivetwin._util.toml import Fault, did_you_mean, schema_faults
+from drivetwin._util.toml import Fault, suggest_spelling, validate_schema
 from drivetwin.gearbox.schema import GearboxFile
 from drivetwin.gearbox.spec import GROUND
 
 
-def gearbox_faults(document: Mapping[str, Any]) -> list[Fault]:
+def find_gearbox_faults(document: Mapping[str, Any]) -> list[Fault]:
     """Return all faults of a card file: those of the schema, or else those between tables."""
-    faults = schema_faults(document, GearboxFile)
+    faults = validate_schema(document, GearboxFile)
     if faults:
         return faults
     file = GearboxFile.model_validate(document)
-    return [*_names(file), *_ends(file), *_members(file), *_gears(file)]
+    return [*_check_names(file), *_check_ends(file), *_check_members(file), *_check_gears(file)]
 
 
-def _names(file: GearboxFile) -> Iterator[Fault]:
+def _check_names(file: GearboxFile) -> Iterator[Fault]:
     """Sets, pairs and elements share one name space: torques are reported by these names."""
     seen: dict[str, str] = {}
     for table, names in (("sets", file.sets), ("pairs", file.pairs), ("elements", file.elements)):
@@ -30,7 +30,7 @@ def _names(file: GearboxFile) -> Iterator[Fault]:
             seen[name] = table
 
 
-def _ends(file: GearboxFile) -> Iterator[Fault]:
+def _check_ends(file: GearboxFile) -> Iterator[Fault]:
     """Input and output are two shafts; shafts that one set or pair joins are different ones."""
     if file.input == file.output:
         yield Fault("output", "input and output are the same member")
@@ -45,7 +45,7 @@ def _ends(file: GearboxFile) -> Iterator[Fault]:
             yield Fault(f"pairs.{name}", "both wheels are on the same member")
 
 
-def _members(file: GearboxFile) -> Iterator[Fault]:
+def _check_members(file: GearboxFile) -> Iterator[Fault]:
     """Every member of an end, an element or an inertia must belong to a set or a gear pair."""
     geared = {m for each in file.sets.values() for m in (each.sun, each.ring, each.carrier)}
     geared |= {m for pair in file.pairs.values() for m in (pair.a, pair.b)}
@@ -54,12 +54,12 @@ def _members(file: GearboxFile) -> Iterator[Fault]:
     for key, member in (("input", file.input), ("output", file.output)):
         if member not in known:
             yield Fault(key, f"no set, pair or element has a member {member!r}"
-                        f"{did_you_mean(member, known)}")  # fmt: skip
+                        f"{suggest_spelling(member, known)}")  # fmt: skip
     for member in file.inertia_kgm2:
         if member == GROUND:
             yield Fault(f"inertia_kgm2.{member}", "the ground does not turn; name a shaft")
         elif member not in known:
-            text = f"no set, pair or element has this member{did_you_mean(member, known)}"
+            text = f"no set, pair or element has this member{suggest_spelling(member, known)}"
             yield Fault(f"inertia_kgm2.{member}", text)
     for name, element in file.elements.items():
         if element.members[0] == element.members[-1] and len(element.members) == 2:
@@ -68,11 +68,11 @@ def _members(file: GearboxFile) -> Iterator[Fault]:
             if member not in geared | {file.input, file.output, GROUND} and (
                 sum(member in other.members for other in file.elements.values()) < 2
             ):
-                text = f"{member!r} belongs to nothing else{did_you_mean(member, geared)}"
+                text = f"{member!r} belongs to nothing else{suggest_spelling(member, geared)}"
                 yield Fault(f"elements.{name}.members", text)
 
 
-def _gears(file: GearboxFile) -> Iterator[Fault]:
+def _check_gears(file: GearboxFile) -> Iterator[Fault]:
     """Gears have different names and engage elements of the card, each once."""
     seen: set[str] = set()
     for index, gear in enumerate(file.gears):
@@ -83,5 +83,5 @@ def _gears(file: GearboxFile) -> Iterator[Fault]:
             yield Fault(f"gears[{index}].elements", "an element is given twice")
         for name in gear.elements:
             if name not in file.elements:
-                text = f"no [elements.{name}]{did_you_mean(name, file.elements)}"
+                text = f"no [elements.{name}]{suggest_spelling(name, file.elements)}"
                 yield Fault(f"gears[{index}].elements", text)

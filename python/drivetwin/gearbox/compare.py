@@ -9,9 +9,9 @@ import numpy as np
 
 from drivetwin.errors import SimulationError
 from drivetwin.gearbox.drive import Drive
-from drivetwin.gearbox.gears import gear_statics
-from drivetwin.gearbox.maneuver import Maneuver, plan, signals, time_grid
-from drivetwin.gearbox.network import network_elements
+from drivetwin.gearbox.gears import solve_gear
+from drivetwin.gearbox.maneuver import Maneuver, build_signals, build_time_grid, plan
+from drivetwin.gearbox.network import build_network_elements
 from drivetwin.gearbox.reduction import Reduction
 from drivetwin.gearbox.traces import CouplingError, Traces
 from drivetwin.simulation.dual_clutch import (
@@ -23,7 +23,7 @@ from drivetwin.simulation.dual_clutch import (
     State,
 )
 from drivetwin.simulation.dual_clutch import simulate as simulate_dual_clutch
-from drivetwin.simulation.network import Element, Start, element
+from drivetwin.simulation.network import Element, Start, build_element
 from drivetwin.simulation.network import simulate as simulate_network
 
 AXLE, WHEEL, SHAFT = "axle beyond the shaft", "wheel of the vehicle", "shaft to the axle"
@@ -41,7 +41,7 @@ class Comparison:
     @property
     def error(self) -> CouplingError:
         """Largest differences."""
-        return self.full.largest_difference(self.form)
+        return self.full.compute_largest_difference(self.form)
 
 
 def compare(
@@ -55,9 +55,9 @@ def compare(
     """
     drive = drive or reduction.gearbox.require_drive()
     maneuver = plan(reduction, drive)
-    time = time_grid(maneuver)
-    full = _whole_gearbox(reduction, maneuver, time)
-    form = _dual_clutch(reduction, maneuver, time, keep_coupling=keep_coupling)
+    time = build_time_grid(maneuver)
+    full = _simulate_whole_gearbox(reduction, maneuver, time)
+    form = _simulate_dual_clutch(reduction, maneuver, time, keep_coupling=keep_coupling)
     return Comparison(time, full, form)
 
 
@@ -69,7 +69,7 @@ def _start(reduction: Reduction, maneuver: Maneuver, coupling: float) -> tuple[f
     """
     drive, i, new = maneuver.drive, maneuver.old_ratio, reduction.on_coming
     inertia = (drive.engine_inertia + reduction.M11) * i**2 + reduction.M22
-    gained = maneuver.gain_before_release(inertia, i / new.i_c - new.i_out)
+    gained = maneuver.compute_speed_gain(inertia, i / new.i_c - new.i_out)
     output = maneuver.output_speed - gained
     total = inertia + 2.0 * coupling * i + maneuver.vehicle
     acceleration = (i * maneuver.engine_torque - maneuver.load) / total
@@ -86,12 +86,12 @@ class WholeGearbox:
     start: Start
 
 
-def whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbox:
+def build_whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbox:
     """State the reference shift for the network."""
     gearbox = reduction.gearbox
-    torque, pressures = signals(reduction, maneuver)
+    torque, pressures = build_signals(reduction, maneuver)
     dogs = [name for name in reduction.common if name in gearbox.dogs]
-    elements = [*network_elements(gearbox, dogs), *_surroundings(reduction, maneuver)]
+    elements = [*build_network_elements(gearbox, dogs), *_build_surroundings(reduction, maneuver)]
     names = [e["name"] for e in elements if e["type"] == "clutch"]
     zero = Signal(torque.time, np.zeros_like(torque.time))
     inputs = {ENGINE_TORQUE: torque} | {name: pressures.get(name, zero) for name in names}
@@ -99,8 +99,8 @@ def whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbox:
     friction = [name for name in reduction.common if name in names]
     # Dogs of the new gear turn some of what idles in the old one; what idles even so stands still.
     engaged = (reduction.off_going.element, *reduction.common)
-    old = replace(gearbox.gear(reduction.from_gear), elements=engaged)
-    in_gear = gear_statics(replace(gearbox, gears=(old,)), old.name).speeds
+    old = replace(gearbox.get_gear(reduction.from_gear), elements=engaged)
+    in_gear = solve_gear(replace(gearbox, gears=(old,)), old.name).speeds
     speed_in = maneuver.old_ratio * output
     speeds = {member: speed_in * (each or 0.0) for member, each in in_gear.items()}
     start = Start(
@@ -111,8 +111,8 @@ def whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbox:
     return WholeGearbox(tuple(elements), inputs, start)
 
 
-def _whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: FloatArray) -> Traces:
-    gearbox, stated = reduction.gearbox, whole_gearbox(reduction, maneuver)
+def _simulate_whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: FloatArray) -> Traces:
+    gearbox, stated = reduction.gearbox, build_whole_gearbox(reduction, maneuver)
     run = simulate_network(
         stated.elements,
         stated.inputs,
@@ -125,25 +125,31 @@ def _whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: FloatArray) -
     return Traces(shaft_torque, input_speed, output_speed)
 
 
-def _surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
+def _build_surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
     """Engine, shaft, final drive, vehicle and load around the gearbox."""
     drive, engine, output = maneuver.drive, reduction.gearbox.input, reduction.gearbox.output
     load = maneuver.load * drive.i_f
     return [
-        element("inertia", "inertia of the engine", node=engine, inertia=drive.engine_inertia),
-        element("torque", "torque of the engine", node=engine, input=ENGINE_TORQUE),
-        element("spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o),
-        element("gear", "drive to the wheel", a=AXLE, b=WHEEL, ratio=drive.i_f),
-        element("inertia", "inertia of the vehicle", node=WHEEL, inertia=drive.vehicle_inertia),
-        element("road_load", "load", node=WHEEL, constant=load, rolling=0.0, aero=0.0),
+        build_element(
+            "inertia", "inertia of the engine", node=engine, inertia=drive.engine_inertia
+        ),
+        build_element("torque", "torque of the engine", node=engine, input=ENGINE_TORQUE),
+        build_element(
+            "spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o
+        ),
+        build_element("gear", "drive to the wheel", a=AXLE, b=WHEEL, ratio=drive.i_f),
+        build_element(
+            "inertia", "inertia of the vehicle", node=WHEEL, inertia=drive.vehicle_inertia
+        ),
+        build_element("road_load", "load", node=WHEEL, constant=load, rolling=0.0, aero=0.0),
     ]
 
 
-def dual_clutch_form(
+def build_dual_clutch_form(
     reduction: Reduction, maneuver: Maneuver, *, keep_coupling: bool = False
 ) -> tuple[DualClutch, State]:
     """Model and start of the reference shift in the dual-clutch form."""
-    model = reduction.dual_clutch(maneuver.drive, keep_coupling=keep_coupling)
+    model = reduction.build_dual_clutch(maneuver.drive, keep_coupling=keep_coupling)
     model = replace(model, load=RoadLoad(constant=maneuver.load * maneuver.drive.i_f))
     coupling = reduction.M12 if keep_coupling else 0.0
     output, wheel, twist = _start(reduction, maneuver, coupling)
@@ -151,11 +157,11 @@ def dual_clutch_form(
     return model, State(maneuver.old_ratio * output, output, wheel, twist, locked)
 
 
-def _dual_clutch(
+def _simulate_dual_clutch(
     reduction: Reduction, maneuver: Maneuver, time: FloatArray, *, keep_coupling: bool
 ) -> Traces:
-    model, start = dual_clutch_form(reduction, maneuver, keep_coupling=keep_coupling)
-    torque, pressures = signals(reduction, maneuver)
+    model, start = build_dual_clutch_form(reduction, maneuver, keep_coupling=keep_coupling)
+    torque, pressures = build_signals(reduction, maneuver)
     run = simulate_dual_clutch(
         model, torque, {each.name: pressures[each.name] for each in model.elements}, start, time
     )

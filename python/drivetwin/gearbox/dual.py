@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from drivetwin.gearbox.spec import Gearbox
 
 
-def dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool) -> DualClutch:
+def build_dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool) -> DualClutch:
     """Return the dual-clutch driveline; see `Reduction.dual_clutch`."""
     pair = (reduction.off_going, reduction.on_coming)
-    drums = _drums(reduction, drive) if keep_coupling else (0.0, 0.0)
+    drums = _compute_drum_inertias(reduction, drive) if keep_coupling else (0.0, 0.0)
     drums_in = sum(drum / each.i_c**2 for drum, each in zip(drums, pair, strict=True))
     drums_out = sum(drum * each.i_out**2 for drum, each in zip(drums, pair, strict=True))
     return DualClutch(
@@ -33,15 +33,15 @@ def dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool) -> D
         c_o=drive.c_o,
         load=RoadLoad(constant=drive.load),
         elements=(
-            shift_element(reduction.gearbox, pair[0], drums[0]),
-            shift_element(reduction.gearbox, pair[1], drums[1]),
+            build_shift_element(reduction.gearbox, pair[0], drums[0]),
+            build_shift_element(reduction.gearbox, pair[1], drums[1]),
         ),
     )
 
 
-def shift_element(gearbox: Gearbox, ratios: ElementRatios, drum: float) -> ShiftElement:
+def build_shift_element(gearbox: Gearbox, ratios: ElementRatios, drum: float) -> ShiftElement:
     """Return a shift element of the form, with a drum of inertia `drum` [kg m^2]."""
-    capacity = gearbox.capacity(ratios.element)
+    capacity = gearbox.get_capacity(ratios.element)
     return ShiftElement(
         name=ratios.element,
         i_c=ratios.i_c,
@@ -54,7 +54,7 @@ def shift_element(gearbox: Gearbox, ratios: ElementRatios, drum: float) -> Shift
     )
 
 
-def _drums(reduction: Reduction, drive: Drive) -> tuple[float, float]:
+def _compute_drum_inertias(reduction: Reduction, drive: Drive) -> tuple[float, float]:
     """Drum inertias (off-going, on-coming) that carry M12 together.
 
     A drum I on element k couples by -I·i_out/i_c and takes I/i_c², I·i_out² from the two sides,

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.gearbox.drive import Drive
-from drivetwin.gearbox.maneuver import RAMP, Maneuver, plan, time_grid
+from drivetwin.gearbox.maneuver import RAMP, Maneuver, build_time_grid, plan
 from drivetwin.gearbox.reduction import Reduction
 from drivetwin.gearbox.traces import CouplingError, Traces
-from drivetwin.simulation.dual_clutch import FloatArray, in_series
+from drivetwin.simulation.dual_clutch import FloatArray, compute_series_inertia
 
 _GROWTH_STEPS = 4
 """Fixed-point steps for the slip left when the first model locks; the growth is moderate."""
@@ -28,13 +28,13 @@ def estimate(reduction: Reduction, drive: Drive | None = None) -> CouplingError:
     Raises ReductionError where no reference shift can be planned.
     """
     maneuver = plan(reduction, drive or reduction.gearbox.require_drive())
-    time = time_grid(maneuver)
+    time = build_time_grid(maneuver)
     time = time[time >= maneuver.release]
-    coupled = _inertia_phase(reduction, maneuver, reduction.M12)
-    alone = _inertia_phase(reduction, maneuver, 0.0)
-    full = _motion(reduction, maneuver, coupled, time)
-    form = _motion(reduction, maneuver, alone, time)
-    error = full.largest_difference(form)
+    coupled = _estimate_inertia_phase(reduction, maneuver, reduction.M12)
+    alone = _estimate_inertia_phase(reduction, maneuver, 0.0)
+    full = _compute_motion(reduction, maneuver, coupled, time)
+    form = _compute_motion(reduction, maneuver, alone, time)
+    error = full.compute_largest_difference(form)
     return CouplingError(
         shaft_torque=error.shaft_torque,
         input_speed=max(error.input_speed, abs(coupled.in_at_lock)),
@@ -62,11 +62,11 @@ class _InertiaPhase:
     torque: float
 
 
-def _inertia_phase(reduction: Reduction, maneuver: Maneuver, M12: float) -> _InertiaPhase:
+def _estimate_inertia_phase(reduction: Reduction, maneuver: Maneuver, M12: float) -> _InertiaPhase:
     i_c, i_out = reduction.on_coming.i_c, reduction.on_coming.i_out
     J_in = maneuver.drive.engine_inertia + reduction.M11
     J_rigid = reduction.M22 + maneuver.vehicle
-    ahead = _head_start(reduction, maneuver, M12)
+    ahead = _estimate_head_start(reduction, maneuver, M12)
     shift_in = -M12 / J_in * maneuver.swing_out
     shift_out = -M12 / J_rigid * maneuver.swing_in
     end_in, end_out = shift_in + maneuver.old_ratio * ahead, shift_out + ahead
@@ -83,11 +83,11 @@ def _inertia_phase(reduction: Reduction, maneuver: Maneuver, M12: float) -> _Ine
     # does it, with an impulse on both shafts. The rate is the mean over what is left to slip.
     left, growth = slip, 0.0
     for _ in range(_GROWTH_STEPS):
-        into, out_of = rates(maneuver.torque_below(abs(left)))
+        into, out_of = rates(maneuver.compute_mean_torque(abs(left)))
         growth = (into / i_c - i_out * out_of) / slip_rate - 1.0
         left = slip * (1.0 + growth)
     impulse = slip * growth / (1.0 / (i_c**2 * J_in) + i_out**2 / J_rigid)
-    _, out_of_lock = rates(maneuver.torque_below(0.0))
+    _, out_of_lock = rates(maneuver.compute_mean_torque(0.0))
     return _InertiaPhase(
         M12=M12,
         ahead=ahead,
@@ -100,16 +100,16 @@ def _inertia_phase(reduction: Reduction, maneuver: Maneuver, M12: float) -> _Ine
     )
 
 
-def _head_start(reduction: Reduction, maneuver: Maneuver, M12: float) -> float:
+def _estimate_head_start(reduction: Reduction, maneuver: Maneuver, M12: float) -> float:
     """Output speed gained before the release because of `M12`, rad/s."""
     i, new = maneuver.old_ratio, reduction.on_coming
     inertia = (maneuver.drive.engine_inertia + reduction.M11) * i**2 + reduction.M22
     grip = i / new.i_c - new.i_out
-    coupled = maneuver.gain_before_release(inertia + 2.0 * M12 * i, grip)
-    return coupled - maneuver.gain_before_release(inertia, grip)
+    coupled = maneuver.compute_speed_gain(inertia + 2.0 * M12 * i, grip)
+    return coupled - maneuver.compute_speed_gain(inertia, grip)
 
 
-def _motion(
+def _compute_motion(
     reduction: Reduction, maneuver: Maneuver, phase: _InertiaPhase, time: FloatArray
 ) -> Traces:
     drive, i_h, J5 = maneuver.drive, maneuver.new_ratio, maneuver.vehicle
@@ -127,7 +127,7 @@ def _motion(
     acceleration = (i_h * maneuver.engine_torque - maneuver.load) / (J4 + J5)
     settled = maneuver.load + J5 * acceleration
     after = np.maximum(time - phase.lock, 0.0)
-    decay, twist_rate = _release(drive, in_series(J4, J5), after)
+    decay, twist_rate = _compute_release_response(drive, compute_series_inertia(J4, J5), after)
     locked = time >= phase.lock
     relative = J5 / (J4 + J5) * (phase.torque - settled) * twist_rate
     output = start_out + swing_out * done + np.where(locked, acceleration * after + relative, 0.0)
@@ -138,7 +138,9 @@ def _motion(
     )
 
 
-def _release(drive: Drive, J: float, after: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _compute_release_response(
+    drive: Drive, J: float, after: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Shaft torque and rate of twist per unit torque released at rest, after each time.
 
     `J` is the inertia of both masses in series [kg m^2].

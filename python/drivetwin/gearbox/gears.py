@@ -38,30 +38,30 @@ class GearStatics:
     power_error: float
     torque_error: float
 
-    def torque(self, element: str, member: str) -> float:
+    def get_torque(self, element: str, member: str) -> float:
         """Torque of an element on a member per unit input torque; 0 where it has none."""
         return sum(f.torque for f in self.flanges if (f.element, f.member) == (element, member))
 
-    def power(self, element: str, member: str) -> float:
+    def compute_power(self, element: str, member: str) -> float:
         """Power from an element into a member per unit input power."""
-        return self.torque(element, member) * (self.speeds[member] or 0.0)
+        return self.get_torque(element, member) * (self.speeds[member] or 0.0)
 
 
-def ratio_remarks(gearbox: Gearbox, ratios: Mapping[str, float]) -> list[str]:
+def describe_ratio_differences(gearbox: Gearbox, ratios: Mapping[str, float]) -> list[str]:
     """One sentence for each gear whose computed ratio, by its name, is not the published one."""
-    entries = ((gearbox.gear(name), ratio) for name, ratio in ratios.items())
+    entries = ((gearbox.get_gear(name), ratio) for name, ratio in ratios.items())
     return [
         f"gear {entry.name}: the computed ratio {ratio:.4f} is not the published "
         f"{entry.published:.6g} ± {entry.tolerance:.2g}: check teeth and elements, or state a "
         "tolerance"
         for entry, ratio in entries
-        if not entry.agrees(ratio)
+        if not entry.matches_ratio(ratio)
     ]
 
 
-def gear_statics(gearbox: Gearbox, gear: str) -> GearStatics:
+def solve_gear(gearbox: Gearbox, gear: str) -> GearStatics:
     """Solve one gear. Raises InputError where its elements do not make one ratio."""
-    entry = gearbox.gear(gear)
+    entry = gearbox.get_gear(gear)
     try:
         speeds, torques, (power, torque) = native_gear_statics(
             as_json(gearbox), list(entry.elements), gearbox.input, gearbox.output

@@ -61,16 +61,20 @@ class Maneuver:
         per_speed = self.new_ratio / self.old_ratio - 1.0
         return abs(per_speed * self.output_speed * self.old_ratio / self.on_coming_i_c)
 
-    def torque_below(self, slip: float) -> float:
+    def compute_mean_torque(self, slip: float) -> float:
         """Mean on-coming torque over the last `slip` [rad/s] before lock-up, N m."""
-        return self.synchronising * self.on_coming.mean_mu(slip) / self.on_coming.mean_mu(self.slip)
+        return (
+            self.synchronising
+            * self.on_coming.compute_mean_mu(slip)
+            / self.on_coming.compute_mean_mu(self.slip)
+        )
 
     @property
     def vehicle(self) -> float:
         """Vehicle inertia at the output, kg m^2 (J5)."""
         return self.drive.vehicle_inertia / self.drive.i_f**2
 
-    def gain_before_release(self, inertia: float, grip: float) -> float:
+    def compute_speed_gain(self, inertia: float, grip: float) -> float:
         """Speed that the output gains before the release [rad/s].
 
         `inertia` before the shaft, at the output [kg m^2]; `grip` is the slip of the on-coming
@@ -116,14 +120,14 @@ def plan(reduction: Reduction, drive: Drive) -> Maneuver:
         swing_out=pulled - new.ratio * inertia / vehicle * swing,
         handover=new.i_c * torque,
         synchronising=synchronising,
-        on_coming=reduction.gearbox.capacity(new.element),
+        on_coming=reduction.gearbox.get_capacity(new.element),
         on_coming_i_c=new.i_c,
         release=LEAD_IN + drive.torque_phase,
         lock=LEAD_IN + drive.torque_phase + phase,
     )
 
 
-def signals(reduction: Reduction, maneuver: Maneuver) -> tuple[Signal, Mapping[str, Signal]]:
+def build_signals(reduction: Reduction, maneuver: Maneuver) -> tuple[Signal, Mapping[str, Signal]]:
     """Engine torque and pressures [Pa] by element, common elements included, over the shift."""
     end = maneuver.lock + AFTER
     hold = maneuver.lock + 0.5 * AFTER
@@ -134,11 +138,11 @@ def signals(reduction: Reduction, maneuver: Maneuver) -> tuple[Signal, Mapping[s
         return capacity.P0 + abs(torque) / (mu * capacity.gain)
 
     def holding(capacity: Capacity, share: float) -> float:
-        return pressure(capacity, HOLDING * largest * share, capacity.mean_mu(0.0))
+        return pressure(capacity, HOLDING * largest * share, capacity.compute_mean_mu(0.0))
 
-    mu = on_coming.mean_mu(maneuver.slip)
-    begin = float(on_coming.friction.at(np.full(1, maneuver.slip))[0])
-    off_going = reduction.gearbox.capacity(reduction.off_going.element)
+    mu = on_coming.compute_mean_mu(maneuver.slip)
+    begin = float(on_coming.friction.evaluate(np.full(1, maneuver.slip))[0])
+    off_going = reduction.gearbox.get_capacity(reduction.off_going.element)
     rising = [
         (0.0, 0.0),
         (LEAD_IN - FILL, 0.0),
@@ -158,15 +162,15 @@ def signals(reduction: Reduction, maneuver: Maneuver) -> tuple[Signal, Mapping[s
             always = holding(capacity, 10.0)
             lines[name] = [(0.0, always), (end, always)]
     torque = Signal(np.array([0.0, end]), np.full(2, maneuver.engine_torque))
-    return torque, {name: _line(points) for name, points in lines.items()}
+    return torque, {name: build_line(points) for name, points in lines.items()}
 
 
-def time_grid(maneuver: Maneuver) -> FloatArray:
+def build_time_grid(maneuver: Maneuver) -> FloatArray:
     """Times of the whole shift at 2 kHz, above every frequency of the driveline."""
     end = maneuver.lock + AFTER
     return np.linspace(0.0, end, round(2000.0 * end) + 1)
 
 
-def _line(points: list[tuple[float, float]]) -> Signal:
+def build_line(points: list[tuple[float, float]]) -> Signal:
     time, values = zip(*points, strict=True)
     return Signal(np.array(time), np.array(values))

@@ -14,7 +14,7 @@ from drivetwin.simulation.network import Element
 _NO_CAPACITY = Capacity(gain=0.0, P0=0.0, peak=1.0, friction=FrictionTable((0.0,), (0.0,)))
 
 
-def network_elements(
+def build_network_elements(
     gearbox: Gearbox, engaged_dogs: Collection[str] | None = None
 ) -> tuple[Element, ...]:
     """Return the gearbox as elements of the core, its members as nodes.
@@ -24,22 +24,22 @@ def network_elements(
     without capacity, for the study of gears.
     """
     return (
-        *_gearing(gearbox),
+        *_build_gearing(gearbox),
         *(
-            _inertia(member, inertia)
+            _build_inertia(member, inertia)
             for member, inertia in gearbox.inertias.items()
             if inertia > 0.0
         ),
-        *_shift_elements(gearbox, engaged_dogs),
+        *_build_shift_elements(gearbox, engaged_dogs),
     )
 
 
 def as_json(gearbox: Gearbox) -> str:
     """Return the gearbox as the driveline that the core reads, dogs as friction elements."""
-    return json.dumps({"elements": network_elements(gearbox)})
+    return json.dumps({"elements": build_network_elements(gearbox)})
 
 
-def _gearing(gearbox: Gearbox) -> list[Element]:
+def _build_gearing(gearbox: Gearbox) -> list[Element]:
     sets = [
         {
             "type": "planetary",
@@ -59,23 +59,25 @@ def _gearing(gearbox: Gearbox) -> list[Element]:
     return [*sets, *pairs]
 
 
-def _shift_elements(gearbox: Gearbox, engaged_dogs: Collection[str] | None) -> Iterator[Element]:
+def _build_shift_elements(
+    gearbox: Gearbox, engaged_dogs: Collection[str] | None
+) -> Iterator[Element]:
     for element in gearbox.elements.values():
         if engaged_dogs is None or element.kind is not ElementKind.DOG:
-            yield _friction(element)
+            yield _build_friction(element)
         elif element.name in engaged_dogs:
-            yield _rigid(element)
+            yield _build_rigid_coupling(element)
 
 
-def _inertia(member: str, inertia: float) -> Element:
+def _build_inertia(member: str, inertia: float) -> Element:
     return {"type": "inertia", "name": f"J {member}", "node": member, "inertia": inertia}
 
 
-def _rigid(element: ShiftMember) -> Element:
+def _build_rigid_coupling(element: ShiftMember) -> Element:
     return {"type": "gear", "name": element.name, "a": element.a, "b": element.b, "ratio": 1.0}
 
 
-def _friction(element: ShiftMember) -> Element:
+def _build_friction(element: ShiftMember) -> Element:
     capacity = element.capacity or _NO_CAPACITY
     return {
         "type": "clutch",

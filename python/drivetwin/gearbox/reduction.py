@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from drivetwin._native import reduce_shift as native_reduce_shift
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox.drive import Drive
-from drivetwin.gearbox.dual import dual_clutch
+from drivetwin.gearbox.dual import build_dual_clutch
 from drivetwin.gearbox.network import as_json
 from drivetwin.gearbox.spec import Gearbox
 from drivetwin.simulation.dual_clutch import DualClutch
@@ -99,7 +99,7 @@ class Reduction:
         """True if the dual-clutch form is exact, i.e. M12 is zero."""
         return self.coupling_ratio <= _NO_COUPLING
 
-    def condition(self) -> str:
+    def describe_condition(self) -> str:
         """Condition (1) of the paper in words, for this shift."""
         if not self.violations:
             return (
@@ -118,14 +118,18 @@ class Reduction:
             f"{100 * self.coupling_ratio:.3g} % of √(M11·M22)."
         )
 
-    def dual_clutch(self, drive: Drive | None = None, *, keep_coupling: bool = True) -> DualClutch:
+    def build_dual_clutch(
+        self, drive: Drive | None = None, *, keep_coupling: bool = True
+    ) -> DualClutch:
         """Return the dual-clutch driveline of this shift in the given drive (the card's, if None).
 
         With `keep_coupling`, M12 is carried by drum inertias of the two elements, as -I·a·b, I·a²,
         I·b² of a member that runs with the slip; without, it is left out and the diagonal kept.
         Raises ReductionError where an element states no capacity, or no drum can carry M12.
         """
-        return dual_clutch(self, drive or self.gearbox.require_drive(), keep_coupling=keep_coupling)
+        return build_dual_clutch(
+            self, drive or self.gearbox.require_drive(), keep_coupling=keep_coupling
+        )
 
 
 def reduce(gearbox: Gearbox, from_gear: str, to_gear: str) -> Reduction:
@@ -134,7 +138,7 @@ def reduce(gearbox: Gearbox, from_gear: str, to_gear: str) -> Reduction:
     Raises ReductionError, with the reason, where the shift is not one element off and one on, or
     where more or fewer than the two speeds of input and output remain in its middle.
     """
-    old, new = gearbox.gear(from_gear), gearbox.gear(to_gear)
+    old, new = gearbox.get_gear(from_gear), gearbox.get_gear(to_gear)
     try:
         off_going, on_coming, common, members = native_reduce_shift(
             as_json(gearbox),
@@ -157,12 +161,13 @@ def reduce(gearbox: Gearbox, from_gear: str, to_gear: str) -> Reduction:
         on_coming=ElementRatios(*on_coming),
         common=tuple(common),
         members=tuple(
-            MemberInertia(_label(gearbox, name), inertia, a, b) for name, inertia, a, b in members
+            MemberInertia(_format_label(gearbox, name), inertia, a, b)
+            for name, inertia, a, b in members
         ),
     )
 
 
-def _label(gearbox: Gearbox, name: str) -> str:
+def _format_label(gearbox: Gearbox, name: str) -> str:
     """Name the spin of planets, which the core gives as `carrier + sun`, after their set."""
     for each in gearbox.sets:
         if name == f"{each.carrier} + {each.sun}":

@@ -58,7 +58,7 @@ class SetTable(StrictModel):
         size = (self.ring_teeth or 0) / (self.sun_teeth or 1)
         return -size if self.dual_pinion else size
 
-    def spec(self, name: str) -> PlanetarySet:
+    def to_spec(self, name: str) -> PlanetarySet:
         """Return the set in SI."""
         inertia = self.planet_inertia_kgm2
         return PlanetarySet(name, self.sun, self.ring, self.carrier, self.ratio, inertia)
@@ -80,23 +80,23 @@ class PairTable(StrictModel):
     def _one_ratio(self) -> PairTable:
         if (self.teeth is None) == (self.ratio is None):
             raise ValueError("give either teeth or ratio")
-        if any(len(mesh) < 2 for mesh in self._meshes()):
+        if any(len(mesh) < 2 for mesh in self._count_meshes()):
             raise ValueError("a mesh has at least two wheels")
         if self.ratio == 0.0:
             raise ValueError("the ratio must not be 0")
         return self
 
-    def _meshes(self) -> list[list[int]]:
+    def _count_meshes(self) -> list[list[int]]:
         wheels = self.teeth or []
         flat = [count for count in wheels if isinstance(count, int)]
         return [flat] if flat else [mesh for mesh in wheels if isinstance(mesh, list)]
 
-    def spec(self, name: str) -> GearPair:
+    def to_spec(self, name: str) -> GearPair:
         """Return the pair; every external mesh turns the sense of rotation."""
         ratio = self.ratio
         if ratio is None:
             ratio = 1.0
-            for mesh in self._meshes():
+            for mesh in self._count_meshes():
                 ratio *= (-1.0) ** (len(mesh) - 1) * mesh[-1] / mesh[0]
         return GearPair(name, self.a, self.b, ratio)
 
@@ -109,7 +109,7 @@ class FrictionEntry(StrictModel):
     v_s_rad_s: float = Field(gt=0)
     mu_v_s: float = 0.0
 
-    def law(self) -> Stribeck:
+    def to_law(self) -> Stribeck:
         """Return the law in SI."""
         return Stribeck(self.mu_c, self.mu_s, self.v_s_rad_s, self.mu_v_s)
 
@@ -140,14 +140,14 @@ class ElementTable(StrictModel):
             raise ValueError("surfaces, area_m2 and radius_m belong together")
         return self
 
-    def spec(self, name: str, friction: FrictionEntry | None) -> ShiftMember:
+    def to_spec(self, name: str, friction: FrictionEntry | None) -> ShiftMember:
         """Return the element in SI; `friction` is the card's common law."""
         members = [*self.members, GROUND]
         law = self.friction or friction
         capacity = None
         if self.surfaces and self.area_m2 and self.radius_m and law is not None:
             gain = self.surfaces * self.derating * self.area_m2 * self.radius_m
-            capacity = Capacity(gain, self.P0_bar * BAR, self.peak, law.law())
+            capacity = Capacity(gain, self.P0_bar * BAR, self.peak, law.to_law())
         return ShiftMember(name, ElementKind(self.kind), members[0], members[1], capacity)
 
 
@@ -170,7 +170,7 @@ class GearTable(StrictModel):
             raise ValueError("the ratio must not be 0")
         return self
 
-    def spec(self) -> GearEntry:
+    def to_spec(self) -> GearEntry:
         """Return the gear; the rounding errors of ratio and final drive add up."""
         half = 0.5 * 10.0**-self.decimals
         overall = self.ratio * self.final_drive
@@ -197,7 +197,7 @@ class DriveTable(StrictModel):
     torque_phase_s: float = Field(default=0.15, gt=0)
     inertia_phase_s: float = Field(default=0.35, gt=0)
 
-    def spec(self) -> Drive:
+    def to_spec(self) -> Drive:
         """Return the drive in SI."""
         return Drive(
             engine_inertia=self.engine_inertia_kgm2,

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from drivetwin._util.toml import did_you_mean
+from drivetwin._util.toml import suggest_spelling
 from drivetwin.errors import CardError, InputError, ReductionError
 from drivetwin.gearbox.drive import Drive
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
@@ -66,9 +66,9 @@ class Capacity:
     peak: float
     friction: Stribeck | FrictionTable
 
-    def mean_mu(self, slip: float) -> float:
+    def compute_mean_mu(self, slip: float) -> float:
         """Mean μ over the slips from zero to `slip` [rad/s]; μ(0) for 0."""
-        return float(np.mean(self.friction.at(np.linspace(0.0, slip, 201))))
+        return float(np.mean(self.friction.evaluate(np.linspace(0.0, slip, 201))))
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class GearEntry:
     published: float
     tolerance: float
 
-    def agrees(self, ratio: float) -> bool:
+    def matches_ratio(self, ratio: float) -> bool:
         """Return True if a computed ratio equals the published one within its rounding."""
         return abs(ratio - self.published) <= self.tolerance * (1.0 + 1e-9)
 
@@ -130,18 +130,18 @@ class Gearbox:
             )
         return self.drive
 
-    def gear(self, name: str) -> GearEntry:
+    def get_gear(self, name: str) -> GearEntry:
         """Return the gear of this name; raises InputError with the names there are."""
         for gear in self.gears:
             if gear.name == name:
                 return gear
         names = [gear.name for gear in self.gears]
         raise InputError(
-            f"{self.name} has no gear {name!r}{did_you_mean(name, names)}",
+            f"{self.name} has no gear {name!r}{suggest_spelling(name, names)}",
             f"choose one of {', '.join(names)}",
         )
 
-    def capacity(self, element: str) -> Capacity:
+    def get_capacity(self, element: str) -> Capacity:
         """Return the torque capacity of an element.
 
         Raises ReductionError for a dog and where the card states no capacity.

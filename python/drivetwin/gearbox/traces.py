@@ -30,7 +30,7 @@ class Traces:
     input_speed: FloatArray
     output_speed: FloatArray
 
-    def largest_difference(self, other: Traces) -> CouplingError:
+    def compute_largest_difference(self, other: Traces) -> CouplingError:
         """Compare with another model over the same times."""
         return CouplingError(
             shaft_torque=float(np.max(np.abs(self.shaft_torque - other.shaft_torque))),

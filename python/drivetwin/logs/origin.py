@@ -16,7 +16,7 @@ from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.simulation.dual_clutch import LATEST
 
 
-def origin_of(starts: Iterable[float]) -> float:
+def find_origin(starts: Iterable[float]) -> float:
     """Return the first of the stamps [s] that are beyond LATEST; 0 without any.
 
     `starts` are the first stamps of all time bases of a log.
@@ -24,7 +24,7 @@ def origin_of(starts: Iterable[float]) -> float:
     return min((float(start) for start in starts if LATEST < abs(start) < math.inf), default=0.0)
 
 
-def since(time: FloatArray, origin: float) -> FloatArray:
+def subtract_origin(time: FloatArray, origin: float) -> FloatArray:
     """Return `time` (n,) [s] from `origin` on.
 
     Decimals that a number as large as the origin cannot hold are rounded away, or even steps would
@@ -36,6 +36,6 @@ def since(time: FloatArray, origin: float) -> FloatArray:
         return np.round(time - origin, -math.ceil(math.log10(np.spacing(abs(origin)))))
 
 
-def origin_told(origin: float) -> tuple[str, ...]:
+def describe_origin(origin: float) -> tuple[str, ...]:
     """Words for an origin that is not zero."""
     return (f"time counts from the first stamp, {origin:.15g} s",) if origin else ()

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from drivetwin.channels.read_options import Column
-from drivetwin.channels.shiftlog import FloatArray, gap_limit
+from drivetwin.channels.shiftlog import FloatArray, compute_gap_limit
 from drivetwin.errors import DamagedChannelError, Where
 
 Window = tuple[float, float]
@@ -63,16 +63,16 @@ class RawChannel:
     def gaps(self) -> tuple[Window, ...]:
         """Spans of time [s] without a number, from the sample before to the sample after."""
         stamps = self.time[np.isfinite(self.values) & np.isfinite(self.time)]
-        wide = np.flatnonzero(np.diff(stamps) > gap_limit(self.stamps))
+        wide = np.flatnonzero(np.diff(stamps) > compute_gap_limit(self.stamps))
         return tuple((float(stamps[index]), float(stamps[index + 1])) for index in wide)
 
     @property
     def pauses(self) -> int:
         """Number of interruptions of the stamps, with or without numbers next to them."""
         stamps = self.stamps
-        return int(np.count_nonzero(np.diff(stamps) > gap_limit(stamps)))
+        return int(np.count_nonzero(np.diff(stamps) > compute_gap_limit(stamps)))
 
-    def within(self, window: Window | None) -> RawChannel:
+    def select_window(self, window: Window | None) -> RawChannel:
         """Return the samples in a window of time, both ends included; all without a window."""
         if window is None:
             return self
@@ -140,7 +140,7 @@ class RawLog:
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Return the column at `index` of `columns`; raises DamagedChannelError without numbers."""
         if index < len(self.channels):
-            return self.channels[index].within(window)
+            return self.channels[index].select_window(window)
         name = self.columns[index].name
         raise DamagedChannelError(
             self.unreadable[name],
@@ -148,6 +148,6 @@ class RawLog:
             Where(file=self.source, channel=name),
         )
 
-    def named(self, name: str) -> tuple[RawChannel, ...]:
+    def get_channels(self, name: str) -> tuple[RawChannel, ...]:
         """Return the channels of this exact name: none, one, or several if the file repeats it."""
         return tuple(channel for channel in self.channels if channel.name == name)

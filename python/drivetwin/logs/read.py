@@ -8,27 +8,27 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin._util.progress import tell
-from drivetwin.channels.mapping import ChannelSpec, Mapped, resolve
+from drivetwin._util.progress import notify_progress
+from drivetwin.channels.mapping import ChannelSpec, Mapped, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, quantity_of
+from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, get_quantity
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.channels.units import channel_unit, first_spellings, lookup
+from drivetwin.channels.units import find_unit, list_first_spellings, resolve_channel_unit
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, UnitError, Where
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.quality.channel_checks import Checked, check_channel
 from drivetwin.logs.quality.consistency_checks import (
     check_common_span,
+    check_coverage,
+    check_final_drive,
     check_gearing,
+    check_torque_balance,
     check_torque_signs,
-    final_drive_held,
-    partly_recorded,
-    torque_balance,
 )
-from drivetwin.logs.quality.time_alignment import clock_warnings
-from drivetwin.logs.quality.torque_delay import torque_warnings
-from drivetwin.logs.quality.update_raster import find_raster, shown_late
+from drivetwin.logs.quality.time_alignment import check_speed_clocks
+from drivetwin.logs.quality.torque_delay import check_torque_delays
+from drivetwin.logs.quality.update_raster import find_raster, mark_late_samples
 from drivetwin.logs.raw import RawChannel, RawLog, Recording, Window
 from drivetwin.vehicle.card import VehicleCard
 
@@ -57,7 +57,7 @@ def read_log(
     stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
     with open_recording(path, stated.options) as recording:
         log = read_recording(recording, path, card, stated, needed, window)
-    mappings = {} if mapping is None else {Path(mapping).name: _digest(Path(mapping))}
+    mappings = {} if mapping is None else {Path(mapping).name: _compute_digest(Path(mapping))}
     return replace(log, mappings=mappings)
 
 
@@ -77,16 +77,16 @@ def read_recording(
     kinds = {name: element.kind for name, element in elements.items()}
     channels: dict[str, Channel] = {}
     specs = {**({} if card is None else card.channels), **stated.channels}
-    mapped = resolve(recording.columns, specs, kinds, needed, str(path))
+    mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path))
     _refuse_unitless(recording, mapped.channels, specs, str(path))
     warnings = [*recording.warnings, *mapped.warnings]
     for count, (role, spec) in enumerate(mapped.channels.items()):
-        tell(count / len(mapped.channels))
+        notify_progress(count / len(mapped.channels))
         try:
-            raw = recording.load(_picked(recording, spec), window)
-            checked = _checked(role, spec, raw, str(path))
+            raw = recording.load(_load_column(recording, spec), window)
+            checked = _make_checked_channel(role, spec, raw, str(path))
         except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
-            if role in specs or quantity_of(role) not in AUXILIARY:
+            if role in specs or get_quantity(role) not in AUXILIARY:
                 raise
             warnings.append(f"channel {spec.source!r}: {fault.what}; left out")
             continue
@@ -96,15 +96,15 @@ def read_recording(
     if card is not None:
         check_gearing(channels, card, str(path))
     check_torque_signs(channels, str(path))
-    warnings += partly_recorded(channels)
+    warnings += check_coverage(channels)
     if card is not None:
-        warnings += [*torque_balance(channels, card), *final_drive_held(channels, card)]
-        warnings += clock_warnings(channels, card)
-    warnings += torque_warnings(channels)
+        warnings += [*check_torque_balance(channels, card), *check_final_drive(channels, card)]
+        warnings += check_speed_clocks(channels, card)
+    warnings += check_torque_delays(channels)
     if not stated.options.time.simultaneous:
-        channels, late = shown_late(channels)
+        channels, late = mark_late_samples(channels)
         warnings += late
-    return ShiftLog(channels, str(path), _digest(path), tuple(dict.fromkeys(warnings)))
+    return ShiftLog(channels, str(path), _compute_digest(path), tuple(dict.fromkeys(warnings)))
 
 
 def _refuse_unitless(
@@ -121,14 +121,14 @@ def _refuse_unitless(
         role: spec.source
         for role, spec in channels.items()
         if spec.unit is None
-        and not (column := recording.columns[_picked(recording, spec)]).empty
+        and not (column := recording.columns[_load_column(recording, spec)]).empty
         and not (column.unit or "").strip()
-        and quantity_of(role) is not Quantity.STATE
-        and (role in stated or quantity_of(role) not in AUXILIARY)
+        and get_quantity(role) is not Quantity.STATE
+        and (role in stated or get_quantity(role) not in AUXILIARY)
     }
     if len(without) < 2:
         return
-    units = {role: first_spellings(quantity_of(role))[0] for role in without}
+    units = {role: list_first_spellings(get_quantity(role))[0] for role in without}
     examples = "; ".join(
         f'channels.{role} = {{ source = "{name}", unit = "{units[role]}" }}'
         for role, name in without.items()
@@ -154,21 +154,21 @@ def read_raw(path: Path, options: ReadOptions | None = None) -> RawLog:
         return RawLog(tuple(channels), unreadable, recording.warnings, str(path))
 
 
-def _digest(path: Path) -> str:
+def _compute_digest(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _picked(recording: Recording, spec: ChannelSpec) -> int:
+def _load_column(recording: Recording, spec: ChannelSpec) -> int:
     """The column of a spec; `resolve` saw to it that it is the only one, or one with numbers."""
-    picked = [index for index, column in enumerate(recording.columns) if spec.picks(column)]
+    picked = [index for index, column in enumerate(recording.columns) if spec.matches(column)]
     return min(picked, key=lambda one: recording.columns[one].empty)
 
 
-def _channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Channel:
-    quantity = quantity_of(role)
+def _convert_channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Channel:
+    quantity = get_quantity(role)
     unit_text = spec.unit if spec.unit is not None else source.unit
-    unit = channel_unit(unit_text, quantity, Where(file=file, channel=spec.source))
+    unit = resolve_channel_unit(unit_text, quantity, Where(file=file, channel=spec.source))
     return Channel(
         role=role,
         quantity=quantity,
@@ -179,17 +179,17 @@ def _channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Cha
     )
 
 
-def _checked(role: str, spec: ChannelSpec, raw: RawChannel, file: str) -> Checked:
+def _make_checked_channel(role: str, spec: ChannelSpec, raw: RawChannel, file: str) -> Checked:
     """Return the checked channel of a role, and its warnings."""
     notes = [f"channel {raw.name!r}: {note}" for note in raw.notes]
-    found = check_channel(_channel(role, spec, raw, file), file)
+    found = check_channel(_convert_channel(role, spec, raw, file), file)
     held = find_raster(found.channel) is not None
-    warnings = (*notes, *_asserted(spec, raw), *found.warnings)
+    warnings = (*notes, *_describe_unit_override(spec, raw), *found.warnings)
     return Checked(replace(found.channel, held=held), warnings)
 
 
-def _asserted(spec: ChannelSpec, raw: RawChannel) -> list[str]:
+def _describe_unit_override(spec: ChannelSpec, raw: RawChannel) -> list[str]:
     """A warning where the mapping asserts another unit than the file states."""
-    if spec.unit is None or raw.unit is None or lookup(raw.unit) == lookup(spec.unit):
+    if spec.unit is None or raw.unit is None or find_unit(raw.unit) == find_unit(spec.unit):
         return []
     return [f"channel {spec.source!r}: read in {spec.unit!r} as mapped, the file says {raw.unit!r}"]

@@ -39,38 +39,38 @@ class Summary:
     warnings: tuple[str, ...]
 
 
-def summarise(recording: Recording) -> Summary:
+def summarise_recording(recording: Recording) -> Summary:
     """Look at every column of an open file; raises the errors of its reader."""
     found: list[ColumnSummary] = []
     for index, column in enumerate(recording.columns):
         try:
-            found.append(_summary(column, recording.load(index)))
+            found.append(_summarise_column(column, recording.load(index)))
         except DamagedChannelError as fault:
             found.append(ColumnSummary(column, fault=fault.what))
     return Summary(tuple(found), recording.warnings)
 
 
-def _summary(column: Column, channel: RawChannel) -> ColumnSummary:
+def _summarise_column(column: Column, channel: RawChannel) -> ColumnSummary:
     without = int(np.count_nonzero(~np.isfinite(channel.values)))
     return ColumnSummary(
         column=column,
         samples=channel.time.size,
-        rate=_update_rate(channel),
+        rate=_estimate_update_rate(channel),
         range=channel.range,
         span=(float(channel.time[0]), float(channel.time[-1])) if channel.time.size else None,
         gaps=without + channel.pauses,
     )
 
 
-def _update_rate(channel: RawChannel) -> float | None:
+def _estimate_update_rate(channel: RawChannel) -> float | None:
     """Return the updates per second; for a held signal the rate of the sender."""
     step = channel.step
     if step is None or step <= 0.0:
         return None
     sent = Channel("", Quantity.FRACTION, channel.time, channel.values, channel.name, "")
-    raster = find_raster(sent) if _in_order(channel.time) else None
+    raster = find_raster(sent) if _is_in_order(channel.time) else None
     return 1.0 / (step if raster is None else raster.period)
 
 
-def _in_order(time: FloatArray) -> bool:
+def _is_in_order(time: FloatArray) -> bool:
     return bool(np.isfinite(time).all() and np.all(np.diff(time) > 0.0))

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from drivetwin.channels.mapping import ChannelSpec, Mapped, guess, spec_of
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.mapping import ChannelSpec, Mapped, infer_candidates, make_spec
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.roles import NEEDED, quantity_of
+from drivetwin.channels.roles import NEEDED, get_quantity
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.logs.raw import Recording
-from drivetwin.logs.summary import ColumnSummary, summarise
+from drivetwin.logs.summary import ColumnSummary, summarise_recording
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -33,7 +33,7 @@ class Column:
     gaps: int
     roles: tuple[str, ...]
 
-    def document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """For JSON and tables."""
         return asdict(self)
 
@@ -58,50 +58,52 @@ class Survey:
             if not (column.unit or "").strip()
             and role in self.mapping
             and self.mapping[role].unit is None
-            and quantity_of(role) is not Quantity.STATE
+            and get_quantity(role) is not Quantity.STATE
         )
 
-    def document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "source": self.source,
-            "columns": [column.document() for column in self.columns],
+            "columns": [column.to_document() for column in self.columns],
             "mapping": {role: asdict(spec) for role, spec in self.mapping.items()},
             "notes": self.notes,
         }
 
 
-def survey(recording: Recording, source: str, card: VehicleCard | None, stated: Mapped) -> Survey:
+def survey_recording(
+    recording: Recording, source: str, card: VehicleCard | None, stated: Mapped
+) -> Survey:
     """Look at an open log; the card names the pressures, what is `stated` overrides guesses.
 
     Raises the typed errors of the readers, but none for channels that are missing or ambiguous:
     these become notes.
     """
-    summary = summarise(recording)
+    summary = summarise_recording(recording)
     columns = [one.column for one in summary.columns]
     specs = {**({} if card is None else card.channels), **stated.channels}
     kinds = {} if card is None else {name: spec.kind for name, spec in card.elements.items()}
-    free = [one for one in columns if not any(spec.picks(one) for spec in specs.values())]
+    free = [one for one in columns if not any(spec.matches(one) for spec in specs.values())]
     candidates = {
-        **guess(free, kinds),
-        **{role: [one for one in columns if spec.picks(one)] for role, spec in specs.items()},
+        **infer_candidates(free, kinds),
+        **{role: [one for one in columns if spec.matches(one)] for role, spec in specs.items()},
     }
     mapping = {
-        role: specs.get(role) or spec_of(found[0], columns)
+        role: specs.get(role) or make_spec(found[0], columns)
         for role, found in candidates.items()
         if len(found) == 1
     }
     faults = [f"{one.column}: {one.fault}" for one in summary.columns if one.fault]
     return Survey(
         source=source,
-        columns=tuple(_column(one, candidates) for one in summary.columns if not one.fault),
+        columns=tuple(_make_column(one, candidates) for one in summary.columns if not one.fault),
         mapping=mapping,
         options=stated.options,
-        notes=(*summary.warnings, *faults, *_notes(candidates, card)),
+        notes=(*summary.warnings, *faults, *_describe_open_roles(candidates, card)),
     )
 
 
-def _column(summary: ColumnSummary, candidates: Mapping[str, Sequence[LogColumn]]) -> Column:
+def _make_column(summary: ColumnSummary, candidates: Mapping[str, Sequence[LogColumn]]) -> Column:
     column = summary.column
     return Column(
         name=column.name,
@@ -114,14 +116,19 @@ def _column(summary: ColumnSummary, candidates: Mapping[str, Sequence[LogColumn]
     )
 
 
-def _notes(candidates: Mapping[str, Sequence[LogColumn]], card: VehicleCard | None) -> list[str]:
+def _describe_open_roles(
+    candidates: Mapping[str, Sequence[LogColumn]], card: VehicleCard | None
+) -> list[str]:
     """Roles that no column, or more than one, could play."""
     notes = [
         f"{role} may be any of {', '.join(map(str, found))}: name one in a channel mapping"
         for role, found in candidates.items()
         if len(found) > 1
     ]
-    wanted = [*NEEDED, *(pressure_role(element) for element in (card.elements if card else ()))]
+    wanted = [
+        *NEEDED,
+        *(make_pressure_role(element) for element in (card.elements if card else ())),
+    ]
     missing = [role for role in wanted if not candidates.get(role)]
     if missing:
         notes.append(f"no column for {', '.join(missing)}: name it in a channel mapping")

@@ -15,10 +15,10 @@ from typing import BinaryIO
 
 import numpy as np
 
-from drivetwin._util.atomic import replacing
-from drivetwin._util.optional_dependencies import require
+from drivetwin._util.atomic import open_atomic
+from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.channels.shiftlog import Channel, FloatArray
-from drivetwin.channels.units import channel_unit
+from drivetwin.channels.units import resolve_channel_unit
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.quality.channel_checks import check_order
 from drivetwin.logs.raw import RawChannel
@@ -26,13 +26,15 @@ from drivetwin.logs.raw import RawChannel
 _TIME = "time"
 
 
-def as_recorded(channel: Channel) -> RawChannel:
+def convert_to_recorded_units(channel: Channel) -> RawChannel:
     """Return a channel of a log under the name and in the unit of its file.
 
     Raises UnitError where that unit is unknown.
     """
     name, unit = channel.source_name, channel.source_unit
-    values = channel_unit(unit, channel.quantity, Where(channel=name)).from_si(channel.values)
+    values = resolve_channel_unit(unit, channel.quantity, Where(channel=name)).from_si(
+        channel.values
+    )
     return RawChannel(name, unit or None, channel.time, values)
 
 
@@ -54,11 +56,13 @@ def write_log(path: Path | str, channels: Sequence[RawChannel]) -> None:
         raise FileFormatError("names repeat, or one is 'time'", "rename the channels", where)
     for channel in channels:
         check_order(channel.time, Where(file=str(path), channel=channel.name))
-    with replacing(path) as file:
+    with open_atomic(path) as file:
         writer(file, path, channels)
 
 
-def _table(channels: Sequence[RawChannel]) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
+def _build_table(
+    channels: Sequence[RawChannel],
+) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
     """All stamps (n,), and for each channel its column (n,) with a mask (n,) of its samples."""
     time = np.unique(np.concatenate([channel.time for channel in channels]))
     columns, masks = [], []
@@ -72,33 +76,37 @@ def _table(channels: Sequence[RawChannel]) -> tuple[FloatArray, list[FloatArray]
 
 
 def _write_csv(file: BinaryIO, _: Path, channels: Sequence[RawChannel]) -> None:
-    time, columns, masks = _table(channels)
+    time, columns, masks = _build_table(channels)
     texts = [[repr(stamp) for stamp in time.tolist()]]
     for column, mask in zip(columns, masks, strict=True):
         cells = zip(column.tolist(), mask.tolist(), strict=True)
-        texts.append([_cell(value) if there else "" for value, there in cells])
+        texts.append([_format_cell(value) if there else "" for value, there in cells])
     names = [_TIME, *(channel.name for channel in channels)]
     units = ["s", *(channel.unit or "" for channel in channels)]
-    rows = [_quoted(names), _quoted(units), *(",".join(row) for row in zip(*texts, strict=True))]
+    rows = [
+        _format_row(names),
+        _format_row(units),
+        *(",".join(row) for row in zip(*texts, strict=True)),
+    ]
     file.write(("\n".join(rows) + "\n").encode("utf-8"))
 
 
-def _cell(value: float) -> str:
+def _format_cell(value: float) -> str:
     return repr(value) if np.isfinite(value) else "NaN"
 
 
-def _quoted(cells: Sequence[str]) -> str:
+def _format_row(cells: Sequence[str]) -> str:
     return ",".join(
         '"' + cell.replace('"', '""') + '"' if re.search('[,"]', cell) else cell for cell in cells
     )
 
 
 def _write_parquet(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> None:
-    require("pyarrow", "io", "a Parquet file", path)
+    import_extra("pyarrow", "io", "a Parquet file", path)
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    time, columns, masks = _table(channels)
+    time, columns, masks = _build_table(channels)
     fields = [pa.field(_TIME, pa.float64(), metadata={"unit": "s"})]
     arrays = [pa.array(time)]
     for channel, column, mask in zip(channels, columns, masks, strict=True):
@@ -134,7 +142,7 @@ def _write_mat(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> No
 
 
 def _write_mf4(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> None:
-    asammdf = require("asammdf", "mdf", "an MDF file", path)
+    asammdf = import_extra("asammdf", "mdf", "an MDF file", path)
     groups: dict[bytes, list[RawChannel]] = {}
     for channel in channels:
         groups.setdefault(channel.time.tobytes(), []).append(channel)

@@ -14,15 +14,15 @@ import numpy as np
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, SimulationError
-from drivetwin.estimation.data.prepare import pressures_of, sampled
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.prepare import collect_pressures, prepare_signal
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.observer.kind import Observer
-from drivetwin.observer.propagate import uncertain, with_drawn_friction
+from drivetwin.observer.propagate import sample_friction, select_uncertain
 from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory, simulate
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.simulate_log import validate
+from drivetwin.validation.simulate_log import simulate_shift
 
 STEMS = ("eta", "J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
 RUNS = 100
@@ -49,7 +49,7 @@ def simulate_observed(
         log.sha256,
         log.warnings,
     )
-    base = validate(twin, quiet, shift)
+    base = simulate_shift(twin, quiet, shift)
     if base.status != "completed":
         raise SimulationError(
             f"the simulation of shift {shift.start_gear}-{shift.end_gear} ended with {base.status}",
@@ -57,54 +57,54 @@ def simulate_observed(
         )
     run = base.trajectory
     ids = (*STEMS, *(f"P0.{one.name}" for one in base.model.elements))
-    known = uncertain(twin, shift, ids)
+    known = select_uncertain(twin, shift, ids)
     generators = np.random.SeedSequence(seed).spawn(runs)
-    noise = pressures_of(quiet, shift)
-    torque = sampled(quiet["engine_torque"])
-    near = torque.within((float(run.time[0]) - UNREST, float(run.time[0]) + UNREST)).values
+    noise = collect_pressures(quiet, shift)
+    torque = prepare_signal(quiet["engine_torque"])
+    near = torque.select_span((float(run.time[0]) - UNREST, float(run.time[0]) + UNREST)).values
     unrest = float(np.std(near)) if near.size else 0.0
     found: list[Trajectory] = []
     for generator in generators:
         rng = np.random.default_rng(generator)
         values = known.values + known.directions @ rng.standard_normal(known.directions.shape[1])
-        model = known.model(values)
-        model = replace(model, elements=with_drawn_friction(model, twin, rng))
-        one = _run(
+        model = known.build_model(values)
+        model = replace(model, elements=sample_friction(model, twin, rng))
+        one = _simulate_member(
             model,
-            _drawn(torque, known.named(values)["te_delay"], rng),
-            {name: _drawn(signal, 0.0, rng) for name, signal in noise.items()},
-            _start(model, run, (shift, unrest), rng),
+            _sample_signal(torque, known.to_named(values)["te_delay"], rng),
+            {name: _sample_signal(signal, 0.0, rng) for name, signal in noise.items()},
+            _sample_start(model, run, (shift, unrest), rng),
             run.time,
         )
         if one is not None:
             found.append(one)
     notes = () if len(found) == runs else (f"{runs - len(found)} of {runs} runs did not complete",)
     bands = {
-        name: _band(column, [_torques(one)[name] for one in found])
-        for name, column in _torques(run).items()
+        name: _compute_band(column, [_collect_torques(one)[name] for one in found])
+        for name, column in _collect_torques(run).items()
     }
     return Observation(
         shift, Observer.SIMULATION, run.time, bands.pop("output_torque"), bands, notes
     )
 
 
-def _torques(run: Trajectory) -> dict[str, FloatArray]:
+def _collect_torques(run: Trajectory) -> dict[str, FloatArray]:
     return {"output_torque": run.shaft_torque, **run.clutch_torque}
 
 
-def _band(column: FloatArray, others: list[FloatArray]) -> Band:
+def _compute_band(column: FloatArray, others: list[FloatArray]) -> Band:
     spread = np.sqrt(np.mean((np.array(others) - column) ** 2, axis=0))
     return Band(column, np.asarray(spread))
 
 
-def _drawn(signal: Sampled, delay: float, rng: np.random.Generator) -> Signal:
+def _sample_signal(signal: MeasuredSignal, delay: float, rng: np.random.Generator) -> Signal:
     """The signal with other noise of its level, moved back by its age [s]; ends are held."""
     values = signal.values + signal.sigma * rng.standard_normal(signal.values.size)
     time = np.concatenate([[signal.time[0] - 1.0], signal.time, [signal.time[-1] + 1.0]])
     return Signal(time, np.concatenate([values[:1], values, values[-1:]]), -delay)
 
 
-def _start(
+def _sample_start(
     model: DualClutch, run: Trajectory, about: tuple[Shift, float], rng: np.random.Generator
 ) -> State:
     """A start about that of `run`: the off-going element of the shift stays locked.
@@ -121,7 +121,7 @@ def _start(
     return State(ratio * speed, speed, (speed - rate) / model.i_f, twist, (shift.offgoing,))
 
 
-def _run(
+def _simulate_member(
     model: DualClutch,
     torque: Signal,
     pressures: Mapping[str, Signal],

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, Where
-from drivetwin.estimation.data.prepare import pressures_of, sampled
-from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.estimation.likelihood.data.input_smoothing import local_mean
+from drivetwin.estimation.data.prepare import collect_pressures, prepare_signal
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.observer.linear_model import BoolArray, Course
 from drivetwin.observer.result import FloatArray
 from drivetwin.shifts.shift import Shift
@@ -45,17 +45,17 @@ class Recorded:
 
     shift: Shift
     time: FloatArray
-    engine_torque: Sampled
-    speeds: dict[str, Sampled]
-    pressures: dict[str, Sampled]
+    engine_torque: MeasuredSignal
+    speeds: dict[str, MeasuredSignal]
+    pressures: dict[str, MeasuredSignal]
 
-    def speed(self, name: str, time: FloatArray) -> FloatArray:
+    def smooth_speed(self, name: str, time: FloatArray) -> FloatArray:
         """A speed without most of its noise at `time` (n,)."""
         signal = self.speeds[name]
-        return np.interp(time, signal.time, local_mean(signal))
+        return np.interp(time, signal.time, smooth_adaptive(signal))
 
 
-def recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
+def collect_recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
     """The channels of a shift that an observer uses.
 
     Raises MissingChannelError without engine torque, input or output speed, InputError where they
@@ -63,17 +63,17 @@ def recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
     """
     engine = "engine_speed" in log
     speeds = {
-        "engine_speed": sampled(log["engine_speed"])
+        "engine_speed": prepare_signal(log["engine_speed"])
         if engine
-        else sampled(log["input_speed"], i_in),
-        "output_speed": sampled(log["output_speed"]),
+        else prepare_signal(log["input_speed"], i_in),
+        "output_speed": prepare_signal(log["output_speed"]),
     }
     if "wheel_speed" in log:
-        speeds["wheel_speed"] = sampled(log["wheel_speed"])
-    speeds = {name: _floored(signal) for name, signal in speeds.items()}
-    torque = sampled(log["engine_torque"])
-    there = all(pressure_role(name) in log for name in (shift.offgoing, shift.oncoming))
-    pressures = pressures_of(log, shift) if there else {}
+        speeds["wheel_speed"] = prepare_signal(log["wheel_speed"])
+    speeds = {name: _clip_noise(signal) for name, signal in speeds.items()}
+    torque = prepare_signal(log["engine_torque"])
+    there = all(make_pressure_role(name) in log for name in (shift.offgoing, shift.oncoming))
+    pressures = collect_pressures(log, shift) if there else {}
     used = (torque, *speeds.values(), *pressures.values())
     start = max(shift.before[0], shift.before[1] - LONGEST, *(s.time[0] for s in used))
     end = min(shift.after[1], shift.lockup_time + LONGEST, *(s.time[-1] for s in used))
@@ -84,7 +84,9 @@ def recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
             "record them together from before the torque phase to after lock-up",
             Where(file=log.source),
         )
-    speeds = {name: _thinned(signal.within((start, end))) for name, signal in speeds.items()}
+    speeds = {
+        name: _reduce_samples(signal.select_span((start, end))) for name, signal in speeds.items()
+    }
     even = start + GRID * np.arange(int((end - start) / GRID) + 1, dtype=np.float64)
     stamps = np.unique(np.round(np.concatenate([s.time for s in speeds.values()]), 7))
     sparse = float(np.median(np.diff(stamps))) > 1.5 * GRID
@@ -92,15 +94,15 @@ def recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
     return Recorded(shift, time, torque, speeds, pressures)
 
 
-def _thinned(signal: Sampled) -> Sampled:
+def _reduce_samples(signal: MeasuredSignal) -> MeasuredSignal:
     """Means over blocks of a signal sampled faster than the grid's least step."""
     count = max(1, round(GRID / float(np.median(np.diff(signal.time)))))
     kept = count * (signal.time.size // count)
     time, values = (x[:kept].reshape(-1, count).mean(axis=1) for x in (signal.time, signal.values))
-    return Sampled(time, values, signal.sigma / float(np.sqrt(count)))
+    return MeasuredSignal(time, values, signal.sigma / float(np.sqrt(count)))
 
 
-def _floored(signal: Sampled) -> Sampled:
+def _clip_noise(signal: MeasuredSignal) -> MeasuredSignal:
     return replace(signal, sigma=max(signal.sigma, FLOOR * float(np.ptp(signal.values))))
 
 
@@ -113,12 +115,12 @@ def is_driving(model: DualClutch, seen: Recorded, delay: float) -> BoolArray:
     middle = 0.5 * (seen.time[1:] + seen.time[:-1])
     before = np.maximum(middle - RATE, seen.time[0])
     after = np.minimum(middle + RATE, seen.time[-1])
-    change = seen.speed("engine_speed", after) - seen.speed("engine_speed", before)
+    change = seen.smooth_speed("engine_speed", after) - seen.smooth_speed("engine_speed", before)
     torque = np.interp(middle + delay, seen.engine_torque.time, seen.engine_torque.values)
     return np.asarray(torque - model.J1 * change / (after - before) >= 0.0)
 
 
-def course_of(model: DualClutch, seen: Recorded, delay: float, driving: BoolArray) -> Course:
+def build_course(model: DualClutch, seen: Recorded, delay: float, driving: BoolArray) -> Course:
     """Inputs and locks over the grid; `delay` [s] is the age of the engine torque.
 
     `driving` (N-1,) is as `is_driving` tells it.
@@ -132,9 +134,9 @@ def course_of(model: DualClutch, seen: Recorded, delay: float, driving: BoolArra
     }
     base, drift = {}, {}
     for one in model.elements:
-        carried = _carried(model, one, seen, middle)
+        carried = _estimate_carried_torque(model, one, seen, middle)
         if not seen.pressures:
-            window, hasty = _unknown(seen.shift, one.name, middle)
+            window, hasty = _find_unknown_pressure(seen.shift, one.name, middle)
             carried = np.where(window, carried, 0.0)
             drift[one.name] = np.where(hasty, HAND_OVER, 0.0)
         else:
@@ -151,7 +153,9 @@ def course_of(model: DualClutch, seen: Recorded, delay: float, driving: BoolArra
     )
 
 
-def _unknown(shift: Shift, name: str, middle: FloatArray) -> tuple[BoolArray, BoolArray]:
+def _find_unknown_pressure(
+    shift: Shift, name: str, middle: FloatArray
+) -> tuple[BoolArray, BoolArray]:
     """When (n,) an element of unknown pressure may carry torque, and when that changes in haste."""
     start, end = shift.inertia_phase
     by_oncoming = shift.kind.has_torque_phase_first
@@ -164,22 +168,24 @@ def _unknown(shift: Shift, name: str, middle: FloatArray) -> tuple[BoolArray, Bo
     return window, window & (by_oncoming | (middle >= end - VENT))
 
 
-def slip_of(model: DualClutch, one: ShiftElement, seen: Recorded, time: FloatArray) -> FloatArray:
+def compute_measured_slip(
+    model: DualClutch, one: ShiftElement, seen: Recorded, time: FloatArray
+) -> FloatArray:
     """Measured slip of an element (eq. 15) [rad/s] at `time` (n,)."""
-    engine = seen.speed("engine_speed", time) / model.i_in
-    return engine / one.i_c - one.i_out * seen.speed("output_speed", time)
+    engine = seen.smooth_speed("engine_speed", time) / model.i_in
+    return engine / one.i_c - one.i_out * seen.smooth_speed("output_speed", time)
 
 
-def _carried(
+def _estimate_carried_torque(
     model: DualClutch, one: ShiftElement, seen: Recorded, middle: FloatArray
 ) -> FloatArray:
     """Torque (n,) of an element if it slips: by its law, or a level without its pressure."""
-    slip = slip_of(model, one, seen, middle)
+    slip = compute_measured_slip(model, one, seen, middle)
     start, end = seen.shift.inertia_phase
     sense = np.sign(np.median(slip[(middle >= start) & (middle <= end)]))
     if one.name in seen.pressures:
         pressure = seen.pressures[one.name]
-        above = np.interp(middle, pressure.time, local_mean(pressure)) - one.P0
-        return np.asarray(sense * one.friction.at(slip) * one.gain * np.maximum(above, 0.0))
+        above = np.interp(middle, pressure.time, smooth_adaptive(pressure)) - one.P0
+        return np.asarray(sense * one.friction.evaluate(slip) * one.gain * np.maximum(above, 0.0))
     level = float(np.max(np.abs(seen.engine_torque.values))) * model.i_in * abs(one.i_c)
     return np.full(middle.size, float(sense) * level)

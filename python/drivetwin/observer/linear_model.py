@@ -19,7 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.estimation.likelihood.noise.linear_response import direction, exponential, observed
+from drivetwin.estimation.likelihood.noise.linear_response import (
+    build_output_row,
+    build_slip_row,
+    compute_exponential,
+)
 from drivetwin.observer.result import FloatArray
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement
 
@@ -65,24 +69,26 @@ class Linear:
     drift: Mapping[str, FloatArray]
 
 
-def answer(model: DualClutch, one: ShiftElement) -> tuple[FloatArray, FloatArray]:
+def compute_impulse_response(model: DualClutch, one: ShiftElement) -> tuple[FloatArray, FloatArray]:
     """Response of the three speeds (3,) to a unit impulse of an element, and its slip row (3,)."""
-    g = _direction(model, one)
+    g = _build_slip_row(model, one)
     mass = np.diag([model.J1 * model.eta + model.J2e, model.J_out, model.J_v])
     for each in model.elements:
-        mass += each.drum_inertia * np.outer(_direction(model, each), _direction(model, each))
+        mass += each.drum_inertia * np.outer(
+            _build_slip_row(model, each), _build_slip_row(model, each)
+        )
     return np.asarray(np.linalg.solve(mass, g), dtype=np.float64), g
 
 
-def linear(model: DualClutch, course: Course) -> Linear:
+def build_linear_model(model: DualClutch, course: Course) -> Linear:
     """The model in its modes over the course."""
     step = np.diff(course.time)
-    force, known = _forces(model, course)
-    inverse = _inverse_mass(model, course)
-    held = _holding(model, course, inverse)
+    force, known = _compute_forces(model, course)
+    inverse = _compute_inverse_mass(model, course)
+    held = _compute_locking_rows(model, course, inverse)
     moving = inverse.copy()
     for one in model.elements:
-        along = inverse @ _direction(model, one)
+        along = inverse @ _build_slip_row(model, one)
         moving -= along[:, :, None] * held[one.name][:, None, :]
     rate = np.zeros((step.size, STATES, STATES))
     rate[:, :SPEEDS, :] = moving @ force
@@ -90,9 +96,9 @@ def linear(model: DualClutch, course: Course) -> Linear:
     rate[:, TORQUE_ERROR, TORQUE_ERROR] = -course.error_rate
     push = np.zeros((step.size, STATES))
     push[:, :SPEEDS] = np.einsum("kij,kj->ki", moving, known)
-    transition, mean = exponential(rate * step[:, None, None])
+    transition, mean = compute_exponential(rate * step[:, None, None])
     shaft = np.zeros(STATES)
-    shaft[:4] = observed(model, "output_torque")
+    shaft[:4] = build_output_row(model, "output_torque")
     rows = {"output_torque": np.broadcast_to(shaft, (step.size, STATES))}
     constants = {"output_torque": np.zeros(step.size)}
     for place, one in enumerate(model.elements):
@@ -105,54 +111,56 @@ def linear(model: DualClutch, course: Course) -> Linear:
     return Linear(transition, pushed, rows, constants, drift)
 
 
-def _direction(model: DualClutch, one: ShiftElement) -> FloatArray:
+def _build_slip_row(model: DualClutch, one: ShiftElement) -> FloatArray:
     """Slip of an element as a row of the three speeds."""
-    return direction(model, one)[:SPEEDS]
+    return build_slip_row(model, one)[:SPEEDS]
 
 
-def _efficiency(model: DualClutch, course: Course) -> FloatArray:
+def _compute_efficiency(model: DualClutch, course: Course) -> FloatArray:
     """dφ/dT_g (N-1,), by the loss law."""
-    ahead, back = (model.efficiency(driving=driving) for driving in (True, False))
+    ahead, back = (model.get_efficiency(driving=driving) for driving in (True, False))
     return np.where(course.driving, ahead, back)
 
 
-def _forces(model: DualClutch, course: Course) -> tuple[FloatArray, FloatArray]:
+def _compute_forces(model: DualClutch, course: Course) -> tuple[FloatArray, FloatArray]:
     """Forces on the three speeds without those of locked elements: (N-1, 3, 8)·x + (N-1, 3)."""
     count = course.engine_torque.size
-    share = _efficiency(model, course)
+    share = _compute_efficiency(model, course)
     force = np.zeros((count, SPEEDS, STATES))
     known = np.zeros((count, SPEEDS))
-    shaft = observed(model, "output_torque")
+    shaft = build_output_row(model, "output_torque")
     force[:, OUTPUT, :4] -= shaft
     force[:, WHEEL, :4] += model.i_f * shaft
     force[:, WHEEL, LOAD] = -1.0
     force[:, ENGINE, TORQUE_ERROR] = share
     known[:, ENGINE] = share * course.engine_torque
     for place, one in enumerate(model.elements):
-        g, base = _direction(model, one), course.base[one.name]
+        g, base = _build_slip_row(model, one), course.base[one.name]
         force[:, :, CARRIED + place] -= base[:, None] * g
         known -= base[:, None] * g
     return force, known
 
 
-def _inverse_mass(model: DualClutch, course: Course) -> FloatArray:
+def _compute_inverse_mass(model: DualClutch, course: Course) -> FloatArray:
     """Accelerations per force (N-1, 3, 3) with no element locked."""
-    share = _efficiency(model, course)
+    share = _compute_efficiency(model, course)
     mass = np.zeros((share.size, SPEEDS, SPEEDS))
     mass[:, ENGINE, ENGINE] = model.J1 * share + model.J2e
     mass[:, OUTPUT, OUTPUT] = model.J_out
     mass[:, WHEEL, WHEEL] = model.J_v
     for one in model.elements:
-        g = _direction(model, one)
+        g = _build_slip_row(model, one)
         mass += one.drum_inertia * np.outer(g, g)
     return np.asarray(np.linalg.inv(mass), dtype=np.float64)
 
 
-def _holding(model: DualClutch, course: Course, inverse: FloatArray) -> dict[str, FloatArray]:
+def _compute_locking_rows(
+    model: DualClutch, course: Course, inverse: FloatArray
+) -> dict[str, FloatArray]:
     """Row (N-1, 3) by element that gives its torque from all other forces while it is locked."""
     found = {}
     for one in model.elements:
-        g = _direction(model, one)
+        g = _build_slip_row(model, one)
         along = inverse @ g
         found[one.name] = course.locked[one.name][:, None] * along / (along @ g)[:, None]
     return found

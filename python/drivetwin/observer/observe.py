@@ -10,8 +10,8 @@ from drivetwin.observer.ensemble import simulate_observed
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.result import Observation
 from drivetwin.observer.smooth import smooth
-from drivetwin.shifts.coverage import near, recorded
-from drivetwin.shifts.lockup_clutch import behind_converter
+from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
+from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.spec import PriorValue
@@ -21,7 +21,7 @@ FAR = 15.0
 25 MB, and what happens so far away says nothing of the shift."""
 
 
-def observed(
+def estimate_torques(
     twin: Twin, log: ShiftLog, shift: Shift, by: Observer = Observer.SMOOTHER
 ) -> Observation:
     """Torques of one shift of a log with 95 % bands; an output torque in the log is not used.
@@ -33,9 +33,9 @@ def observed(
     where the log is, DamagedChannelError where an input has a gap in the shift, SimulationError
     where the twin's own run fails.
     """
-    log = behind_converter(log, twin.card(), shift)
-    fills = {one.name: PriorValue(one.P0) for one in twin.dual_clutch(shift).elements}
-    whole = near(recorded(log, shift, fills, twin.i_in), (FAR, FAR))
+    log = refer_to_turbine(log, twin.build_card(), shift)
+    fills = {one.name: PriorValue(one.P0) for one in twin.build_dual_clutch(shift).elements}
+    whole = trim_to_window(trim_to_recorded(log, shift, fills, twin.i_in), (FAR, FAR))
     found = (smooth if by is Observer.SMOOTHER else simulate_observed)(twin, log, whole)
     cuts = whole.warnings[len(shift.warnings) :]
     return replace(found, notes=(*cuts, *found.notes))

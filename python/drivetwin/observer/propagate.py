@@ -31,13 +31,13 @@ class Uncertain:
     values: FloatArray
     covariance: FloatArray
 
-    def model(self, values: FloatArray) -> DualClutch:
+    def build_model(self, values: FloatArray) -> DualClutch:
         """The model at other `values` (p,) of the parameters."""
-        named = self.named(values)
+        named = self.to_named(values)
         own = {name: named[name] for name in self.ids if name != "te_delay"}
-        return self.twin.dual_clutch(self.shift, overrides=own)
+        return self.twin.build_dual_clutch(self.shift, overrides=own)
 
-    def named(self, values: FloatArray) -> Mapping[str, float]:
+    def to_named(self, values: FloatArray) -> Mapping[str, float]:
         """Return the `values` (p,) by parameter id."""
         return dict(zip(self.ids, values.tolist(), strict=True))
 
@@ -51,10 +51,10 @@ class Uncertain:
         return np.asarray(scale[:, None] * axes[:, kept] * np.sqrt(power[kept]))
 
 
-def uncertain(
+def select_uncertain(
     twin: Twin, shift: Shift, stems: tuple[str, ...], more: Mapping[str, float] | None = None
 ) -> Uncertain:
-    """The parameters `stems` of the twin; `J_prime` stands for that of its `inertia_gear`.
+    """The parameters `stems` of the twin; `J_prime` stands for that of its `select_inertia_gear`.
 
     `more` are further standard deviations by id, of errors that are not the twin's.
     Raises MissingParameterError where the twin has no value for one of them.
@@ -65,11 +65,11 @@ def uncertain(
             "identify from a log that has one, or state eta on the vehicle card",
             Where(file=twin.name),
         )
-    model = twin.dual_clutch(shift)
-    inertia = f"J_prime_{twin.inertia_gear(shift)}"
+    model = twin.build_dual_clutch(shift)
+    inertia = f"J_prime_{twin.select_inertia_gear(shift)}"
     ids = tuple(inertia if stem == "J_prime" else stem for stem in stems)
     fallback = {f"P0.{one.name}": one.P0 for one in model.elements}
-    values = np.array([twin.value(name, fallback.get(name, 0.0)) for name in ids])
+    values = np.array([twin.get_value(name, fallback.get(name, 0.0)) for name in ids])
     covariance = np.zeros((len(ids), len(ids)))
     if twin.covariance is not None:
         known = [k for k, name in enumerate(ids) if name in twin.covariance_ids]
@@ -83,7 +83,7 @@ def uncertain(
     return Uncertain(twin, shift, ids, values, covariance)
 
 
-def with_drawn_friction(
+def sample_friction(
     model: DualClutch, twin: Twin, rng: np.random.Generator
 ) -> tuple[ShiftElement, ...]:
     """The elements of `model` with friction drawn from what the twin knows of it."""

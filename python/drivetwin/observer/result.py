@@ -33,7 +33,7 @@ class Band:
         """Upper end of the 95 % band."""
         return self.value + Z95 * self.std
 
-    def covers(self, truth: FloatArray) -> float:
+    def compute_coverage(self, truth: FloatArray) -> float:
         """Share of the samples at which `truth` (n,) lies in the 95 % band."""
         return float(np.mean((truth >= self.lower) & (truth <= self.upper)))
 

@@ -14,9 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.observer.inputs import Recorded, course_of, is_driving, recorded, slip_of
+from drivetwin.observer.inputs import (
+    Recorded,
+    build_course,
+    collect_recorded,
+    compute_measured_slip,
+    is_driving,
+)
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.linear_model import (
     CARRIED,
@@ -26,12 +32,12 @@ from drivetwin.observer.linear_model import (
     TORQUE_ERROR,
     BoolArray,
     Linear,
-    answer,
-    linear,
+    build_linear_model,
+    compute_impulse_response,
 )
-from drivetwin.observer.propagate import Uncertain, uncertain
+from drivetwin.observer.propagate import Uncertain, select_uncertain
 from drivetwin.observer.result import Band, FloatArray, Observation
-from drivetwin.observer.smoother import Measurement, Process, filtered, smoothed
+from drivetwin.observer.smoother import Measurement, Process, filter_forward, smooth_states
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.twin.twin import Twin
@@ -72,11 +78,11 @@ class _Setting:
     directions: FloatArray
     driving: BoolArray
 
-    def linear(self, values: FloatArray) -> tuple[DualClutch, Linear]:
+    def linearize_model(self, values: FloatArray) -> tuple[DualClutch, Linear]:
         """The linear model at parameters `values` (p,)."""
-        model = self.known.model(values)
-        delay = self.known.named(values)["te_delay"]
-        return model, linear(model, course_of(model, self.seen, delay, self.driving))
+        model = self.known.build_model(values)
+        delay = self.known.to_named(values)["te_delay"]
+        return model, build_linear_model(model, build_course(model, self.seen, delay, self.driving))
 
 
 def smooth(twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
@@ -85,21 +91,23 @@ def smooth(twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
     Raises MissingParameterError where the twin is incomplete, MissingChannelError and InputError
     where the log is.
     """
-    seen = recorded(log, shift, twin.i_in)
+    seen = collect_recorded(log, shift, twin.i_in)
     fills = {f"P0.{name}": READ * p.sigma for name, p in seen.pressures.items()}
-    known = uncertain(twin, shift, (*STEMS, *fills), fills)
-    driving = is_driving(known.model(known.values), seen, known.named(known.values)["te_delay"])
+    known = select_uncertain(twin, shift, (*STEMS, *fills), fills)
+    driving = is_driving(
+        known.build_model(known.values), seen, known.to_named(known.values)["te_delay"]
+    )
     setting = _Setting(seen, known, known.directions, driving)
-    model, base = setting.linear(known.values)
+    model, base = setting.linearize_model(known.values)
     none = np.zeros((base.transition.shape[0], STATES, 0))
     walks = WALKS if setting.seen.pressures else FREE_WALKS
-    rough = _process(setting, model, base, none, walks[1])
-    motion, _ = smoothed(rough)
-    slopes, by_parameter = _slopes(setting, base, motion)
-    trials = [_process(setting, model, base, slopes, walk) for walk in walks]
-    best = min(trials, key=lambda process: filtered(process).surprise)
-    means, covariances = smoothed(best)
-    bands = _bands(base, by_parameter, means, covariances)
+    rough = _build_process(setting, model, base, none, walks[1])
+    motion, _ = smooth_states(rough)
+    slopes, by_parameter = _compute_slopes(setting, base, motion)
+    trials = [_build_process(setting, model, base, slopes, walk) for walk in walks]
+    best = min(trials, key=lambda process: filter_forward(process).surprise)
+    means, covariances = smooth_states(best)
+    bands = _compute_bands(base, by_parameter, means, covariances)
     time = 0.5 * (setting.seen.time[1:] + setting.seen.time[:-1])
     return Observation(
         shift,
@@ -107,22 +115,22 @@ def smooth(twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
         time,
         bands.pop("output_torque"),
         bands,
-        _notes(setting.seen, log),
+        _collect_notes(setting.seen, log),
     )
 
 
-def _notes(seen: Recorded, log: ShiftLog) -> tuple[str, ...]:
+def _collect_notes(seen: Recorded, log: ShiftLog) -> tuple[str, ...]:
     texts = []
     if not seen.pressures:
         elements = seen.shift.offgoing, seen.shift.oncoming
-        missing = " and ".join(name for name in elements if pressure_role(name) not in log)
+        missing = " and ".join(name for name in elements if make_pressure_role(name) not in log)
         texts.append(f"no pressure of {missing}: clutch torques follow from the speeds alone")
     if "wheel_speed" not in seen.speeds:
         texts.append("no wheel speed: what lies behind the shaft follows from the model")
     return tuple(texts)
 
 
-def _slopes(
+def _compute_slopes(
     setting: _Setting, base: Linear, motion: FloatArray
 ) -> tuple[FloatArray, Mapping[str, FloatArray]]:
     """Effect of one standard deviation along each direction about `motion` (N, 8).
@@ -133,7 +141,7 @@ def _slopes(
     middle = 0.5 * (motion[1:] + motion[:-1])
     pushes, torques = [], []
     for column in setting.directions.T:
-        _, moved = setting.linear(setting.known.values + SMALL * column)
+        _, moved = setting.linearize_model(setting.known.values + SMALL * column)
         change = np.einsum("kij,kj->ki", moved.transition - base.transition, before)
         pushes.append((change + moved.push - base.push) / SMALL)
         torques.append(
@@ -153,7 +161,7 @@ def _slopes(
     return np.stack(pushes, axis=2), by_name
 
 
-def _process(
+def _build_process(
     setting: _Setting, model: DualClutch, base: Linear, slopes: FloatArray, walk: float
 ) -> Process:
     """The estimation problem with parameter directions as constant states behind the eight."""
@@ -165,7 +173,7 @@ def _process(
     push, noise = np.zeros((count, size)), np.zeros((count, size))
     push[:, :STATES] = base.push
     step = np.diff(setting.seen.time)
-    drive = _drive(setting.seen, model)
+    drive = _compute_drive_torque(setting.seen, model)
     torque = setting.seen.engine_torque
     noise[:, TORQUE_ERROR] = torque.sigma**2 * (
         1.0 - base.transition[:, TORQUE_ERROR, TORQUE_ERROR] ** 2
@@ -174,27 +182,35 @@ def _process(
         drift = np.maximum(base.drift[one.name], walk)
         noise[:, CARRIED + place] = np.nan_to_num(drift**2 * step)
     noise[:, LOAD] = (LOAD_WALK * drive) ** 2 * step
-    mean, spread = _start(setting, model, drive)
+    mean, spread = _estimate_start(setting, model, drive)
     covariance = np.diag(np.concatenate([spread**2, np.ones(extra)]))
     mean = np.concatenate([mean, np.zeros(extra)])
-    measured = _measurements(setting.seen, model, size)
+    measured = _collect_measurements(setting.seen, model, size)
     return Process(
-        transition, push, noise, mean, covariance, measured, _lock_up(setting.seen, model, size)
+        transition,
+        push,
+        noise,
+        mean,
+        covariance,
+        measured,
+        _build_lock_up_impulse(setting.seen, model, size),
     )
 
 
-def _drive(seen: Recorded, model: DualClutch) -> float:
+def _compute_drive_torque(seen: Recorded, model: DualClutch) -> float:
     """Greatest torque at the wheel that the engine torque of the log makes [N m]."""
     ratio = max(abs(model.i_in * one.i_c * one.i_out) for one in model.elements)
     return float(np.max(np.abs(seen.engine_torque.values))) * ratio * model.i_f
 
 
-def _start(setting: _Setting, model: DualClutch, drive: float) -> tuple[FloatArray, FloatArray]:
+def _estimate_start(
+    setting: _Setting, model: DualClutch, drive: float
+) -> tuple[FloatArray, FloatArray]:
     """Mean and standard deviation (8,) of the state at the first grid point."""
     seen = setting.seen
     first = seen.time[:1]
-    engine = float(seen.speed("engine_speed", first)[0])
-    output = float(seen.speed("output_speed", first)[0])
+    engine = float(seen.smooth_speed("engine_speed", first)[0])
+    output = float(seen.smooth_speed("output_speed", first)[0])
     torque = model.load.constant / model.i_f
     mean = np.array([engine, output, output / model.i_f, torque / model.k_o, 0, 0, 0, 0.0])
     mean[LOAD] = model.load.constant
@@ -208,7 +224,7 @@ def _start(setting: _Setting, model: DualClutch, drive: float) -> tuple[FloatArr
     return mean, spread
 
 
-def _measurements(seen: Recorded, model: DualClutch, size: int) -> list[list[Measurement]]:
+def _collect_measurements(seen: Recorded, model: DualClutch, size: int) -> list[list[Measurement]]:
     """Speeds at their stamps; no slip where a gear begins to be held."""
     found: list[list[Measurement]] = [[] for _ in seen.time]
     for place, name in enumerate(("engine_speed", "output_speed", "wheel_speed")):
@@ -220,7 +236,10 @@ def _measurements(seen: Recorded, model: DualClutch, size: int) -> list[list[Mea
         points = np.searchsorted(seen.time, np.round(signal.time, 7))
         for k, value in zip(points.tolist(), signal.values.tolist(), strict=True):
             found[k].append((row, value, signal.sigma**2))
-    held = {seen.shift.offgoing: 0, seen.shift.oncoming: _point(seen, seen.shift.lockup_time)}
+    held = {
+        seen.shift.offgoing: 0,
+        seen.shift.oncoming: _find_grid_point(seen, seen.shift.lockup_time),
+    }
     for one in model.elements:
         row = np.zeros(size)
         row[:2] = 1.0 / (model.i_in * one.i_c), -one.i_out
@@ -228,7 +247,7 @@ def _measurements(seen: Recorded, model: DualClutch, size: int) -> list[list[Mea
     return found
 
 
-def _lock_up(seen: Recorded, model: DualClutch, size: int) -> dict[int, FloatArray]:
+def _build_lock_up_impulse(seen: Recorded, model: DualClutch, size: int) -> dict[int, FloatArray]:
     """Impulse of the on-coming element by which its lock-up may be early or late.
 
     Locking δt late, the element has slipped on for that time: its slip ends all the same, and
@@ -236,22 +255,22 @@ def _lock_up(seen: Recorded, model: DualClutch, size: int) -> dict[int, FloatArr
     """
     shift = seen.shift
     one = next(e for e in model.elements if e.name == shift.oncoming)
-    k = _point(seen, shift.lockup_time)
+    k = _find_grid_point(seen, shift.lockup_time)
     before = np.array([seen.time[k] - RATE_SPAN, seen.time[k]])
-    rate = float(np.diff(slip_of(model, one, seen, before))[0]) / RATE_SPAN
+    rate = float(np.diff(compute_measured_slip(model, one, seen, before))[0]) / RATE_SPAN
     step = float(seen.time[k] - seen.time[k - 1])
     jump = rate * float(np.hypot(shift.sigma.get("lockup", 0.0), 0.5 * step))
-    along, g = answer(model, one)
+    along, g = compute_impulse_response(model, one)
     column = np.zeros(size)
     column[:SPEEDS] = along / (along @ g) * jump
     return {k: np.outer(column, column)}
 
 
-def _point(seen: Recorded, time: float) -> int:
+def _find_grid_point(seen: Recorded, time: float) -> int:
     return min(int(np.searchsorted(seen.time, time)), seen.time.size - 1)
 
 
-def _bands(
+def _compute_bands(
     base: Linear,
     by_parameter: Mapping[str, FloatArray],
     means: FloatArray,

@@ -35,7 +35,7 @@ class Process:
     measurements: Sequence[Sequence[Measurement]]
     impulses: Mapping[int, FloatArray] = field(default_factory=dict)
 
-    def ahead(self, k: int, x: FloatArray, P: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def predict_state(self, k: int, x: FloatArray, P: FloatArray) -> tuple[FloatArray, FloatArray]:
         """State and covariance at grid point k before its measurements, from those at k-1."""
         F = self.transition[k - 1]
         P = F @ P @ F.T
@@ -54,7 +54,7 @@ class Filtered:
     surprise: float
 
 
-def filtered(process: Process) -> Filtered:
+def filter_forward(process: Process) -> Filtered:
     """Forward pass."""
     x, P = process.mean.copy(), process.covariance.copy()
     count, size = len(process.measurements), x.size
@@ -62,7 +62,7 @@ def filtered(process: Process) -> Filtered:
     surprise = 0.0
     for k in range(count):
         if k > 0:
-            x, P = process.ahead(k, x, P)
+            x, P = process.predict_state(k, x, P)
         for row, value, variance in process.measurements[k]:
             along = P @ row
             power = float(row @ along) + variance
@@ -74,9 +74,9 @@ def filtered(process: Process) -> Filtered:
     return Filtered(means, covariances, surprise)
 
 
-def smoothed(process: Process) -> tuple[FloatArray, FloatArray]:
+def smooth_states(process: Process) -> tuple[FloatArray, FloatArray]:
     """State (N, n) and covariance (N, n, n) given the whole log."""
-    forward = filtered(process)
+    forward = filter_forward(process)
     means, covariances = forward.mean.copy(), forward.covariance.copy()
     size = process.mean.size
     pull, weight = np.zeros(size), np.zeros((size, size))
@@ -84,17 +84,17 @@ def smoothed(process: Process) -> tuple[FloatArray, FloatArray]:
         P = forward.covariance[k]
         means[k] = forward.mean[k] - P @ pull
         covariances[k] = P - P @ weight @ P
-        pull, weight = _before(process, forward, k, pull, weight)
+        pull, weight = _propagate_adjoint(process, forward, k, pull, weight)
     return means, covariances
 
 
-def _before(
+def _propagate_adjoint(
     process: Process, forward: Filtered, k: int, pull: FloatArray, weight: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Adjoint state and its weight after grid point k-1, from those after point k."""
     x, P = process.mean, process.covariance
     if k > 0:
-        x, P = process.ahead(k, forward.mean[k - 1], forward.covariance[k - 1])
+        x, P = process.predict_state(k, forward.mean[k - 1], forward.covariance[k - 1])
     stages = []
     for row, value, variance in process.measurements[k]:
         along = P @ row

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from drivetwin._util.atomic import write_text
-from drivetwin._util.progress import tell
+from drivetwin._util.progress import notify_progress
 from drivetwin._util.version import program_version
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
@@ -15,14 +15,14 @@ from drivetwin.estimation.result.validation import Validation
 from drivetwin.report.find_reports import Candidate, Trial
 from drivetwin.report.html import render_page
 from drivetwin.report.sections.comparison import (
-    agreement_section,
-    friction_overlay_section,
-    origin_section,
-    trial_sections,
+    build_agreement_section,
+    build_friction_overlay_section,
+    build_origin_section,
+    build_trial_sections,
 )
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.simulate_log import validate
+from drivetwin.validation.simulate_log import simulate_shift
 
 
 def save_comparison(
@@ -36,10 +36,10 @@ def render_comparison(candidates: Sequence[Candidate], trials: Sequence[Trial]) 
     """HTML text of the comparison; with one candidate it shows the logs alone."""
     several = len(candidates) > 1
     sections = [
-        *([agreement_section(candidates)] if several else []),
-        *trial_sections(candidates, trials),
-        friction_overlay_section(candidates),
-        origin_section(candidates),
+        *([build_agreement_section(candidates)] if several else []),
+        *build_trial_sections(candidates, trials),
+        build_friction_overlay_section(candidates),
+        build_origin_section(candidates),
     ]
     names = ", ".join(one.name for one in candidates)
     return render_page(
@@ -49,7 +49,7 @@ def render_comparison(candidates: Sequence[Candidate], trials: Sequence[Trial]) 
     )
 
 
-def trials_of(
+def simulate_trials(
     twins: Mapping[str, Twin], log: ShiftLog, shifts: Sequence[Shift], name: str
 ) -> list[Trial]:
     """Simulate every shift of a log, called `name`, with every twin.
@@ -62,9 +62,9 @@ def trials_of(
         runs: dict[str, Validation] = {}
         refused: dict[str, str] = {}
         for place, (twin_name, twin) in enumerate(twins.items()):
-            tell((count + place / len(twins)) / len(shifts))
+            notify_progress((count + place / len(twins)) / len(shifts))
             try:
-                runs[twin_name] = validate(twin, log, shift)
+                runs[twin_name] = simulate_shift(twin, log, shift)
             except DrivetwinError as fault:
                 refused[twin_name] = fault.what
         trials.append(Trial(label, runs, refused))

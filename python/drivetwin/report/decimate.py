@@ -13,7 +13,7 @@ _OUTSIDE = 600
 """Points on either side of a focus: enough for a view of the whole log."""
 
 
-def envelope(
+def extract_envelope(
     time: FloatArray, values: FloatArray, max_points: int = MAX_POINTS
 ) -> tuple[FloatArray, FloatArray]:
     """First, smallest, largest and last sample of equal bins, in time order.
@@ -25,11 +25,11 @@ def envelope(
     if time.size <= max_points:
         return time, values
     bins = np.linspace(0, time.size, max_points // 4 + 1).astype(np.intp)
-    kept = _picked(values, bins[:-1], bins[1:])
+    kept = _select_extremes(values, bins[:-1], bins[1:])
     return time[kept], values[kept]
 
 
-def focused(
+def decimate_around(
     time: FloatArray, values: FloatArray, focus: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
     """Decimate a trace (n,) to its envelope outside `focus` [s]; keep all points inside.
@@ -40,14 +40,14 @@ def focused(
         return time, values
     first, last = np.searchsorted(time, focus)
     parts = [
-        envelope(time[:first], values[:first], _OUTSIDE),
-        envelope(time[first:last], values[first:last], MAX_POINTS - 2 * _OUTSIDE),
-        envelope(time[last:], values[last:], _OUTSIDE),
+        extract_envelope(time[:first], values[:first], _OUTSIDE),
+        extract_envelope(time[first:last], values[first:last], MAX_POINTS - 2 * _OUTSIDE),
+        extract_envelope(time[last:], values[last:], _OUTSIDE),
     ]
     return np.concatenate([t for t, _ in parts]), np.concatenate([v for _, v in parts])
 
 
-def _picked(
+def _select_extremes(
     values: FloatArray, starts: NDArray[np.intp], ends: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """Indices of what is kept of each bin; a bin without a number keeps its first sample."""

@@ -7,17 +7,17 @@ from io import StringIO
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.drive.result import DriveRun
 from drivetwin.report.figures.drive import (
-    energy_figure,
-    maneuver_panels,
-    motion_figure,
-    motion_panels,
-    shift_figure,
+    build_maneuver_panels,
+    build_motion_panels,
+    plot_energy,
+    plot_maneuver,
+    plot_motion,
 )
 from drivetwin.report.html import render_page
-from drivetwin.report.sections.blocks import Cell, FigureBlock, Section, TableBlock, cells
+from drivetwin.report.sections.blocks import Cell, FigureBlock, Section, TableBlock, make_cells
 
 _TRACE_STEP = 10
 """Every so many samples go into the table: 100 Hz, enough for any plot."""
@@ -26,36 +26,38 @@ _TRACE_STEP = 10
 def render_drive(run: DriveRun, title: str) -> str:
     """HTML text of the page; equal drives give equal text."""
     motion = FigureBlock(
-        motion_figure(run), "Speeds, torques, converter and pressures.", motion_panels(run)
+        plot_motion(run), "Speeds, torques, converter and pressures.", build_motion_panels(run)
     )
     shifts = [
         FigureBlock(
-            shift_figure(run, each),
+            plot_maneuver(run, each),
             f"{each.action.label}, {each.action.kind}.",
-            maneuver_panels(run, each),
+            build_maneuver_panels(run, each),
         )
         for each in run.maneuvers
         if each.action.off_going and each.action.on_coming
     ]
     sections = [
         Section("drive", "The drive", "From standstill to the end of the plan.", [motion]),
-        Section("work", "Friction", "What each shift did to its elements.", [_table(run)]),
+        Section(
+            "work", "Friction", "What each shift did to its elements.", [_build_shift_table(run)]
+        ),
         Section("shifts", "Shifts", "Each shift in the order of the drive.", shifts),
         Section(
             "energy",
             "Energy",
             "Where the work of the engine went.",
-            [FigureBlock(energy_figure(run), "Energy by part, kJ.")],
+            [FigureBlock(plot_energy(run), "Energy by part, kJ.")],
         ),
     ]
     return render_page(title, f"{run.time[-1]:.1f} s from standstill", sections)
 
 
-def _table(run: DriveRun) -> TableBlock:
+def _build_shift_table(run: DriveRun) -> TableBlock:
     names = ("shift", "kind", "element", "begin [s]", "work [kJ]", "peak power [kW]")
     rows = [
         (
-            *cells(each.action.label, each.action.kind, work.element),
+            *make_cells(each.action.label, each.action.kind, work.element),
             Cell(f"{each.action.start:.2f}", number=True),
             Cell(f"{abs(work.work) / 1e3:.2f}", number=True),
             Cell(f"{work.peak_power / 1e3:.1f}", number=True),
@@ -63,11 +65,11 @@ def _table(run: DriveRun) -> TableBlock:
         for each in run.maneuvers
         for work in each.work
     ]
-    head = (*cells(*names[:3]), *cells(*names[3:], number=True))
+    head = (*make_cells(*names[:3]), *make_cells(*names[3:], number=True))
     return TableBlock("Friction work and peak power of the elements", head, rows)
 
 
-def traces_text(run: DriveRun) -> str:
+def format_traces(run: DriveRun) -> str:
     """CSV with a unit row: the motion at 100 Hz, SI."""
     columns = {
         ("time", "s"): run.time,
@@ -80,7 +82,7 @@ def traces_text(run: DriveRun) -> str:
         ("shaft_torque", "N*m"): run.shaft_torque,
         ("speed_ratio", "1"): run.speed_ratio,
         ("torque_ratio", "1"): run.torque_ratio,
-        **{(pressure_role(name), "Pa"): values for name, values in run.pressure.items()},
+        **{(make_pressure_role(name), "Pa"): values for name, values in run.pressure.items()},
         **{(f"slip.{name}", "rad/s"): values for name, values in run.slip.items()},
         **{(f"torque.{name}", "N*m"): values for name, values in run.torque.items()},
     }

@@ -35,15 +35,15 @@ class Store:
 
     def add_time(self, time: FloatArray) -> int:
         """Number of a time base (n,), increasing [s]."""
-        return self._add(time, _time_step(time), even=_is_even(time))
+        return self._add(time, _choose_time_step(time), even=_is_even(time))
 
     def add_values(self, values: FloatArray) -> int:
         """Number of an array (n,); samples that are not finite are gaps."""
-        return self._add(values, _value_step(values), even=False)
+        return self._add(values, _choose_value_step(values), even=False)
 
-    def packed(self) -> str:
+    def encode(self) -> str:
         """All bytes as base64 of gzip; equal stores give equal texts."""
-        return packed(b"".join(self._bytes))
+        return encode_content(b"".join(self._bytes))
 
     def _add(self, values: FloatArray, step: float, *, even: bool) -> int:
         key = values.tobytes() + bytes([even])
@@ -54,36 +54,36 @@ class Store:
             first, last = float(values[0]), float(values[-1])
             entry |= {"start": first, "step": (last - first) / max(values.size - 1, 1)}
         elif values.size:
-            entry |= self._coded(values, step)
+            entry |= self._encode_values(values, step)
         self.index.append(entry)
         self._known[key] = len(self.index) - 1
         return self._known[key]
 
-    def _coded(self, values: FloatArray, step: float) -> dict[str, Any]:
+    def _encode_values(self, values: FloatArray, step: float) -> dict[str, Any]:
         """Append the differences of whole steps; what it takes to undo that."""
         finite = np.isfinite(values)
         start = float(values[finite][0]) if finite.any() else 0.0
-        codes = np.round((_filled(values, finite, start) - start) / step).astype(np.int64)
+        codes = np.round((_fill_gaps(values, finite, start) - start) / step).astype(np.int64)
         change = np.diff(codes, prepend=0)
         folded = np.where(change < 0, -2 * change - 1, 2 * change)
         width = 2 if int(folded.max()) < 1 << 16 else 4
         planes = folded.astype(f"<u{width}").view(np.uint8)
         self._bytes.append(planes.reshape(-1, width).T.tobytes())
-        return {"start": start, "step": step, "width": width, "gaps": _gaps(finite)}
+        return {"start": start, "step": step, "width": width, "gaps": _find_gaps(finite)}
 
 
-def packed(content: bytes) -> str:
+def encode_content(content: bytes) -> str:
     """Base64 of gzip; equal contents give equal texts."""
     return base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")
 
 
-def _filled(values: FloatArray, finite: np.typing.NDArray[np.bool_], start: float) -> FloatArray:
+def _fill_gaps(values: FloatArray, finite: np.typing.NDArray[np.bool_], start: float) -> FloatArray:
     """The array with each gap held at the sample before it."""
     last = np.maximum.accumulate(np.where(finite, np.arange(values.size), -1))
     return np.where(last >= 0, values[np.maximum(last, 0)], start)
 
 
-def _gaps(finite: np.typing.NDArray[np.bool_]) -> list[list[int]]:
+def _find_gaps(finite: np.typing.NDArray[np.bool_]) -> list[list[int]]:
     """First and one past the last index of each stretch without a sample."""
     edges = np.flatnonzero(np.diff(np.concatenate(([True], finite, [True])).astype(np.int8)))
     return [[int(first), int(last)] for first, last in edges.reshape(-1, 2)]
@@ -96,11 +96,11 @@ def _is_even(time: FloatArray) -> bool:
     return bool(np.abs(time - grid).max() <= EVEN * (grid[1] - grid[0]))
 
 
-def _time_step(time: FloatArray) -> float:
+def _choose_time_step(time: FloatArray) -> float:
     return EVEN * float(np.median(np.diff(time))) if time.size > 1 else 1.0
 
 
-def _value_step(values: FloatArray) -> float:
+def _choose_value_step(values: FloatArray) -> float:
     """Rounding that is small against the noise of the samples, and never below what float32 has."""
     known = values[np.isfinite(values)]
     span = float(np.ptp(known)) if known.size else 0.0

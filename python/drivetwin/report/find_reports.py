@@ -33,12 +33,12 @@ class Candidate:
     version: str
 
     @classmethod
-    def of_twin(cls, name: str, twin: Twin) -> Candidate:
+    def from_twin(cls, name: str, twin: Twin) -> Candidate:
         """Create a candidate from a twin file."""
         return cls(name, twin.method, twin.parameters, twin.friction, {}, twin.inputs, twin.version)
 
     @classmethod
-    def of_result(cls, name: str, content: ResultFile) -> Candidate:
+    def from_result(cls, name: str, content: ResultFile) -> Candidate:
         """Create a candidate from a result file."""
         nan = float("nan")
         fit = {
@@ -54,8 +54,8 @@ class Candidate:
         return cls(
             name,
             content.method,
-            {key: record.estimate(key) for key, record in content.parameters.items()},
-            {element: record.curve() for element, record in content.friction.items()},
+            {key: record.to_estimate(key) for key, record in content.parameters.items()},
+            {element: record.to_curve() for element, record in content.friction.items()},
             fit,
             content.inputs,
             content.version,
@@ -101,14 +101,16 @@ class Agreement:
         return None if self.apart is None else self.apart <= DIFFER
 
 
-def agreements(candidates: Sequence[Candidate]) -> list[Agreement]:
+def compare_estimates(candidates: Sequence[Candidate]) -> list[Agreement]:
     """Compare every parameter that some candidate estimates, in the order of the first such one."""
     ids = dict.fromkeys(name for one in candidates for name in one.estimates)
-    found = (_agreement(name, [one.estimates.get(name) for one in candidates]) for name in ids)
+    found = (
+        _compare_parameter(name, [one.estimates.get(name) for one in candidates]) for name in ids
+    )
     return [one for one in found if one is not None]
 
 
-def _agreement(name: str, estimates: Sequence[Estimate | None]) -> Agreement | None:
+def _compare_parameter(name: str, estimates: Sequence[Estimate | None]) -> Agreement | None:
     told = [(one.value, one.std_total) for one in estimates if one and one.value is not None]
     if not told:
         return None

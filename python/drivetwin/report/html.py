@@ -13,17 +13,21 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from drivetwin._util.atomic import write_text
-from drivetwin._util.progress import part, tell
+from drivetwin._util.progress import notify_progress, scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
-from drivetwin.report.embedded_data import Store, packed
+from drivetwin.report.embedded_data import Store, encode_content
 from drivetwin.report.sections.blocks import FigureBlock, Section
-from drivetwin.report.sections.identifiability import limits_section
-from drivetwin.report.sections.likelihood import likelihood_sections
-from drivetwin.report.sections.parameters import trust_section
-from drivetwin.report.sections.provenance import provenance_section
-from drivetwin.report.sections.stage_results import evidence_sections
-from drivetwin.report.sections.summary import friction_section, shift_section, validation_section
+from drivetwin.report.sections.identifiability import build_limits_section
+from drivetwin.report.sections.likelihood import build_likelihood_sections
+from drivetwin.report.sections.parameters import build_parameters_section
+from drivetwin.report.sections.provenance import build_provenance_section
+from drivetwin.report.sections.stage_results import build_stage_sections
+from drivetwin.report.sections.summary import (
+    build_friction_section,
+    build_shift_section,
+    build_validation_section,
+)
 
 _BELOW_BUTTONS = 30
 """Room above the panels [px] where the page has the zoom buttons outside the figure."""
@@ -36,8 +40,8 @@ def save_report(path: Path | str, found: Identification, log: ShiftLog) -> None:
 
 def render_report(found: Identification, log: ShiftLog, library: str | None = None) -> str:
     """HTML text of the report; equal inputs give equal text. `library` as in `render_page`."""
-    with part(0.0, 0.5):
-        sections = report_sections(found, log)
+    with scale_progress(0.0, 0.5):
+        sections = build_report_sections(found, log)
     shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in found.shifts)
     return render_page(
         title=f"Driveline model from {Path(log.source).name}",
@@ -47,17 +51,17 @@ def render_report(found: Identification, log: ShiftLog, library: str | None = No
     )
 
 
-def report_sections(found: Identification, log: ShiftLog) -> list[Section]:
+def build_report_sections(found: Identification, log: ShiftLog) -> list[Section]:
     """All sections in reading order; those without content are left out."""
     sections = [
-        trust_section(found),
-        shift_section(found, log),
-        validation_section(found.evidence.validation),
-        *evidence_sections(found),
-        friction_section(found),
-        *likelihood_sections(found),
-        limits_section(found),
-        provenance_section(found),
+        build_parameters_section(found),
+        build_shift_section(found, log),
+        build_validation_section(found.evidence.validation),
+        *build_stage_sections(found),
+        build_friction_section(found),
+        *build_likelihood_sections(found),
+        build_limits_section(found),
+        build_provenance_section(found),
     ]
     return [section for section in sections if section.blocks]
 
@@ -82,20 +86,20 @@ def render_page(
     drawn = count(1)
 
     def as_json(block: FigureBlock) -> Markup:
-        tell(next(drawn) / (figures + 1))
-        return figure_json(block, store)
+        notify_progress(next(drawn) / (figures + 1))
+        return encode_figure(block, store)
 
     environment.filters["figure_json"] = as_json
     return environment.get_template("report.html.j2").render(
         title=title,
         subtitle=subtitle,
         sections=sections,
-        style=_resource("report.css"),
-        script=_resource("report.js"),
-        samples_index=lambda: _json(store.index),
-        samples=lambda: Markup(store.packed()),
+        style=_read_resource("report.css"),
+        script=_read_resource("report.js"),
+        samples_index=lambda: _encode_json(store.index),
+        samples=lambda: Markup(store.encode()),
         library=library,
-        plotly_js=Markup("" if library else _packed_library()),
+        plotly_js=Markup("" if library else _load_encoded_library()),
     )
 
 
@@ -104,23 +108,23 @@ def save_library(path: Path) -> None:
     script = (
         'const script = document.createElement("script");'
         'script.type = "application/gzip"; script.id = "plotly";'
-        f'script.textContent = "{_packed_library()}"; document.body.append(script);'
+        f'script.textContent = "{_load_encoded_library()}"; document.body.append(script);'
     )
     write_text(path, "{" + script + "}\n")
 
 
-def _packed_library() -> str:
-    return packed(get_plotlyjs().encode())
+def _load_encoded_library() -> str:
+    return encode_content(get_plotlyjs().encode())
 
 
-def figure_json(block: FigureBlock, store: Store) -> Markup:
+def encode_figure(block: FigureBlock, store: Store) -> Markup:
     """JSON of a figure, safe inside a script element: traces, layout, zooms, and of a figure over
     time the numbers of each curve's times and values in `store`."""
     figure = json.loads(block.figure.to_json())
     menus = figure["layout"].pop("updatemenus", [])
     buttons = [button for menu in menus for button in menu["buttons"]]
     curves = [
-        (store.add_time(curve.time), store.add_values(panel.display.of(curve.values)))
+        (store.add_time(curve.time), store.add_values(panel.display.to_display(curve.values)))
         for panel in block.panels
         for curve in panel.curves
     ]
@@ -128,7 +132,7 @@ def figure_json(block: FigureBlock, store: Store) -> Markup:
         del trace["x"], trace["y"]
     if buttons:
         figure["layout"]["margin"]["t"] = _BELOW_BUTTONS
-    return _json(
+    return _encode_json(
         {
             "data": figure["data"],
             "layout": figure["layout"],
@@ -139,9 +143,9 @@ def figure_json(block: FigureBlock, store: Store) -> Markup:
     )
 
 
-def _json(value: object) -> Markup:
+def _encode_json(value: object) -> Markup:
     return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
 
 
-def _resource(name: str) -> Markup:
+def _read_resource(name: str) -> Markup:
     return Markup(files("drivetwin.report").joinpath("templates", name).read_text("utf-8"))

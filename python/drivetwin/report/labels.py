@@ -3,19 +3,19 @@
 
 from __future__ import annotations
 
-from drivetwin.channels.pressure_roles import pressed_element
-from drivetwin.channels.roles import quantity_of
-from drivetwin.parameters import OVER_ETA, spec_of
+from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.roles import get_quantity
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
 
 
-def parameter_label(parameter_id: str) -> str:
+def get_parameter_label(parameter_id: str) -> str:
     """Symbol with the gear or element it belongs to, e.g. `J′ (2)`."""
-    spec = spec_of(parameter_id)
+    spec = get_parameter_spec(parameter_id)
     suffix = parameter_id.removeprefix(spec.stem).removesuffix(OVER_ETA).lstrip("_.")
     return f"{spec.symbol} ({suffix})" if suffix else spec.symbol
 
 
-def channel_label(role: str) -> str:
+def get_channel_label(role: str) -> str:
     """Role of a channel in words, e.g. `output torque` or `pressure B2`."""
     return role.replace("_", " ").replace(".", " ")
 
@@ -30,12 +30,12 @@ _SYMBOLS = {
 }
 
 
-def channel_symbol(role: str) -> str:
+def get_channel_symbol(role: str) -> str:
     """Return the symbol of a channel, e.g. `T_o` or `P B2`; the role itself without a symbol."""
-    element = pressed_element(role)
+    element = get_pressure_element(role)
     return _SYMBOLS.get(role, role) if element is None else f"P {element}"
 
 
-def channel_unit(role: str) -> str:
+def get_channel_unit(role: str) -> str:
     """SI unit of a channel by its role. Raises KeyError for a role that does not exist."""
-    return quantity_of(role).unit
+    return get_quantity(role).unit

@@ -11,16 +11,16 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import escape
 
-from drivetwin._util.display_units import display_of, significant, with_uncertainty
+from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.report.figures.comparison import friction_overlay
-from drivetwin.report.figures.parameters import interval_figure
-from drivetwin.report.figures.recording import QUANTITIES, log_figure
-from drivetwin.report.figures.validation import validation_figure
-from drivetwin.report.labels import channel_label, channel_unit
+from drivetwin.report.figures.comparison import plot_friction_overlay
+from drivetwin.report.figures.parameters import plot_intervals
+from drivetwin.report.figures.recording import QUANTITIES, plot_log
+from drivetwin.report.figures.validation import plot_validation
+from drivetwin.report.labels import get_channel_label, get_channel_unit
 from drivetwin.twin.twin import Twin
 
 Row = Sequence[str]
@@ -44,7 +44,7 @@ class Summary:
     remarks: Sequence[str] = ()
 
     def __str__(self) -> str:
-        parts = [self.title, *(_text(table) for table in self.tables), *self.remarks]
+        parts = [self.title, *(_format_text(table) for table in self.tables), *self.remarks]
         return "\n\n".join(part for part in parts if part)
 
     __repr__ = __str__
@@ -52,7 +52,7 @@ class Summary:
     @property
     def html(self) -> str:
         """Plain HTML that takes the notebook's own colours."""
-        tables = "".join(_html(table) for table in self.tables)
+        tables = "".join(_format_html(table) for table in self.tables)
         remarks = "".join(f"<li>{escape(text)}</li>" for text in self.remarks)
         listed = f"<ul>{remarks}</ul>" if remarks else ""
         return f"<div><strong>{escape(self.title)}</strong>{tables}{listed}</div>"
@@ -61,7 +61,7 @@ class Summary:
         return self.html
 
 
-def _text(table: Table) -> str:
+def _format_text(table: Table) -> str:
     """Aligned columns, two spaces apart."""
     lines = [table.head, *table.rows]
     widths = [max(len(line[k]) for line in lines) for k in range(len(table.head))]
@@ -78,7 +78,7 @@ def _text(table: Table) -> str:
     )
 
 
-def _html(table: Table) -> str:
+def _format_html(table: Table) -> str:
     def cells(line: Row, tag: str) -> str:
         return "".join(
             f'<{tag} style="text-align:{"right" if k in table.right else "left"}">{escape(text)}'
@@ -91,89 +91,92 @@ def _html(table: Table) -> str:
 
 
 @singledispatch
-def figure_of(thing: object) -> go.Figure:
+def draw_figure(thing: object) -> go.Figure:
     """Figure of a result; TypeError for what has none."""
     raise TypeError(f"no figure of a {type(thing).__name__}")
 
 
 @singledispatch
-def summary_of(thing: object) -> Summary:
+def summarise(thing: object) -> Summary:
     """Summary of a result; TypeError for what has none."""
     raise TypeError(f"no summary of a {type(thing).__name__}")
 
 
-@figure_of.register
+@draw_figure.register
 def _(log: ShiftLog) -> go.Figure:
-    return log_figure(log)
+    return plot_log(log)
 
 
-@figure_of.register
+@draw_figure.register
 def _(found: Identification) -> go.Figure:
     validations = found.evidence.validation
-    return validation_figure(validations[0]) if validations else interval_figure(found.estimates)
+    return plot_validation(validations[0]) if validations else plot_intervals(found.estimates)
 
 
-@figure_of.register
+@draw_figure.register
 def _(twin: Twin) -> go.Figure:
-    return friction_overlay("the element", twin.friction, list(twin.friction))
+    return plot_friction_overlay("the element", twin.friction, list(twin.friction))
 
 
-@figure_of.register
+@draw_figure.register
 def _(validation: Validation) -> go.Figure:
-    return validation_figure(validation)
+    return plot_validation(validation)
 
 
-@summary_of.register
+@summarise.register
 def _(log: ShiftLog) -> Summary:
     rows = []
     for role, one in log.channels.items():
         _, display = QUANTITIES[one.quantity]
         low, high = (
-            significant(float(value) * display.factor)
+            format_significant(float(value) * display.factor)
             for value in (np.nanmin(one.values), np.nanmax(one.values))
         )
-        rate = significant(1.0 / one.step, 3)
+        rate = format_significant(1.0 / one.step, 3)
         rows.append((role, one.source_name, rate, low, high, display.label))
     head = ("role", "channel", "Hz", "from", "to", "unit")
     return Summary(log.source, [Table(head, rows, frozenset({2, 3, 4}))], log.warnings)
 
 
-@summary_of.register
+@summarise.register
 def _(found: Identification) -> Summary:
     shifts = ", ".join(f"{one.start_gear}→{one.end_gear}" for one in found.shifts)
     return Summary(
         f"{', '.join(found.inputs)}: shift {shifts}, {found.method.value} method",
-        [_parameters(found.estimates.values()), *_fits(found.fit)],
-        [*_reasons(found.estimates.values()), *(f"warning: {text}" for text in found.warnings)],
+        [_build_parameter_table(found.estimates.values()), *_build_fit_tables(found.fit)],
+        [
+            *_collect_reasons(found.estimates.values()),
+            *(f"warning: {text}" for text in found.warnings),
+        ],
     )
 
 
-@summary_of.register
+@summarise.register
 def _(twin: Twin) -> Summary:
     return Summary(
         f"Twin of {twin.name}, {twin.method.value} method",
-        [_parameters(twin.parameters.values())],
-        _reasons(twin.parameters.values()),
+        [_build_parameter_table(twin.parameters.values())],
+        _collect_reasons(twin.parameters.values()),
     )
 
 
-@summary_of.register
+@summarise.register
 def _(validation: Validation) -> Summary:
     shift = validation.shift
     return Summary(
         f"Shift {shift.start_gear}→{shift.end_gear} simulated: {validation.status}",
-        list(_fits(validation.fit)),
+        list(_build_fit_tables(validation.fit)),
         validation.warnings,
     )
 
 
-def _parameters(estimates: Iterable[Estimate]) -> Table:
+def _build_parameter_table(estimates: Iterable[Estimate]) -> Table:
     rows = []
     for one in estimates:
-        display = display_of(one.unit)
+        display = get_display_unit(one.unit)
         half = None if one.std_total is None else Z95 * one.std_total * display.factor
         value, width = (
-            ("–", "") if one.value is None else with_uncertainty(one.value * display.factor, half)
+            ("–", "") if one.value is None else format_uncertainty(one.value * display.factor, half)
         )
         rows.append(
             (one.id, value, f"± {width}" if width else "", display.label, one.verdict.value)
@@ -181,7 +184,7 @@ def _parameters(estimates: Iterable[Estimate]) -> Table:
     return Table(("parameter", "value", "95 %", "unit", "verdict"), rows, frozenset({1, 2}))
 
 
-def _reasons(estimates: Iterable[Estimate]) -> list[str]:
+def _collect_reasons(estimates: Iterable[Estimate]) -> list[str]:
     """Collect the reasons of the verdicts, each once with all parameters that share it."""
     shared: dict[str, list[str]] = {}
     for one in estimates:
@@ -190,16 +193,16 @@ def _reasons(estimates: Iterable[Estimate]) -> list[str]:
     return [f"{', '.join(ids)}: {reason}" for reason, ids in shared.items()]
 
 
-def _fits(fit: Mapping[str, Mapping[str, SignalFit]]) -> Iterable[Table]:
+def _build_fit_tables(fit: Mapping[str, Mapping[str, SignalFit]]) -> Iterable[Table]:
     """The table of fits; none where nothing was simulated."""
     if not fit:
         return
     phases = list(dict.fromkeys(phase for one in fit.values() for phase in one))
     rows = []
     for signal, one in fit.items():
-        display = display_of(channel_unit(signal))
-        error = f"{significant(one['all'].rmse * display.factor, 3)} {display.label}"
+        display = get_display_unit(get_channel_unit(signal))
+        error = f"{format_significant(one['all'].rmse * display.factor, 3)} {display.label}"
         told = [f"{one[p].fit_percent:.1f}" if p in one else "–" for p in phases]
-        rows.append((channel_label(signal), *told, error))
+        rows.append((get_channel_label(signal), *told, error))
     head = ("fit %", *phases, "rmse")
     yield Table(head, rows, frozenset(range(1, len(head))))

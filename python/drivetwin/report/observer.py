@@ -8,24 +8,24 @@ from pathlib import Path
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.observer.result import Observation
-from drivetwin.report.figures.observer import observer_panels
-from drivetwin.report.figures.stack import stacked
+from drivetwin.report.figures.observer import build_observer_panels
+from drivetwin.report.figures.stack import stack_panels
 from drivetwin.report.html import render_page
 from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, Section
-from drivetwin.validation.simulate_log import phases_of
+from drivetwin.validation.simulate_log import clip_phases
 
 
 def render_observations(found: Sequence[Observation], log: ShiftLog) -> str:
     """HTML text of the page; equal observations give equal text."""
-    sections = [_section(number, one, log) for number, one in enumerate(found, start=1)]
+    sections = [_build_section(number, one, log) for number, one in enumerate(found, start=1)]
     title = f"Torques observed in {Path(log.source).name}"
     return render_page(title, f"by {found[0].observer}, with 95 % bands", sections)
 
 
-def _section(number: int, one: Observation, log: ShiftLog) -> Section:
-    panels = observer_panels(one, log)
-    phases = phases_of(one.shift, (float(one.time[0]), float(one.time[-1])))
-    figure = stacked(panels, phases, height=280 * len(panels))
+def _build_section(number: int, one: Observation, log: ShiftLog) -> Section:
+    panels = build_observer_panels(one, log)
+    phases = clip_phases(one.shift, (float(one.time[0]), float(one.time[-1])))
+    figure = stack_panels(panels, phases, height=280 * len(panels))
     blocks: list[FigureBlock | NotesBlock] = [
         FigureBlock(figure, "Each torque with its 95 % band.", panels)
     ]

@@ -61,7 +61,7 @@ _CANDIDATES = (
 _DASHES = ("solid", "dash", "dot", "dashdot")
 
 
-def candidate_style(index: int) -> CandidateStyle:
+def get_candidate_style(index: int) -> CandidateStyle:
     """Style of the `index`-th of several: six colours with markers, then again dashed."""
     colour, symbol = _CANDIDATES[index % len(_CANDIDATES)]
     dash = _DASHES[index // len(_CANDIDATES) % len(_DASHES)]
@@ -73,7 +73,7 @@ FONT = "Inter, 'Segoe UI', system-ui, -apple-system, 'Liberation Sans', sans-ser
 GRID = "rgba(128,128,128,0.22)"
 
 
-def axis(title: str, **extra: Any) -> dict[str, Any]:
+def make_axis(title: str, **extra: Any) -> dict[str, Any]:
     """Axis with a title that carries the unit and a quiet grid."""
     return {
         "title": {"text": title, "standoff": 8},
@@ -87,7 +87,7 @@ def axis(title: str, **extra: Any) -> dict[str, Any]:
     }
 
 
-def layout(height: int, **extra: Any) -> dict[str, Any]:
+def make_layout(height: int, **extra: Any) -> dict[str, Any]:
     """Return the common layout of all figures; the background is transparent."""
     return {
         "template": go.layout.Template(),

@@ -12,7 +12,7 @@ from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.shifts.changepoint import Hinge, Moving, fit_hinge
 from drivetwin.shifts.kinematics import GearboxSpeeds
 from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.slow_sampling import Crossing, begun, ended
+from drivetwin.shifts.slow_sampling import Crossing, locate_slip_end, locate_slip_start
 
 FloatArray = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class Boundary:
     sigma: float
 
 
-def break_away(
+def locate_break_away(
     speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], stop: int, settings: ShiftSettings
 ) -> Boundary | None:
     """Locate break-away from the gear of `ratio`, engaged in samples `held`; None if not found.
@@ -53,19 +53,19 @@ def break_away(
     `stop` is the first sample at which the next gear is engaged.
     """
     first, last = held
-    rest = slice(max(first, last + 1 - speeds.samples(_REST, 8)), last + 1)
-    slip = _slip(speeds, ratio, rest)
+    rest = slice(max(first, last + 1 - speeds.count_samples(_REST, 8)), last + 1)
+    slip = _compute_slip(speeds, ratio, rest)
     part = slice(first, stop + 1)
-    seen = begun(slip.time[part], slip.error[part] - slip.level, slip.noise)
+    seen = locate_slip_start(slip.time[part], slip.error[part] - slip.level, slip.noise)
     if slip.stairs or _is_sparse(speeds, settings):
-        return _boundary(seen)
-    run = speeds.samples(_QUIET, 3)
-    still = _runs_of_true(slip.departure[: last + 1] < _LIMIT, run)
+        return _to_boundary(seen)
+    run = speeds.count_samples(_QUIET, 3)
+    still = _find_true_runs(slip.departure[: last + 1] < _LIMIT, run)
     anchor = max(int(still.max()) + run - 1, first) if len(still) else last
-    window = _first_window(
-        slip, anchor, Moving.AFTER, speeds.samples(settings.hinge_window, _LEAST)
+    window = _select_first_window(
+        slip, anchor, Moving.AFTER, speeds.count_samples(settings.hinge_window, _LEAST)
     )
-    found = _locate(slip, (anchor, window), Moving.AFTER, (first, stop))
+    found = _locate_hinge(slip, (anchor, window), Moving.AFTER, (first, stop))
     if found is None or seen is None or speeds.step < _BUS:
         return found
     # On a bus the two speeds contradict each other a little before an element lets go for good.
@@ -73,7 +73,7 @@ def break_away(
     return Boundary(found.time, float(np.hypot(found.sigma, doubt)))
 
 
-def lock_up(
+def locate_lock_up(
     speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], start: int, settings: ShiftSettings
 ) -> Boundary | None:
     """Locate lock-up of the gear of `ratio`, engaged in samples `held`; None if not found.
@@ -81,18 +81,20 @@ def lock_up(
     `start` is the last sample at which the previous gear is engaged.
     """
     first, last = held
-    rest = slice(first, min(last + 1, first + speeds.samples(_REST, 8)))
-    slip = _slip(speeds, ratio, rest)
+    rest = slice(first, min(last + 1, first + speeds.count_samples(_REST, 8)))
+    slip = _compute_slip(speeds, ratio, rest)
     if slip.stairs or _is_sparse(speeds, settings):
         part = slice(start, last + 1)
-        return _boundary(ended(slip.time[part], slip.error[part] - slip.level, slip.noise))
-    run = speeds.samples(_QUIET, 3)
-    still = _runs_of_true(slip.departure[first : last + 1] < _LIMIT, run)
+        return _to_boundary(
+            locate_slip_end(slip.time[part], slip.error[part] - slip.level, slip.noise)
+        )
+    run = speeds.count_samples(_QUIET, 3)
+    still = _find_true_runs(slip.departure[first : last + 1] < _LIMIT, run)
     anchor = first + int(still.min()) if len(still) else first
-    window = _first_window(
-        slip, anchor, Moving.BEFORE, speeds.samples(settings.hinge_window, _LEAST)
+    window = _select_first_window(
+        slip, anchor, Moving.BEFORE, speeds.count_samples(settings.hinge_window, _LEAST)
     )
-    return _locate(slip, (anchor, window), Moving.BEFORE, (start, last))
+    return _locate_hinge(slip, (anchor, window), Moving.BEFORE, (start, last))
 
 
 def _is_sparse(speeds: GearboxSpeeds, settings: ShiftSettings) -> bool:
@@ -100,7 +102,7 @@ def _is_sparse(speeds: GearboxSpeeds, settings: ShiftSettings) -> bool:
     return _LEAST * speeds.step > 2.0 * settings.hinge_window
 
 
-def _boundary(found: Crossing | None) -> Boundary | None:
+def _to_boundary(found: Crossing | None) -> Boundary | None:
     return None if found is None else Boundary(found.time, found.sigma)
 
 
@@ -124,28 +126,28 @@ class _Slip:
     stairs: bool
 
 
-def _slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
+def _compute_slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
     """Slip of a gear that is held in the samples `rest`."""
-    error = speeds.sync_error(ratio)
-    width = speeds.samples(_SMOOTH, 3)
+    error = speeds.compute_sync_error(ratio)
+    width = speeds.count_samples(_SMOOTH, 3)
     level = float(np.median(error[rest]))
     noise = 1.4826 * float(np.median(np.abs(error[rest] - level)))
     floor = _ROUNDING * float(np.median(np.abs(speeds.input[rest])))
-    rounding = speeds.rounding(ratio)
+    rounding = speeds.estimate_rounding(ratio)
     noise = max(noise, floor, rounding)
     root = float(np.sqrt(width))
     mean = np.abs(compute_moving_mean(error - level, width))
-    stairs = rounding > _white(error[rest])
+    stairs = rounding > _estimate_white_noise(error[rest])
     return _Slip(speeds.time, error, level, floor, noise, mean * root / noise, root, stairs)
 
 
-def _white(error: FloatArray) -> float:
+def _estimate_white_noise(error: FloatArray) -> float:
     """White noise of a slip at rest, from second differences: mostly zero between stairs."""
     bend = np.abs(np.diff(error, 2))
     return 1.4826 * float(np.median(bend)) / float(np.sqrt(6.0)) if len(bend) else 0.0
 
 
-def _first_window(slip: _Slip, anchor: int, moving: Moving, shortest: int) -> int:
+def _select_first_window(slip: _Slip, anchor: int, moving: Moving, shortest: int) -> int:
     """Samples from `anchor` on to where the slip has clearly left rest, within bounds."""
     ahead = slip.departure[anchor:] if moving is Moving.AFTER else slip.departure[anchor::-1]
     clear = np.flatnonzero(ahead > _CLEAR * slip.root)
@@ -153,7 +155,7 @@ def _first_window(slip: _Slip, anchor: int, moving: Moving, shortest: int) -> in
     return int(np.clip(reached, shortest, _WIDEN * shortest))
 
 
-def _runs_of_true(flags: NDArray[np.bool_], length: int) -> NDArray[np.intp]:
+def _find_true_runs(flags: NDArray[np.bool_], length: int) -> NDArray[np.intp]:
     """Indices at which `length` true flags in a row begin."""
     if len(flags) < length:
         return np.empty(0, dtype=np.intp)
@@ -161,7 +163,7 @@ def _runs_of_true(flags: NDArray[np.bool_], length: int) -> NDArray[np.intp]:
     return np.flatnonzero(count == length)
 
 
-def _locate(
+def _locate_hinge(
     slip: _Slip, where: tuple[int, int], moving: Moving, limits: tuple[int, int]
 ) -> Boundary | None:
     """Fit the hinge around sample `where[0]` in the widest window that the curve can follow.
@@ -174,7 +176,7 @@ def _locate(
     time, sigma = float("nan"), float("inf")
     for part in _WINDOWS:
         span = max(round(part * widest), _LEAST)
-        hinge = _centred(slip, (anchor, span), moving, limits)
+        hinge = _locate_hinge_twice(slip, (anchor, span), moving, limits)
         if hinge is None:
             break
         moved = 0.0 if np.isnan(time) else abs(hinge.time - time)
@@ -190,7 +192,7 @@ def _locate(
     return Boundary(time, float(np.hypot(sigma, step / np.sqrt(12.0))))
 
 
-def _centred(
+def _locate_hinge_twice(
     slip: _Slip, where: tuple[int, int], moving: Moving, limits: tuple[int, int]
 ) -> Hinge | None:
     """Fit the hinge around sample `where[0]` ± `where[1]`, then again around what was found."""

@@ -7,17 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import pressure_role
-from drivetwin.channels.shiftlog import Channel, ShiftLog, open_ends
+from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.channels.units import BAR
-from drivetwin.shifts.breakaway_lockup import Boundary, break_away, lock_up
+from drivetwin.shifts.breakaway_lockup import Boundary, locate_break_away, locate_lock_up
 from drivetwin.shifts.gear_runs import Run
 from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
-from drivetwin.shifts.pressures import one_clutch
+from drivetwin.shifts.pressures import is_shared_pressure
 from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.shift import Shift, shift_kind
-from drivetwin.shifts.tcu_flags import flag_before
-from drivetwin.shifts.torque_onset import SMOOTH, pressure_onset, smoothed, torque_dip_onset
+from drivetwin.shifts.shift import Shift, classify_shift
+from drivetwin.shifts.tcu_flags import find_flag_start
+from drivetwin.shifts.torque_onset import (
+    SMOOTH,
+    locate_pressure_onset,
+    locate_torque_dip,
+    smooth_channel,
+)
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -44,7 +49,7 @@ class Search:
     settings: ShiftSettings
 
 
-def ratio_in(speeds: GearboxSpeeds, first: int, last: int) -> FloatArray:
+def compute_ratio(speeds: GearboxSpeeds, first: int, last: int) -> FloatArray:
     """ω_in/ω_out of samples `first` to `last`, both included."""
     part = slice(first, last + 1)
     return speeds.input[part] / speeds.output[part]
@@ -56,25 +61,28 @@ def build_shift(search: Search, before: Run, after: Run) -> Shift:
     start_gear, end_gear = before.gear or "", after.gear or ""
     if start_gear == end_gear:
         raise CandidateRefusedError(f"gear {start_gear} slips and is held again: no change of gear")
-    begin = break_away(
+    begin = locate_break_away(
         speeds, search.ratios[start_gear], (before.first, before.last), after.first, settings
     )
-    lock = lock_up(
+    lock = locate_lock_up(
         speeds, search.ratios[end_gear], (after.first, after.last), before.last, settings
     )
     if begin is None or lock is None:
         what = "break-away of the off-going" if begin is None else "lock-up of the on-coming"
         raise CandidateRefusedError(f"the {what} element cannot be located in its slip")
     _check_inertia_phase(search, begin, lock)
-    offgoing, oncoming = search.card.element_of(start_gear), search.card.element_of(end_gear)
+    offgoing, oncoming = (
+        search.card.get_gear_element(start_gear),
+        search.card.get_gear_element(end_gear),
+    )
     _check_passage(search, begin, lock)
-    span = _usable(search, before, after)
-    kind, warnings = shift_kind(
+    span = _compute_usable_span(search, before, after)
+    kind, warnings = classify_shift(
         search.log, search.ratios[start_gear] > search.ratios[end_gear], begin.time
     )
     step = search.ratios[end_gear] / search.ratios[start_gear]
     passage = (kind, (offgoing, oncoming), step)
-    onset, more = _torque_start(search, passage, span[0], (begin, lock))
+    onset, more = _locate_torque_start(search, passage, span[0], (begin, lock))
     if onset.time - span[0] < settings.min_hold:
         raise CandidateRefusedError(
             f"gear {start_gear} is recorded for {onset.time - span[0]:.3f} s before the torque "
@@ -92,7 +100,7 @@ def build_shift(search: Search, before: Run, after: Run) -> Shift:
         after=(lock.time, span[1]),
         lockup_time=lock.time,
         sigma={"torque_start": onset.sigma, "inertia_start": begin.sigma, "lockup": lock.sigma},
-        warnings=(*speeds.warnings, *warnings, *more, *_ratio_warnings(search, before, after)),
+        warnings=(*speeds.warnings, *warnings, *more, *_check_ratios(search, before, after)),
     )
 
 
@@ -112,11 +120,11 @@ def _check_inertia_phase(search: Search, begin: Boundary, lock: Boundary) -> Non
 def _check_passage(search: Search, begin: Boundary, lock: Boundary) -> None:
     """Refuse what takes too long, and what rests at a ratio that the card does not have."""
     taken, longest = lock.time - begin.time, search.settings.max_inertia_phase
-    resting = resting_ratio(search, begin.time, lock.time)
+    resting = find_resting_ratio(search, begin.time, lock.time)
     if resting is not None:
         raise CandidateRefusedError(
             f"between the gears the ratio rests at {resting:.4g}, "
-            f"which is no gear of the card ({gear_list(search)})"
+            f"which is no gear of the card ({describe_gears(search)})"
         )
     if taken > longest:
         raise CandidateRefusedError(
@@ -124,20 +132,20 @@ def _check_passage(search: Search, begin: Boundary, lock: Boundary) -> None:
         )
 
 
-def resting_ratio(search: Search, start: float, end: float) -> float | None:
+def find_resting_ratio(search: Search, start: float, end: float) -> float | None:
     """First ratio held steadily for twice `min_hold` between two times [s], or None."""
     speeds, window = search.speeds, 2.0 * search.settings.min_hold
     for begin in np.arange(start, end - window, 0.5 * window):
         first, stop = np.searchsorted(speeds.time, [begin, begin + window])
         if stop - first < search.settings.min_inertia_samples:
             continue
-        ratio = ratio_in(speeds, int(first), int(stop) - 1)
+        ratio = compute_ratio(speeds, int(first), int(stop) - 1)
         if np.ptp(np.percentile(ratio, [5, 95])) < _STEADY * np.median(ratio):
             return float(np.median(ratio))
     return None
 
 
-def _usable(search: Search, before: Run, after: Run) -> tuple[float, float]:
+def _compute_usable_span(search: Search, before: Run, after: Run) -> tuple[float, float]:
     """Times from and to which the two gears are held; clear of slip where a run was cut."""
     time, settle = search.speeds.time, search.settings.settle
     start = time[before.first] + (settle if before.first > 0 else 0.0)
@@ -145,12 +153,12 @@ def _usable(search: Search, before: Run, after: Run) -> tuple[float, float]:
     return float(start), float(end)
 
 
-def gear_list(search: Search) -> str:
+def describe_gears(search: Search) -> str:
     """Gears of the card with their ratios, for messages."""
     return ", ".join(f"{name} {value:.4g}" for name, value in search.ratios.items())
 
 
-def _torque_start(
+def _locate_torque_start(
     search: Search,
     passage: tuple[ShiftKind, tuple[str, str], float],
     earliest: float,
@@ -165,18 +173,18 @@ def _torque_start(
     """
     kind, (offgoing, oncoming), step = passage
     begin = phase[0]
-    if one_clutch(search.log, offgoing, oncoming):
+    if is_shared_pressure(search.log, offgoing, oncoming):
         reason = f"one clutch is {offgoing} and {oncoming} in turn: the torque phase is empty"
         return begin, (reason,)
     earliest = max(earliest, begin.time - search.settings.max_torque_phase)
-    if pressure_role(oncoming) in search.log:
-        return _pressure_start(search, (offgoing, oncoming), earliest, phase)
+    if make_pressure_role(oncoming) in search.log:
+        return _locate_pressure_start(search, (offgoing, oncoming), earliest, phase)
     if "output_torque" in search.log and kind is ShiftKind.POWER_ON_UP:
-        torque = smoothed(search.log["output_torque"], (earliest, begin.time))
-        dip = torque_dip_onset(torque, begin.time, step)
+        torque = smooth_channel(search.log["output_torque"], (earliest, begin.time))
+        dip = locate_torque_dip(torque, begin.time, step)
         if dip is not None:
             return dip, (f"no pressure of {oncoming}: torque phase read from the output torque",)
-    flag = flag_before(search.log, begin.time, begin.time - earliest)
+    flag = find_flag_start(search.log, begin.time, begin.time - earliest)
     if flag is not None and kind is ShiftKind.POWER_ON_UP:
         half = 0.5 * (begin.time - flag)
         reason = (
@@ -189,7 +197,7 @@ def _torque_start(
     return Boundary(begin.time, sigma), (reason,)
 
 
-def _pressure_start(
+def _locate_pressure_start(
     search: Search,
     elements: tuple[str, str],
     earliest: float,
@@ -198,8 +206,8 @@ def _pressure_start(
     """Locate the torque start by the on-coming pressure; refuse a missing or contradictory one."""
     offgoing, oncoming = elements
     begin, lock = phase
-    channel, P0 = search.log.pressure(oncoming), search.card.elements[oncoming].P0
-    pressure = smoothed(channel, (earliest, lock.time + _GRIP))
+    channel, P0 = search.log.get_pressure(oncoming), search.card.elements[oncoming].P0
+    pressure = smooth_channel(channel, (earliest, lock.time + _GRIP))
     margin = 3.0 * P0.std + pressure.noise
     grip = pressure.values[pressure.time >= lock.time - _GRIP]
     if not len(grip):
@@ -209,9 +217,9 @@ def _pressure_start(
             f"pressures contradict the speeds: {oncoming} locks, but its pressure is only "
             f"{grip.max() / BAR:.3g} bar then, below P0 = {P0.value / BAR:.3g} bar"
         )
-    onset = pressure_onset(pressure, (P0.value, P0.std), begin.time)
+    onset = locate_pressure_onset(pressure, (P0.value, P0.std), begin.time)
     if onset is not None:
-        _check_seen(channel, oncoming, (earliest, onset.time))
+        _check_rise_samples(channel, oncoming, (earliest, onset.time))
     rest = pressure.values[pressure.time <= begin.time]
     if len(rest) and rest.min() > P0.value + margin:
         raise CandidateRefusedError(
@@ -225,13 +233,13 @@ def _pressure_start(
     return begin, (f"{oncoming} exceeds P0 {when}: the torque phase is empty",)
 
 
-def _check_seen(pressure: Channel, oncoming: str, span: tuple[float, float]) -> None:
+def _check_rise_samples(pressure: Channel, oncoming: str, span: tuple[float, float]) -> None:
     """Refuse where the rise above P0, which ends `span` [s], lies before or between samples.
 
     Averaging displaces the rise next to a gap.
     """
     onset = span[1]
-    for low, high in (*pressure.gaps, *open_ends(pressure.time, span)):
+    for low, high in (*pressure.gaps, *find_uncovered_ends(pressure.time, span)):
         if low - SMOOTH < onset < high + SMOOTH:
             raise CandidateRefusedError(
                 f"the pressure of {oncoming} is missing from {low:.3f} s to {high:.3f} s, where it "
@@ -239,12 +247,12 @@ def _check_seen(pressure: Channel, oncoming: str, span: tuple[float, float]) -> 
             )
 
 
-def _ratio_warnings(search: Search, *runs: Run) -> tuple[str, ...]:
+def _check_ratios(search: Search, *runs: Run) -> tuple[str, ...]:
     """Return a warning if a measured ratio differs from the card (rounded ratio, scaled speed)."""
     texts = []
     for run in runs:
         gear = run.gear or ""
-        ratio = float(np.median(ratio_in(search.speeds, run.first, run.last)))
+        ratio = float(np.median(compute_ratio(search.speeds, run.first, run.last)))
         if abs(ratio / search.ratios[gear] - 1.0) > _RATIO_DRIFT:
             texts.append(
                 f"ratio held in gear {gear} is {ratio:.5g}, the card says {search.ratios[gear]:.5g}"

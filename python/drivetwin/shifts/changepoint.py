@@ -71,11 +71,11 @@ def fit_hinge(
     noise and the unknown form of the onset. `noise_floor` (signal unit) is a lower bound of the
     noise. Returns None if nothing moves.
     """
-    direction = _direction(time, values, moving, search)
+    direction = _detect_direction(time, values, moving, search)
     fits = [
         fit
         for powers in moving.orders
-        if (fit := _fit(time, values, moving, (search, powers, direction, noise_floor)))
+        if (fit := _fit_curve(time, values, moving, (search, powers, direction, noise_floor)))
     ]
     if not fits:
         return None
@@ -89,7 +89,7 @@ def fit_hinge(
     return Hinge(centre, float(np.sqrt(variance)), best.noise_moving)
 
 
-def _direction(
+def _detect_direction(
     time: FloatArray, values: FloatArray, moving: Moving, search: tuple[float, float]
 ) -> float:
     """Sign of the movement away from rest."""
@@ -102,12 +102,12 @@ def _direction(
     return float(np.sign(np.mean(far) - np.median(near)))
 
 
-def _basis(time: FloatArray, hinge: float, side: int, powers: tuple[int, ...]) -> FloatArray:
+def _build_basis(time: FloatArray, hinge: float, side: int, powers: tuple[int, ...]) -> FloatArray:
     x = np.clip(side * (time - hinge), 0.0, None)
     return np.column_stack([np.ones_like(x), *(x**power for power in powers)])
 
 
-def _fit(
+def _fit_curve(
     time: FloatArray,
     values: FloatArray,
     moving: Moving,
@@ -120,7 +120,7 @@ def _fit(
         return None
 
     def solve(hinge: float) -> tuple[FloatArray, float]:
-        basis = _basis(time, hinge, side, powers)
+        basis = _build_basis(time, hinge, side, powers)
         coefficients = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
         misfit = float(np.sum((values - basis @ coefficients) ** 2))
         return coefficients, misfit
@@ -139,29 +139,29 @@ def _fit(
     hinge = refined if cost(refined) <= costs[best] else float(grid[best])
     coefficients, misfit = solve(hinge)
     variance = max(misfit / (len(time) - unknowns), floor**2)
-    sigma = _sigma(time, hinge, side, (powers, coefficients)) * np.sqrt(variance)
+    sigma = _compute_sigma(time, hinge, side, (powers, coefficients)) * np.sqrt(variance)
     likelihood = len(time) * np.log(max(misfit / len(time), floor**2))
     limit = 0.5 * (search[1] - search[0])
-    residual = values - _basis(time, hinge, side, powers) @ coefficients
+    residual = values - _build_basis(time, hinge, side, powers) @ coefficients
     ahead = side * (time - hinge) > 0.0
     return _Fit(
         hinge,
         min(float(sigma), limit),
-        _rms(residual[ahead], floor),
+        _compute_rms(residual[ahead], floor),
         float(likelihood + unknowns * np.log(len(time))),
     )
 
 
-def _rms(residual: FloatArray, floor: float) -> float:
+def _compute_rms(residual: FloatArray, floor: float) -> float:
     return max(float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0, floor)
 
 
-def _sigma(
+def _compute_sigma(
     time: FloatArray, hinge: float, side: int, curve: tuple[tuple[int, ...], FloatArray]
 ) -> float:
     """Standard deviation of the hinge for unit noise (Gauss-Newton); inf where undetermined."""
     powers, coefficients = curve
-    basis = _basis(time, hinge, side, powers)
+    basis = _build_basis(time, hinge, side, powers)
     x = np.clip(side * (time - hinge), 0.0, None)
     slope = sum(
         (a * p * x ** (p - 1) for p, a in zip(powers, coefficients[1:], strict=True)),

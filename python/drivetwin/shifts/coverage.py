@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import pressure_role
-from drivetwin.channels.shiftlog import Channel, ShiftLog, open_ends
+from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.errors import DamagedChannelError, Where
-from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, open_spans
+from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, find_open_spans
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
 
@@ -36,7 +36,7 @@ BEFORE, AFTER = 8.0, 5.0
 constant: on a drive grade and service brake change it."""
 
 
-def parts_between(span: Span, gaps: tuple[Span, ...]) -> tuple[Span, ...]:
+def split_at_gaps(span: Span, gaps: tuple[Span, ...]) -> tuple[Span, ...]:
     """The parts of `span` [s] that no gap touches, in order of time."""
     parts, start = [], span[0]
     for low, high in sorted(gaps):
@@ -68,7 +68,7 @@ class _Gap:
         return f"{self.channel.source_name!r} has no samples from {low:.3f} s to {high:.3f} s"
 
 
-def near(shift: Shift, most: tuple[float, float] = (BEFORE, AFTER)) -> Shift:
+def trim_to_window(shift: Shift, most: tuple[float, float] = (BEFORE, AFTER)) -> Shift:
     """Return `shift` with no more of the gears before and after it than `most` [s].
 
     Unless stated, that is what one load holds for.
@@ -80,7 +80,7 @@ def near(shift: Shift, most: tuple[float, float] = (BEFORE, AFTER)) -> Shift:
     return replace(shift, before=before, after=after)
 
 
-def recorded(
+def trim_to_recorded(
     log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue], i_in: float = 1.0
 ) -> Shift:
     """Return `shift` with `before` and `after` cut to what its inputs were recorded for.
@@ -89,26 +89,27 @@ def recorded(
     reported in the warnings of the shift. Raises DamagedChannelError where a gap lies in the shift
     itself or leaves less than LEAST of a gear.
     """
-    gaps = _gaps(log, shift, fills)
+    gaps = _find_gaps(log, shift, fills)
     gaps += [
-        _Gap(None, span, (span[0] - LETS_GO, span[1] + LETS_GO)) for span in open_spans(log, i_in)
+        _Gap(None, span, (span[0] - LETS_GO, span[1] + LETS_GO))
+        for span in find_open_spans(log, i_in)
     ]
     start, end = shift.before[1], shift.lockup_time
     inside = [gap for gap in gaps if gap.reach[0] < end and gap.reach[1] > start]
     if inside:
-        raise _refused(log, inside[0], "during the shift")
+        raise _make_gap_error(log, inside[0], "during the shift")
     earlier = [gap for gap in gaps if shift.before[0] < gap.reach[1] <= start]
     if earlier:
         last = max(earlier, key=lambda gap: gap.reach[1])
         if start - last.reach[1] < LEAST:
-            raise _refused(log, last, f"less than {LEAST:g} s before the shift")
+            raise _make_gap_error(log, last, f"less than {LEAST:g} s before the shift")
         text = f"{last}: gear {shift.start_gear} counts from there on"
         shift = replace(shift, before=(last.reach[1], start), warnings=(*shift.warnings, text))
     later = [gap for gap in gaps if end <= gap.reach[0] < shift.after[1]]
     if later:
         first = min(later, key=lambda gap: gap.reach[0])
         if first.reach[0] - end < LEAST:
-            raise _refused(log, first, f"less than {LEAST:g} s after the shift")
+            raise _make_gap_error(log, first, f"less than {LEAST:g} s after the shift")
         text = f"{first}: gear {shift.end_gear} counts up to there"
         shift = replace(
             shift, after=(shift.after[0], first.reach[0]), warnings=(*shift.warnings, text)
@@ -116,24 +117,24 @@ def recorded(
     return shift
 
 
-def _gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[_Gap]:
+def _find_gaps(log: ShiftLog, shift: Shift, fills: Mapping[str, PriorValue]) -> list[_Gap]:
     """Gaps of the inputs that matter to the shift, where they start late or end early too."""
     found = []
     whole = (shift.before[0], shift.after[1])
     if "engine_torque" in log:
         torque = log["engine_torque"].updates
-        gaps = (*torque.gaps, *open_ends(torque.time, whole))
+        gaps = (*torque.gaps, *find_uncovered_ends(torque.time, whole))
         found += [_Gap(torque, gap, (gap[0] - OLDEST, gap[1] + YOUNGEST)) for gap in gaps]
     for name, fill in fills.items():
-        if pressure_role(name) in log:
-            pressure = log.pressure(name)
-            inner = [gap for gap in pressure.gaps if _decides(pressure, gap, shift, fill)]
-            gaps = (*inner, *open_ends(pressure.time, whole))
+        if make_pressure_role(name) in log:
+            pressure = log.get_pressure(name)
+            inner = [gap for gap in pressure.gaps if _is_relevant_gap(pressure, gap, shift, fill)]
+            gaps = (*inner, *find_uncovered_ends(pressure.time, whole))
             found += [_Gap(pressure, gap, gap) for gap in gaps]
     return found
 
 
-def _decides(pressure: Channel, gap: Span, shift: Shift, fill: PriorValue) -> bool:
+def _is_relevant_gap(pressure: Channel, gap: Span, shift: Shift, fill: PriorValue) -> bool:
     """Return True if an element may have started to transmit torque, or to slip, in a gap."""
     if gap[1] > shift.before[1] and gap[0] < shift.lockup_time:
         return True
@@ -141,7 +142,7 @@ def _decides(pressure: Channel, gap: Span, shift: Shift, fill: PriorValue) -> bo
     return bool(np.sign(beside[0]) != np.sign(beside[1]) or np.abs(beside).min() < fill.std)
 
 
-def _refused(log: ShiftLog, gap: _Gap, where: str) -> DamagedChannelError:
+def _make_gap_error(log: ShiftLog, gap: _Gap, where: str) -> DamagedChannelError:
     if gap.channel is None:
         return DamagedChannelError(
             f"{gap}, {where}: the engine torque does not drive the gearbox there",

@@ -13,16 +13,21 @@ from drivetwin.shifts.candidate import (
     CandidateRefusedError,
     Search,
     build_shift,
-    gear_list,
-    ratio_in,
-    resting_ratio,
+    compute_ratio,
+    describe_gears,
+    find_resting_ratio,
 )
-from drivetwin.shifts.gear_runs import Run, gear_runs
-from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds, gear_ratios, gearbox_speeds
-from drivetwin.shifts.quality import shift_quality
+from drivetwin.shifts.gear_runs import Run, detect_gear_runs
+from drivetwin.shifts.kinematics import (
+    FloatArray,
+    GearboxSpeeds,
+    compute_gear_ratios,
+    resample_speeds,
+)
+from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.settings import ShiftSettings
 from drivetwin.shifts.shift import RejectedShift, Shift
-from drivetwin.shifts.tcu_flags import checked
+from drivetwin.shifts.tcu_flags import check_flags
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -33,7 +38,7 @@ class FoundShifts(NamedTuple):
     rejected: tuple[RejectedShift, ...]
 
 
-def find_shifts(
+def detect_shifts(
     log: ShiftLog, card: VehicleCard, settings: ShiftSettings | None = None
 ) -> FoundShifts:
     """Find every gear shift of a log, its phases and quality figures, and the candidates refused.
@@ -45,43 +50,45 @@ def find_shifts(
     or halfway from the shift flag). Flag and gear of the bus are checked against the speeds.
     Raises MissingChannelError where a speed is missing, TimeError where the speeds share no time.
     """
-    speeds = gearbox_speeds(log, card)
-    search = Search(log, card, speeds, gear_ratios(card), settings or ShiftSettings())
-    runs = gear_runs(speeds, search.ratios, search.settings)
+    speeds = resample_speeds(log, card)
+    search = Search(log, card, speeds, compute_gear_ratios(card), settings or ShiftSettings())
+    runs = detect_gear_runs(speeds, search.ratios, search.settings)
     if not runs:
-        return FoundShifts((), (_standing(search),))
+        return FoundShifts((), (_find_standstill(search),))
     shifts: list[Shift] = []
     rejected = [
-        RejectedShift(_span(speeds, run), reason)
+        RejectedShift(_to_span(speeds, run), reason)
         for index, run in enumerate(runs)
-        if (reason := _unfinished(search, runs, index))
+        if (reason := _explain_no_shift(search, runs, index))
     ]
-    held = _lasting([run for run in runs if run.gear is not None], speeds.time, search.settings)
+    held = _drop_passing_gears(
+        [run for run in runs if run.gear is not None], speeds.time, search.settings
+    )
     for before, after in pairwise(held):
-        if _interrupted(runs, before, after):
+        if _has_standstill(runs, before, after):
             continue
         try:
             shifts.append(build_shift(search, before, after))
         except CandidateRefusedError as no_shift:
             span = (float(speeds.time[before.last]), float(speeds.time[after.first]))
             rejected.append(RejectedShift(span, str(no_shift)))
-    chained = _chain(shifts, search.settings)
-    rated = tuple(replace(s, quality=shift_quality(log, card, s)) for s in chained)
-    finished, refused = checked(log, rated, rejected)
+    chained = _limit_phases(shifts, search.settings)
+    rated = tuple(replace(s, quality=compute_shift_quality(log, card, s)) for s in chained)
+    finished, refused = check_flags(log, rated, rejected)
     return FoundShifts(finished, tuple(sorted(refused, key=lambda item: item.time)))
 
 
-def held_spans(log: ShiftLog, card: VehicleCard) -> list[tuple[str, tuple[float, float]]]:
+def find_gear_spans(log: ShiftLog, card: VehicleCard) -> list[tuple[str, tuple[float, float]]]:
     """The gears that a log holds, in order of time, with first and last time [s] of each.
 
-    Raises as `find_shifts`.
+    Raises as `detect_shifts`.
     """
-    speeds = gearbox_speeds(log, card)
-    runs = gear_runs(speeds, gear_ratios(card), ShiftSettings())
-    return [(run.gear, _span(speeds, run)) for run in runs if run.gear is not None]
+    speeds = resample_speeds(log, card)
+    runs = detect_gear_runs(speeds, compute_gear_ratios(card), ShiftSettings())
+    return [(run.gear, _to_span(speeds, run)) for run in runs if run.gear is not None]
 
 
-def _standing(search: Search) -> RejectedShift:
+def _find_standstill(search: Search) -> RejectedShift:
     speeds = search.speeds
     return RejectedShift(
         (float(speeds.time[0]), float(speeds.time[-1])),
@@ -90,18 +97,18 @@ def _standing(search: Search) -> RejectedShift:
     )
 
 
-def _span(speeds: GearboxSpeeds, run: Run) -> tuple[float, float]:
+def _to_span(speeds: GearboxSpeeds, run: Run) -> tuple[float, float]:
     return float(speeds.time[run.first]), float(speeds.time[run.last])
 
 
-def _interrupted(runs: list[Run], before: Run, after: Run) -> bool:
+def _has_standstill(runs: list[Run], before: Run, after: Run) -> bool:
     """Return True if the vehicle stood still between two engaged gears."""
     between = [run for run in runs if before.last < run.first and run.last < after.first]
     missing = (after.first - before.last - 1) - sum(run.last - run.first + 1 for run in between)
     return missing > 0
 
 
-def _lasting(held: list[Run], time: FloatArray, settings: ShiftSettings) -> list[Run]:
+def _drop_passing_gears(held: list[Run], time: FloatArray, settings: ShiftSettings) -> list[Run]:
     """Without gears that are passed once more on the way to another: a slip that first turned."""
     return [
         run
@@ -115,25 +122,25 @@ def _lasting(held: list[Run], time: FloatArray, settings: ShiftSettings) -> list
     ]
 
 
-def _unfinished(search: Search, runs: list[Run], index: int) -> str:
+def _explain_no_shift(search: Search, runs: list[Run], index: int) -> str:
     """Why a stretch without gear belongs to no shift with a gear on either side; empty if none."""
     run, speeds = runs[index], search.speeds
     if run.gear is not None:
         return ""
     before = runs[index - 1] if index > 0 else None
     after = runs[index + 1] if index + 1 < len(runs) else None
-    if before is not None and _interrupted(runs, before, run):
+    if before is not None and _has_standstill(runs, before, run):
         before = None
-    if after is not None and _interrupted(runs, run, after):
+    if after is not None and _has_standstill(runs, run, after):
         after = None
-    start, end = _span(speeds, run)
+    start, end = _to_span(speeds, run)
     if end - start < search.settings.min_hold or (before and after):
         return ""
-    ratio = ratio_in(speeds, run.first, run.last)
+    ratio = compute_ratio(speeds, run.first, run.last)
     measured = f"measured ratio {ratio.min():.4g} to {ratio.max():.4g}"
-    resting = resting_ratio(search, start, end)
+    resting = find_resting_ratio(search, start, end)
     if resting is not None:
-        return f"steady ratio {resting:.4g} matches no gear of the card ({gear_list(search)})"
+        return f"steady ratio {resting:.4g} matches no gear of the card ({describe_gears(search)})"
     if before is None and after is None:
         return f"no gear of the card is held; {measured}"
     if before is None:
@@ -144,7 +151,7 @@ def _unfinished(search: Search, runs: list[Run], index: int) -> str:
     )
 
 
-def _chain(shifts: list[Shift], settings: ShiftSettings) -> list[Shift]:
+def _limit_phases(shifts: list[Shift], settings: ShiftSettings) -> list[Shift]:
     """End each `after` where the next torque phase starts, begin each `before` after lock-up."""
     chained: list[Shift] = []
     for index, shift in enumerate(shifts):
@@ -157,9 +164,9 @@ def _chain(shifts: list[Shift], settings: ShiftSettings) -> list[Shift]:
     return chained
 
 
-def usable_shifts(log: ShiftLog, card: VehicleCard) -> FoundShifts:
-    """Detect shifts like `find_shifts`; raise NoShiftError with the rejections if all are."""
-    found = find_shifts(log, card)
+def require_shifts(log: ShiftLog, card: VehicleCard) -> FoundShifts:
+    """Detect shifts like `detect_shifts`; raise NoShiftError with the rejections if all are."""
+    found = detect_shifts(log, card)
     if found.shifts:
         return found
     reasons = "; ".join(

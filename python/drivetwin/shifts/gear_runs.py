@@ -28,7 +28,7 @@ class Run:
     last: int
 
 
-def gear_runs(
+def detect_gear_runs(
     speeds: GearboxSpeeds, ratios: Mapping[str, float], settings: ShiftSettings
 ) -> list[Run]:
     """Cut the log into gears held and what lies between; standstill is left out.
@@ -37,15 +37,19 @@ def gear_runs(
     `max_dropout` does not end a gear.
     """
     names = list(ratios)
-    state = _state(speeds, list(ratios.values()), settings)
+    state = _classify_samples(speeds, list(ratios.values()), settings)
     time = speeds.time
-    held = [Run(names[value], first, last) for value, first, last in _constant(state) if value >= 0]
-    held = _bridge(held, time, settings.max_dropout)
+    held = [
+        Run(names[value], first, last)
+        for value, first, last in _iterate_constant_runs(state)
+        if value >= 0
+    ]
+    held = _merge_runs(held, time, settings.max_dropout)
     held = [run for run in held if time[run.last] - time[run.first] >= settings.min_hold]
-    return _with_gaps(held, state)
+    return _insert_gaps(held, state)
 
 
-def _state(
+def _classify_samples(
     speeds: GearboxSpeeds, ratios: list[float], settings: ShiftSettings
 ) -> NDArray[np.int64]:
     """Index of the nearest gear within tolerance, or _NONE, or _STANDING; (n,)."""
@@ -56,14 +60,14 @@ def _state(
     gears = np.array(ratios)
     distance = np.abs(ratio[:, None] / gears[None, :] - 1.0)
     nearest = distance.argmin(axis=1)
-    tolerance = settings.ratio_tolerance + 5.0 * _ratio_noise(ratio, moving)
+    tolerance = settings.ratio_tolerance + 5.0 * _estimate_ratio_noise(ratio, moving)
     # Between close gears the tolerance must not reach the neighbour.
     gap = np.diff(np.sort(np.log(gears))).min() if len(gears) > 1 else 1.0
     close = distance.min(axis=1) < min(tolerance, 0.25 * gap)
     return np.where(moving, np.where(close, nearest, _NONE), _STANDING).astype(np.int64)
 
 
-def _ratio_noise(ratio: NDArray[np.float64], moving: NDArray[np.bool_]) -> float:
+def _estimate_ratio_noise(ratio: NDArray[np.float64], moving: NDArray[np.bool_]) -> float:
     """Relative white noise of the ratio, from second differences (blind to smooth change)."""
     bend = np.diff(ratio, 2)[moving[2:] & moving[:-2]]
     level = ratio[moving]
@@ -72,7 +76,7 @@ def _ratio_noise(ratio: NDArray[np.float64], moving: NDArray[np.bool_]) -> float
     return float(1.4826 * np.median(np.abs(bend)) / np.sqrt(6.0) / np.median(level))
 
 
-def _constant(state: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
+def _iterate_constant_runs(state: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
     """Yield (value, first, last) of every stretch of equal values."""
     edges = np.flatnonzero(np.diff(state)) + 1
     starts = np.concatenate([[0], edges])
@@ -81,7 +85,7 @@ def _constant(state: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
         yield int(state[first]), int(first), int(last)
 
 
-def _bridge(held: list[Run], time: NDArray[np.float64], longest: float) -> list[Run]:
+def _merge_runs(held: list[Run], time: NDArray[np.float64], longest: float) -> list[Run]:
     joined: list[Run] = []
     for run in held:
         before = joined[-1] if joined else None
@@ -96,12 +100,12 @@ def _bridge(held: list[Run], time: NDArray[np.float64], longest: float) -> list[
     return joined
 
 
-def _with_gaps(held: list[Run], state: NDArray[np.int64]) -> list[Run]:
+def _insert_gaps(held: list[Run], state: NDArray[np.int64]) -> list[Run]:
     """Fill in what lies between the gears held, without standstill."""
     runs: list[Run] = []
     start = 0
     for run in [*held, Run(None, len(state), len(state))]:
-        for value, first, last in _stretches(state, start, run.first):
+        for value, first, last in _iterate_state_runs(state, start, run.first):
             if value != _STANDING:
                 runs.append(Run(None, first, last))
         if run.gear is not None:
@@ -110,9 +114,11 @@ def _with_gaps(held: list[Run], state: NDArray[np.int64]) -> list[Run]:
     return runs
 
 
-def _stretches(state: NDArray[np.int64], start: int, stop: int) -> Iterator[tuple[int, int, int]]:
+def _iterate_state_runs(
+    state: NDArray[np.int64], start: int, stop: int
+) -> Iterator[tuple[int, int, int]]:
     """Yield (value, first, last) in state[start:stop], all moving states counting as one."""
     if stop > start:
         part = np.where(state[start:stop] == _STANDING, _STANDING, _NONE)
-        for value, first, last in _constant(part.astype(np.int64)):
+        for value, first, last in _iterate_constant_runs(part.astype(np.int64)):
             yield value, start + first, start + last

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, TimeError, Where
-from drivetwin.logs.quality.outliers import staircase
+from drivetwin.logs.quality.outliers import detect_quantization
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 FloatArray = NDArray[np.float64]
@@ -38,7 +38,7 @@ class GearboxSpeeds:
         """Median sample interval [s]."""
         return float(np.median(np.diff(self.time)))
 
-    def sync_error(self, ratio: float) -> FloatArray:
+    def compute_sync_error(self, ratio: float) -> FloatArray:
         """ω_in - i·ω_out [rad/s], (n,): zero where the gear of `ratio` i = ic·iout is held.
 
         It is the slip of eq. 15 times ic of the element that makes the gear, so its zeros are the
@@ -46,22 +46,22 @@ class GearboxSpeeds:
         """
         return self.input - ratio * self.output
 
-    def rounding(self, ratio: float) -> float:
-        """Standard deviation [rad/s] that stairs of the speeds leave in `sync_error`."""
+    def estimate_rounding(self, ratio: float) -> float:
+        """Standard deviation [rad/s] that stairs of the speeds leave in `compute_sync_error`."""
         inlet, outlet = self.stairs
         return float(np.hypot(inlet, ratio * outlet) / np.sqrt(12.0))
 
-    def samples(self, seconds: float, at_least: int) -> int:
+    def count_samples(self, seconds: float, at_least: int) -> int:
         """Number of samples in a span, but no fewer than `at_least`."""
         return max(at_least, round(seconds / self.step))
 
 
-def gear_ratios(card: VehicleCard) -> dict[str, float]:
+def compute_gear_ratios(card: VehicleCard) -> dict[str, float]:
     """ω_in/ω_out of each gear by name (ic·iout, without the input gear)."""
     return {gear.name: gear.ratio for gear in card.gears}
 
 
-def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
+def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
     """Bring both speeds to the time base of the input speed (linear between output samples).
 
     Input samples inside a gap of the output speed are left out.
@@ -78,17 +78,17 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
         source, scale = log["engine_speed"], 1.0 / card.i_in
         warnings.append("input speed taken from the engine speed: right with lock-up engaged only")
     else:
-        raise _missing("input_speed", "engine_speed", log)
-    inlet = _finite(source)
+        raise _describe_substitute("input_speed", "engine_speed", log)
+    inlet = _select_finite(source)
     if "output_speed" in log:
         sink, factor = log["output_speed"], 1.0
     elif "wheel_speed" in log:
         sink, factor = log["wheel_speed"], card.final_drive
         warnings.append("output speed taken from the wheel speed: shaft twist adds to the slip")
     else:
-        raise _missing("output_speed", "wheel_speed", log)
-    slow = _finite(sink)
-    outlet = slow.at(inlet.time)
+        raise _describe_substitute("output_speed", "wheel_speed", log)
+    slow = _select_finite(sink)
+    outlet = slow.interpolate(inlet.time)
     known = np.isfinite(outlet)
     count = int(np.count_nonzero(known))
     if count < _LEAST:
@@ -103,11 +103,11 @@ def gearbox_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
         scale * inlet.values[known],
         factor * outlet[known],
         tuple(warnings),
-        (scale * staircase(inlet.values), factor * staircase(slow.values)),
+        (scale * detect_quantization(inlet.values), factor * detect_quantization(slow.values)),
     )
 
 
-def _finite(channel: Channel) -> Channel:
+def _select_finite(channel: Channel) -> Channel:
     """The numbers of a channel, of a held one its fresh values only."""
     channel = channel.updates
     keep = np.isfinite(channel.values)
@@ -120,7 +120,7 @@ def _finite(channel: Channel) -> Channel:
     return replace(channel, time=channel.time[keep], values=channel.values[keep])
 
 
-def _missing(wanted: str, substitute: str, log: ShiftLog) -> MissingChannelError:
+def _describe_substitute(wanted: str, substitute: str, log: ShiftLog) -> MissingChannelError:
     return MissingChannelError(
         f"neither {wanted!r} nor {substitute!r} is mapped; without it no ratio can be formed",
         "name the channel in a channel mapping file (--channels) or in [channels] of the card",

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError, Where
-from drivetwin.logs.quality.outliers import runs
+from drivetwin.logs.quality.outliers import find_true_runs
 from drivetwin.shifts.kinematics import FloatArray
 from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.tcu_flags import set_spans
+from drivetwin.shifts.tcu_flags import find_flag_spans
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 Span = tuple[float, float]
@@ -60,26 +60,26 @@ class LockUp:
     warning: str = ""
 
 
-def converter_slip(log: ShiftLog, card: VehicleCard, span: Span) -> float | None:
+def compute_mean_slip(log: ShiftLog, card: VehicleCard, span: Span) -> float | None:
     """Mean of ω_e/(i_in·ω_in) - 1 over `span` [s]; None without the channels."""
     if "engine_speed" not in log or "input_speed" not in log:
         return None
     engine = log["engine_speed"]
     inside = (engine.time >= span[0]) & (engine.time <= span[1])
-    inlet = card.i_in * log["input_speed"].at(engine.time[inside])
+    inlet = card.i_in * log["input_speed"].interpolate(engine.time[inside])
     known = np.isfinite(inlet) & (inlet > 0.0)
     if not known.any():
         return None
     return float(np.mean(engine.values[inside][known] / inlet[known])) - 1.0
 
 
-def open_slip(log: ShiftLog, card: VehicleCard, shift: Shift) -> float | None:
+def compute_converter_slip(log: ShiftLog, card: VehicleCard, shift: Shift) -> float | None:
     """Slip of the converter before `shift`; None if closed or without the channels."""
-    slip = converter_slip(log, card, (shift.before[1] - _BESIDE, shift.before[1]))
+    slip = compute_mean_slip(log, card, (shift.before[1] - _BESIDE, shift.before[1]))
     return slip if slip is not None and abs(slip) > CLOSED else None
 
 
-def unseen(log: ShiftLog, card: VehicleCard) -> tuple[str, ...]:
+def warn_unobserved_lockup(log: ShiftLog, card: VehicleCard) -> tuple[str, ...]:
     """Return a warning if the card has a converter and no channel indicates whether it is open."""
     lacks = [role for role in ("engine_speed", "input_speed") if role not in log]
     if card.converter is None or not lacks or "lockup_engaged" in log:
@@ -91,7 +91,7 @@ def unseen(log: ShiftLog, card: VehicleCard) -> tuple[str, ...]:
     )
 
 
-def behind_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog:
+def refer_to_turbine(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog:
     """Replace the engine by the turbine as the input of the gearbox if the converter is open.
 
     Its torque, by the card's map from the speeds of engine and input, takes the place of
@@ -100,23 +100,23 @@ def behind_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog
     closed before `shift` or the card has no map. Raises IdentificationError where the map ends
     short of the shift.
     """
-    if card.converter is None or open_slip(log, card, shift) is None:
+    if card.converter is None or compute_converter_slip(log, card, shift) is None:
         return log
     engine = log["engine_speed"].updates
-    turbine = card.i_in * log["input_speed"].updates.at(engine.time)
+    turbine = card.i_in * log["input_speed"].updates.interpolate(engine.time)
     known = np.isfinite(turbine) & (engine.values > 0.0)
     ratio = np.divide(turbine, engine.values, out=np.zeros_like(turbine), where=known)
     first, last = card.converter.speed_ratio[0], card.converter.speed_ratio[-1]
     beyond = known & ((ratio < first - _BEYOND) | (ratio > last + _BEYOND))
     _require_map(log, shift, engine.time[beyond], ratio[beyond], (first, last))
     known &= ~beyond
-    for start, end in _closed_spans(log, card.i_in):
+    for start, end in _find_closed_spans(log, card.i_in):
         known &= (engine.time < start - LETS_GO) | (engine.time > end + LETS_GO)
     torque = Channel(
         role="engine_torque",
         quantity=Quantity.TORQUE,
         time=engine.time[known],
-        values=card.converter.turbine_torque(engine.values[known], turbine[known]),
+        values=card.converter.compute_turbine_torque(engine.values[known], turbine[known]),
         source_name=f"{TURBINE_TORQUE} from {engine.source_name}, lock-up clutch open",
         source_unit="Nm",
     )
@@ -142,21 +142,21 @@ def _require_map(
     )
 
 
-def _closed_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
+def _find_closed_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
     """Spans [s] in which the lock-up clutch is closed: by its flag, else by the speeds of engine
     and input, the same for _HOLD on. An open converter seldom lingers there, and carries nothing.
     """
     if "lockup_engaged" in log:
-        return tuple(set_spans(log["lockup_engaged"]))
-    return _spans(log, i_in, lambda mean: np.abs(mean) < _RIGID, _HOLD)
+        return tuple(find_flag_spans(log["lockup_engaged"]))
+    return _find_slip_spans(log, i_in, lambda mean: np.abs(mean) < _RIGID, _HOLD)
 
 
-def require_closed(log: ShiftLog, card: VehicleCard, shift: Shift) -> None:
+def require_locked_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> None:
     """Raise IdentificationError where the converter slips before `shift` and has no map.
 
     Its torque would have to be known then; the engine torque is not that of the gearbox.
     """
-    slip = open_slip(log, card, shift)
+    slip = compute_converter_slip(log, card, shift)
     if slip is not None and card.converter is None:
         raise IdentificationError(
             f"the converter is open before the shift {shift.start_gear}-{shift.end_gear}: engine "
@@ -168,21 +168,23 @@ def require_closed(log: ShiftLog, card: VehicleCard, shift: Shift) -> None:
         )
 
 
-def lock_ups(log: ShiftLog, card: VehicleCard) -> tuple[LockUp, ...]:
+def detect_lock_ups(log: ShiftLog, card: VehicleCard) -> tuple[LockUp, ...]:
     """Every closing of the lock-up clutch; one that is closed from the first sample on is none."""
     if "lockup_engaged" in log:
         flag = log["lockup_engaged"]
         return tuple(
-            _flagged(log, card, flag, span) for span in set_spans(flag) if span[0] > flag.time[0]
+            _check_flag_closing(log, card, flag, span)
+            for span in find_flag_spans(flag)
+            if span[0] > flag.time[0]
         )
     if "engine_speed" in log and "input_speed" in log:
-        return _seen(log["engine_speed"], log["input_speed"], card.i_in)
+        return _detect_closings(log["engine_speed"], log["input_speed"], card.i_in)
     return ()
 
 
-def _flagged(log: ShiftLog, card: VehicleCard, flag: Channel, span: Span) -> LockUp:
+def _check_flag_closing(log: ShiftLog, card: VehicleCard, flag: Channel, span: Span) -> LockUp:
     """Closing according to the flag, checked against the slip."""
-    slip = converter_slip(log, card, (span[0] + _HOLD, max(span[1], span[0] + 2.0 * _HOLD)))
+    slip = compute_mean_slip(log, card, (span[0] + _HOLD, max(span[1], span[0] + 2.0 * _HOLD)))
     warning = ""
     if slip is None:
         warning = "no speeds of engine and input: the flag is unchecked"
@@ -191,29 +193,29 @@ def _flagged(log: ShiftLog, card: VehicleCard, flag: Channel, span: Span) -> Loc
     return LockUp(span[0], flag.step / float(np.sqrt(12.0)), span[1], warning)
 
 
-def _seen(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
+def _detect_closings(engine: Channel, inlet: Channel, i_in: float) -> tuple[LockUp, ...]:
     """Find closings from the speeds: the slip, averaged over _HOLD/3, rests at zero for _HOLD.
 
     Slip has to be present for as long before.
     """
-    time, slip = _slip(engine, inlet, i_in)
+    time, slip = _compute_slip(engine, inlet, i_in)
     width = round(_HOLD / _STEP / 3.0)
     if time.size < 4 * width:
         return ()
     mean = compute_moving_mean(np.where(np.isfinite(slip), slip, 1.0), width)
     closed = np.abs(mean) < CLOSED
-    for first, stop in runs(~closed):
+    for first, stop in find_true_runs(~closed):
         # A late engine speed looks like slip while a shift changes the speeds.
         if first > 0 and (stop - first) * _STEP < _HOLD:
             closed[first:stop] = True
     return tuple(
         LockUp(float(time[first]), _HOLD / 6.0, float(time[stop - 1]))
-        for first, stop in runs(closed)
+        for first, stop in find_true_runs(closed)
         if (stop - first) * _STEP >= _HOLD and first > width
     )
 
 
-def open_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
+def find_open_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
     """Spans [s] in which the speeds of engine and input show the converter open, for _LASTS on.
 
     Less may be a late engine speed while a shift changes the speeds. Empty where the log lacks one
@@ -221,26 +223,26 @@ def open_spans(log: ShiftLog, i_in: float) -> tuple[Span, ...]:
     """
     if "engine_speed" not in log or "input_speed" not in log:
         return ()
-    return _spans(log, i_in, lambda mean: np.abs(mean) > CLOSED, _LASTS)
+    return _find_slip_spans(log, i_in, lambda mean: np.abs(mean) > CLOSED, _LASTS)
 
 
-def _spans(
+def _find_slip_spans(
     log: ShiftLog, i_in: float, shows: Callable[[FloatArray], BoolArray], least: float
 ) -> tuple[Span, ...]:
     """Spans [s] of `least` or more in which the slip's mean over _HOLD/3 `shows` something."""
-    time, slip = _slip(log["engine_speed"], log["input_speed"], i_in)
+    time, slip = _compute_slip(log["engine_speed"], log["input_speed"], i_in)
     width = round(_HOLD / _STEP / 3.0)
     if time.size < 4 * width:
         return ()
     mean = compute_moving_mean(np.where(np.isfinite(slip), slip, 0.0), width)
     return tuple(
         (float(time[first]), float(time[stop - 1]))
-        for first, stop in runs(shows(mean))
+        for first, stop in find_true_runs(shows(mean))
         if (stop - first) * _STEP >= least
     )
 
 
-def _slip(engine: Channel, inlet: Channel, i_in: float) -> tuple[FloatArray, FloatArray]:
+def _compute_slip(engine: Channel, inlet: Channel, i_in: float) -> tuple[FloatArray, FloatArray]:
     """ω_e/(i_in·ω_in) - 1 (n,) at times (n,) [s] every _STEP that both speeds share.
 
     Not finite in a gap and where the input stands.
@@ -248,4 +250,4 @@ def _slip(engine: Channel, inlet: Channel, i_in: float) -> tuple[FloatArray, Flo
     start, end = max(engine.time[0], inlet.time[0]), min(engine.time[-1], inlet.time[-1])
     time = np.arange(start, end, _STEP)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return time, engine.at(time) / (i_in * inlet.at(time)) - 1.0
+        return time, engine.interpolate(time) / (i_in * inlet.interpolate(time)) - 1.0

@@ -12,14 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import Shift
 
 
-def one_clutch(log: ShiftLog, offgoing: str, oncoming: str) -> bool:
+def is_shared_pressure(log: ShiftLog, offgoing: str, oncoming: str) -> bool:
     """Return True if the pressures of both elements come from the same column."""
-    roles = (pressure_role(offgoing), pressure_role(oncoming))
+    roles = (make_pressure_role(offgoing), make_pressure_role(oncoming))
     if any(role not in log for role in roles):
         return False
     first, second = (log[role] for role in roles)
@@ -27,28 +27,28 @@ def one_clutch(log: ShiftLog, offgoing: str, oncoming: str) -> bool:
     return same and bool(np.array_equal(first.values, second.values))
 
 
-def shift_pressures(log: ShiftLog, shift: Shift) -> dict[str, Channel]:
+def get_shift_pressures(log: ShiftLog, shift: Shift) -> dict[str, Channel]:
     """Pressure channels of both elements of a shift, by name.
 
     Raises MissingChannelError where one is missing.
     """
-    found = {name: log.pressure(name) for name in (shift.offgoing, shift.oncoming)}
-    if not one_clutch(log, shift.offgoing, shift.oncoming):
+    found = {name: log.get_pressure(name) for name in (shift.offgoing, shift.oncoming)}
+    if not is_shared_pressure(log, shift.offgoing, shift.oncoming):
         return found
     channel = found[shift.offgoing]
-    open_ = _opened(channel, shift.inertia_phase)
+    open_ = _estimate_opening_time(channel, shift.inertia_phase)
     before = channel.time <= open_
     return {
         shift.offgoing: replace(channel, values=np.where(before, channel.values, 0.0)),
         shift.oncoming: replace(
             channel,
-            role=pressure_role(shift.oncoming),
+            role=make_pressure_role(shift.oncoming),
             values=np.where(before, 0.0, channel.values),
         ),
     }
 
 
-def _opened(channel: Channel, phase: tuple[float, float]) -> float:
+def _estimate_opening_time(channel: Channel, phase: tuple[float, float]) -> float:
     """Instant [s] in the middle of the time in which the pressure is least."""
     inside = (channel.time >= phase[0]) & (channel.time <= phase[1])
     time, values = channel.time[inside], channel.values[inside]

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from drivetwin.channels.shiftlog import Channel, ShiftLog, gap_limit
-from drivetwin.shifts.kinematics import GearboxSpeeds, gear_ratios, gearbox_speeds
+from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
+from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import middle_of
+from drivetwin.vehicle.spec import compute_middle
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +35,7 @@ QUALITY_UNITS: dict[str, str] = {
     "friction_work": "J",
     "friction_power_max": "W",
 }
-"""SI unit of every figure that `shift_quality` may return."""
+"""SI unit of every figure that `compute_shift_quality` may return."""
 
 _REFERENCE = 0.1
 """Span [s] whose mean is the torque before the shift, or the slip after it."""
@@ -55,12 +55,12 @@ class _Torque:
     time: FloatArray
     values: FloatArray
 
-    def within(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+    def select_span(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
         keep = (self.time >= start) & (self.time <= end)
         return self.time[keep], self.values[keep]
 
 
-def shift_quality(
+def compute_shift_quality(
     log: ShiftLog, card: VehicleCard, shift: Shift, J_vehicle: float | None = None
 ) -> dict[str, float]:
     """Figures of one shift by name, units in QUALITY_UNITS.
@@ -72,7 +72,7 @@ def shift_quality(
     `torque_hole_depth`, `torque_hole_area`: fall below (in the direction of power) its mean over
     0.1 s before the torque phase, from there to its return or the lock-up;
     `tie_up_torque`: fall in the torque phase beyond T_o·i_after/i_before, where a clean hand-over
-    of a power-on upshift ends; `lockup_oscillation`: max - min within 0.5 s from lock-up;
+    of a power-on upshift ends; `compute_lockup_oscillation`: max - min within 0.5 s from lock-up;
     `torque_rate_max`: largest |dT_o/dt| from torque phase to 0.5 s after lock-up;
     `wheel_jerk_max` = torque_rate_max·i_f/J_v; `vibration_dose` = (∫ a^4 dt)^¼ over the same time
     with a = i_f·(T_o - straight line through both ends)/J_v, the wheel's angular acceleration (eq.
@@ -89,36 +89,38 @@ def shift_quality(
         "torque_phase_time": shift.torque_phase[1] - start,
         "inertia_phase_time": end - shift.inertia_phase[0],
     }
-    speeds = gearbox_speeds(log, card)
-    figures |= _speed_excess(speeds, gear_ratios(card), shift)
-    figures |= _slip_left(speeds, card.clutch_ratios(shift.oncoming), shift)
-    torque = _output_torque(log, shift)
+    speeds = resample_speeds(log, card)
+    figures |= _compute_speed_excess(speeds, compute_gear_ratios(card), shift)
+    figures |= _compute_residual_slip(speeds, card.get_clutch_ratios(shift.oncoming), shift)
+    torque = _select_output_torque(log, shift)
     if torque is not None:
-        J_v = J_vehicle or middle_of(card.J_vehicle_range)
-        figures |= _torque_hole(torque, gear_ratios(card), shift)
-        figures |= _vibration(torque, shift, card.final_drive / J_v)
-        figures |= _friction(torque, speeds, card.clutch_ratios(shift.oncoming), shift)
+        J_v = J_vehicle or compute_middle(card.J_vehicle_range)
+        figures |= _measure_torque_hole(torque, compute_gear_ratios(card), shift)
+        figures |= _compute_vibration(torque, shift, card.final_drive / J_v)
+        figures |= _compute_friction_work(
+            torque, speeds, card.get_clutch_ratios(shift.oncoming), shift
+        )
     return figures
 
 
-def _low_pass(values: FloatArray, step: float, cutoff: float) -> FloatArray:
+def _filter_low_pass(values: FloatArray, step: float, cutoff: float) -> FloatArray:
     """Zero-phase Butterworth of order 2 run twice; unchanged where sampling is too slow for it."""
     if cutoff * step >= 0.4 or len(values) < 16:
         return values
     return np.asarray(sosfiltfilt(butter(2, cutoff, fs=1.0 / step, output="sos"), values))
 
 
-def _uniform(channel: Channel, span: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+def _sample_uniformly(channel: Channel, span: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
     """Finite samples within `span` on an even grid of the channel's own step; none with a gap."""
     keep = np.isfinite(channel.values) & (channel.time >= span[0]) & (channel.time <= span[1])
     time, values = channel.time[keep], channel.values[keep]
-    if len(time) < 16 or np.diff(time).max() > gap_limit(channel.time):
+    if len(time) < 16 or np.diff(time).max() > compute_gap_limit(channel.time):
         return np.empty(0), np.empty(0)
     grid = np.arange(time[0], time[-1], channel.step)
     return grid, np.interp(grid, time, values)
 
 
-def _output_torque(log: ShiftLog, shift: Shift) -> _Torque | None:
+def _select_output_torque(log: ShiftLog, shift: Shift) -> _Torque | None:
     """T_o from 0.3 s before the torque phase to the end of the response; None where missing."""
     if "output_torque" not in log:
         return None
@@ -127,13 +129,13 @@ def _output_torque(log: ShiftLog, shift: Shift) -> _Torque | None:
         shift.torque_phase[0] - 3 * _REFERENCE,
         min(shift.lockup_time + 2 * _RING, shift.after[1]),
     )
-    time, values = _uniform(channel, span)
+    time, values = _sample_uniformly(channel, span)
     if not len(time) or time[-1] < shift.lockup_time:
         return None
-    return _Torque(time, _low_pass(values, channel.step, _BAND))
+    return _Torque(time, _filter_low_pass(values, channel.step, _BAND))
 
 
-def _speed_excess(
+def _compute_speed_excess(
     speeds: GearboxSpeeds, ratios: dict[str, float], shift: Shift
 ) -> dict[str, float]:
     margin = 0.1
@@ -141,8 +143,8 @@ def _speed_excess(
         speeds.time <= shift.lockup_time + margin
     )
     pair = sorted([ratios[shift.start_gear], ratios[shift.end_gear]])
-    inlet = _low_pass(speeds.input[near], speeds.step, _SPEED_BAND)
-    outlet = _low_pass(speeds.output[near], speeds.step, _SPEED_BAND)
+    inlet = _filter_low_pass(speeds.input[near], speeds.step, _SPEED_BAND)
+    outlet = _filter_low_pass(speeds.output[near], speeds.step, _SPEED_BAND)
     inside = (speeds.time[near] >= shift.inertia_phase[0]) & (
         speeds.time[near] <= shift.lockup_time
     )
@@ -156,7 +158,7 @@ def _speed_excess(
     }
 
 
-def _slip_left(
+def _compute_residual_slip(
     speeds: GearboxSpeeds, ratios: tuple[float, float], shift: Shift
 ) -> dict[str, float]:
     """Residual slip after lock-up of the on-coming element."""
@@ -168,10 +170,12 @@ def _slip_left(
     return {"slip_at_lockup": float(slip.mean())}
 
 
-def _torque_hole(torque: _Torque, ratios: dict[str, float], shift: Shift) -> dict[str, float]:
+def _measure_torque_hole(
+    torque: _Torque, ratios: dict[str, float], shift: Shift
+) -> dict[str, float]:
     start, end = shift.torque_phase[0], shift.lockup_time
-    before = torque.within(start - _REFERENCE, start)[1]
-    time, values = torque.within(start, end)
+    before = torque.select_span(start - _REFERENCE, start)[1]
+    time, values = torque.select_span(start, end)
     if not len(before) or len(values) < 2:
         return {}
     reference = float(before.mean())
@@ -184,16 +188,16 @@ def _torque_hole(torque: _Torque, ratios: dict[str, float], shift: Shift) -> dic
         "torque_hole_area": float(np.trapezoid(hole, time[:stop])),
     }
     step = ratios[shift.end_gear] / ratios[shift.start_gear]
-    dip = torque.within(*shift.torque_phase)[1]
+    dip = torque.select_span(*shift.torque_phase)[1]
     if shift.kind is ShiftKind.POWER_ON_UP and len(dip):
         figures["tie_up_torque"] = max(0.0, step * reference - float(dip.min()))
     return figures
 
 
-def _vibration(torque: _Torque, shift: Shift, gain: float) -> dict[str, float]:
+def _compute_vibration(torque: _Torque, shift: Shift, gain: float) -> dict[str, float]:
     """`gain` turns torque at the output shaft into angular acceleration of the wheel: i_f/J_v."""
-    time, values = torque.within(shift.torque_phase[0], shift.lockup_time + _RING)
-    ring = torque.within(shift.lockup_time, shift.lockup_time + _RING)[1]
+    time, values = torque.select_span(shift.torque_phase[0], shift.lockup_time + _RING)
+    ring = torque.select_span(shift.lockup_time, shift.lockup_time + _RING)[1]
     if len(values) < 3 or len(ring) < 3:
         return {}
     rate = float(np.abs(np.gradient(values, time)).max())
@@ -207,11 +211,11 @@ def _vibration(torque: _Torque, shift: Shift, gain: float) -> dict[str, float]:
     }
 
 
-def _friction(
+def _compute_friction_work(
     torque: _Torque, speeds: GearboxSpeeds, ratios: tuple[float, float], shift: Shift
 ) -> dict[str, float]:
     i_c, i_out = ratios
-    time, values = torque.within(*shift.inertia_phase)
+    time, values = torque.select_span(*shift.inertia_phase)
     if len(time) < 2:
         return {}
     slip = np.interp(time, speeds.time, speeds.input / i_c - i_out * speeds.output)

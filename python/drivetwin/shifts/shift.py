@@ -52,7 +52,7 @@ _PEDAL = 0.05
 """Least accelerator position that counts as power on."""
 
 
-def shift_kind(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKind, tuple[str, ...]]:
+def classify_shift(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKind, tuple[str, ...]]:
     """Kind of the shift, and a warning if no channel indicates the power state.
 
     Power is on where the mean engine torque in the last 0.3 s before break-away [s] is positive;
@@ -62,7 +62,7 @@ def shift_kind(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKind, t
     warnings: tuple[str, ...] = ()
     for role, limit in limits.items():
         if role in log:
-            mean = _mean(log, role, break_away)
+            mean = _compute_mean(log, role, break_away)
             if np.isfinite(mean):
                 power_on = mean > limit
                 break
@@ -72,15 +72,15 @@ def shift_kind(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKind, t
     return ShiftKind.from_direction(up=up, power_on=power_on), warnings
 
 
-def _mean(log: ShiftLog, role: str, end: float) -> float:
+def _compute_mean(log: ShiftLog, role: str, end: float) -> float:
     channel = log[role]
     grid = np.linspace(end - _WINDOW, end, 31)
-    values = channel.at(grid)
+    values = channel.interpolate(grid)
     values = values[np.isfinite(values)]
     return float(values.mean()) if len(values) else float("nan")
 
 
-def shift_labels(shifts: Sequence[Shift], to: str = "→") -> list[str]:
+def make_shift_labels(shifts: Sequence[Shift], to: str = "→") -> list[str]:
     """Labels of the shifts of a log by their gears, `2→3`; repeated ones with the time of lock-up,
     `2→3 at 3.34 s`.
     """

@@ -35,30 +35,30 @@ class Crossing:
     sigma: float
 
 
-def begun(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
+def locate_slip_start(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
     """Locate the start of a slip (n,) that ends away from rest; None without one.
 
     `slip` [rad/s] is that of the off-going element, 0 at rest, up to the lock-up of the other.
     """
     moved = np.abs(slip)
     limit = max(_SHARE * float(moved[-1]), _LIMIT * noise)
-    last = _last_at_rest(moved, limit, noise)
+    last = _find_last_rest_sample(moved, limit, noise)
     if last is None:
         return None
-    at = _passes(time, moved, limit, last)
+    at = _interpolate_crossing(time, moved, limit, last)
     calm = np.flatnonzero(moved[: last + 1] < _LIMIT * noise)
     rest = int(calm[-1]) if len(calm) else 0
     # A slip that creeps is seen before it is large.
     at = min(at, float(time[min(rest + _LASTING, len(time) - 1)]))
     # The capacity falls steadily, so a slip grows at least with the square of the time.
     far = max(min(_STEEP * limit, 0.5 * float(moved[last:].max())), limit)
-    steep = _passes(time, moved, far, last)
+    steep = _interpolate_crossing(time, moved, far, last)
     hidden = (steep - at) / (np.sqrt(_STEEP) - 1.0)
     early = 0.5 * max(at - float(time[rest]), hidden)
-    return Crossing(at, float(np.hypot(early, _step_error(time, last))))
+    return Crossing(at, float(np.hypot(early, _compute_step_error(time, last))))
 
 
-def _last_at_rest(moved: FloatArray, limit: float, noise: float) -> int | None:
+def _find_last_rest_sample(moved: FloatArray, limit: float, noise: float) -> int | None:
     """Return the last sample of the lasting rest; None without one, or if it ends the signal.
 
     A slip that turns after a flare passes through zero and does not rest there.
@@ -73,13 +73,13 @@ def _last_at_rest(moved: FloatArray, limit: float, noise: float) -> int | None:
     return last if last + 1 < len(moved) else None
 
 
-def _passes(time: FloatArray, moved: FloatArray, limit: float, last: int) -> float:
+def _interpolate_crossing(time: FloatArray, moved: FloatArray, limit: float, last: int) -> float:
     """Interpolate the time [s] at which `moved` (n,) first exceeds `limit` after sample `last`."""
     above = last + int(np.argmax(moved[last:] >= limit))
     return float(np.interp(limit, moved[above - 1 : above + 1], time[above - 1 : above + 1]))
 
 
-def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
+def locate_slip_end(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
     """Locate the end of a slip (n,) that starts away from rest; None if it never ends.
 
     `slip` [rad/s] is that of the on-coming element, 0 where it is locked.
@@ -92,21 +92,23 @@ def ended(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
         return None
     last = int(moving[-1])
     step = float(time[last + 1] - time[last])
-    hidden = _to_rest(time[: last + 1], np.abs(slip[: last + 1]), limit)
+    hidden = _extrapolate_to_rest(time[: last + 1], np.abs(slip[: last + 1]), limit)
     if hidden > step:
         return Crossing(
-            float(time[last]) + hidden, float(np.hypot(0.5 * hidden, _step_error(time, last)))
+            float(time[last]) + hidden,
+            float(np.hypot(0.5 * hidden, _compute_step_error(time, last))),
         )
     pace = float(slip[last] - slip[last + 1])
     share = float(np.clip(slip[last] / pace, 0.0, 1.0)) if pace != 0.0 else 1.0
     # Half of what the limit of rest hides, at the pace of the last step.
     reach = min(0.5 * limit / abs(pace), 1.0) if pace != 0.0 else 1.0
     return Crossing(
-        float(time[last]) + share * step, float(np.hypot(reach * step, _step_error(time, last)))
+        float(time[last]) + share * step,
+        float(np.hypot(reach * step, _compute_step_error(time, last))),
     )
 
 
-def _to_rest(time: FloatArray, moved: FloatArray, limit: float) -> float:
+def _extrapolate_to_rest(time: FloatArray, moved: FloatArray, limit: float) -> float:
     """Time [s] that a slip takes from its last number to zero, at its pace down to the limit.
 
     Returns zero if the decrease has too few samples for a rate.
@@ -118,6 +120,6 @@ def _to_rest(time: FloatArray, moved: FloatArray, limit: float) -> float:
     return float(time[-1] - time[high]) * float(moved[-1]) / fall
 
 
-def _step_error(time: FloatArray, index: int) -> float:
+def _compute_step_error(time: FloatArray, index: int) -> float:
     """Standard deviation [s] of an instant known to lie between two samples."""
     return float(time[index + 1] - time[index]) / float(np.sqrt(12.0))

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from drivetwin.shifts.shift import Shift
 
 
-def divided(shifts: Sequence[Shift]) -> tuple[tuple[float, float], ...]:
+def compute_exclusive_spans(shifts: Sequence[Shift]) -> tuple[tuple[float, float], ...]:
     """The span [s] that each shift of one log accounts for.
 
     Each then starts in a gear that is surely held, and ends before the next shift's pressures act.
     """
-    borders = _borders(shifts)
+    borders = _compute_borders(shifts)
     starts = [shifts[0].before[0], *borders]
     ends = [*borders, shifts[-1].after[1]]
     return tuple(
@@ -27,16 +27,16 @@ def divided(shifts: Sequence[Shift]) -> tuple[tuple[float, float], ...]:
     )
 
 
-def apart(shifts: Sequence[Shift]) -> tuple[Shift, ...]:
+def split_shared_gears(shifts: Sequence[Shift]) -> tuple[Shift, ...]:
     """The shifts of one log with the gears between them divided, so that they share no sample."""
-    spans = divided(shifts)
+    spans = compute_exclusive_spans(shifts)
     return tuple(
         replace(one, before=(start, one.before[1]), after=(one.after[0], end))
         for one, (start, end) in zip(shifts, spans, strict=True)
     )
 
 
-def own_samples(
+def compute_exclusive_masks(
     shifts: Sequence[Shift], times: Sequence[NDArray[np.float64]]
 ) -> tuple[NDArray[np.bool_], ...]:
     """Masks (n,) of the samples that are each shift's own.
@@ -44,13 +44,13 @@ def own_samples(
     `times` (n,) [s] belong to what was made of each shift of one log. Put together, what is left
     of them increases as each of them does.
     """
-    borders = _borders(shifts)
+    borders = _compute_borders(shifts)
     return tuple(
         np.searchsorted(borders, time, side="right") == place for place, time in enumerate(times)
     )
 
 
-def _borders(shifts: Sequence[Shift]) -> list[float]:
+def _compute_borders(shifts: Sequence[Shift]) -> list[float]:
     """Middle of each gear held between two shifts; where what counts of it for the one ends before
     what counts for the other begins, the beginning of the latter."""
     return [

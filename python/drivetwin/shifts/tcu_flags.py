@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.channels.shiftlog import Channel, ShiftLog, open_ends
-from drivetwin.logs.quality.outliers import runs
+from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
+from drivetwin.logs.quality.outliers import find_true_runs
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 Span = tuple[float, float]
@@ -21,46 +21,48 @@ _LATE = 0.3
 """How late [s] a gear or flag may be told on the bus."""
 
 
-def set_spans(flag: Channel) -> tuple[Span, ...]:
+def find_flag_spans(flag: Channel) -> tuple[Span, ...]:
     """Spans [s] in which a flag is set, from its first to its last set sample.
 
     A change for less than _GLITCH is none.
     """
     on, ends = flag.values > 0.5, np.append(flag.time, flag.time[-1] + flag.step)
     for state in (False, True):
-        for first, stop in runs(on == state):
+        for first, stop in find_true_runs(on == state):
             inside = first > 0 and stop < on.size
             if inside and ends[stop] - ends[first] < _GLITCH:
                 on[first:stop] = not state
-    return tuple((float(flag.time[first]), float(flag.time[stop - 1])) for first, stop in runs(on))
+    return tuple(
+        (float(flag.time[first]), float(flag.time[stop - 1])) for first, stop in find_true_runs(on)
+    )
 
 
-def flag_before(log: ShiftLog, time: float, reach: float) -> float | None:
+def find_flag_start(log: ShiftLog, time: float, reach: float) -> float | None:
     """Return the time [s] of setting of the shift flag at `time`, at most `reach` earlier."""
     if "shift_in_process" not in log:
         return None
-    found = [low for low, high in set_spans(log["shift_in_process"]) if low <= time <= high]
+    found = [low for low, high in find_flag_spans(log["shift_in_process"]) if low <= time <= high]
     return found[0] if found and time - found[0] <= reach else None
 
 
-def checked(
+def check_flags(
     log: ShiftLog, shifts: Sequence[Shift], rejected: Sequence[RejectedShift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
     """The shifts with a warning where flag or gear contradict them, and flags without a shift."""
-    told = tuple(replace(s, warnings=(*s.warnings, *_contradictions(log, s))) for s in shifts)
+    told = tuple(replace(s, warnings=(*s.warnings, *_find_contradictions(log, s))) for s in shifts)
     if "shift_in_process" not in log:
         return told, tuple(rejected)
     seen = [(s.torque_phase[0], s.lockup_time) for s in shifts] + [r.time for r in rejected]
     flag = log["shift_in_process"]
     empty = [
-        RejectedShift(span, _unseen(log, flag, span))
-        for span in set_spans(flag)
+        RejectedShift(span, _explain_missing_shift(log, flag, span))
+        for span in find_flag_spans(flag)
         if not any(low <= span[1] and high >= span[0] for low, high in seen)
     ]
     return told, (*rejected, *empty)
 
 
-def _unseen(log: ShiftLog, flag: Channel, span: Span) -> str:
+def _explain_missing_shift(log: ShiftLog, flag: Channel, span: Span) -> str:
     """Explain why a flag set over `span` [s] has no shift."""
     if span[0] <= flag.time[0]:
         return "the shift flag is set where the recording begins: the shift is not all in it"
@@ -68,17 +70,17 @@ def _unseen(log: ShiftLog, flag: Channel, span: Span) -> str:
         return "the shift flag is set where the recording ends: the shift is not all in it"
     for role, substitute in (("input_speed", "engine_speed"), ("output_speed", "wheel_speed")):
         speed = log[role if role in log else substitute]
-        for low, high in (*speed.gaps, *open_ends(speed.time, span)):
+        for low, high in (*speed.gaps, *find_uncovered_ends(speed.time, span)):
             if low < span[1] and high > span[0]:
                 missing = f"{speed.source_name!r} has no samples from {low:.3f} s to {high:.3f} s"
                 return f"the shift flag is set, but {missing}: no change of gear can be seen"
     return "the shift flag is set, but the speeds show no change of gear"
 
 
-def _contradictions(log: ShiftLog, shift: Shift) -> list[str]:
+def _find_contradictions(log: ShiftLog, shift: Shift) -> list[str]:
     texts = []
     if "shift_in_process" in log:
-        spans = set_spans(log["shift_in_process"])
+        spans = find_flag_spans(log["shift_in_process"])
         start, end = shift.inertia_phase
         if not any(low <= start + _LATE and high >= end - _LATE for low, high in spans):
             texts.append("the shift flag is not set during this shift")
@@ -89,7 +91,7 @@ def _contradictions(log: ShiftLog, shift: Shift) -> list[str]:
             (shift.end_gear, min(shift.lockup_time + _LATE, shift.after[1])),
         )
         for name, time in moments:
-            value = float(gear.at(np.array([time]))[0])
+            value = float(gear.interpolate(np.array([time]))[0])
             if name.isdecimal() and np.isfinite(value) and value != float(name):
                 texts.append(
                     f"the bus tells gear {value:g} at {time:.2f} s, the speeds show gear {name}"

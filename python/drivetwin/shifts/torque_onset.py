@@ -28,7 +28,7 @@ _SHAFT = 0.015
 
 
 @dataclass(frozen=True, eq=False)
-class Smoothed:
+class SmoothedSignal:
     """A channel averaged over about SMOOTH; `noise` is what is left in `values` of its noise."""
 
     time: FloatArray
@@ -36,19 +36,19 @@ class Smoothed:
     noise: float
 
 
-def smoothed(channel: Channel, span: tuple[float, float]) -> Smoothed:
+def smooth_channel(channel: Channel, span: tuple[float, float]) -> SmoothedSignal:
     """Moving average of the finite samples within `span` [s], centred, so a ramp is kept."""
     keep = np.isfinite(channel.values) & (channel.time >= span[0]) & (channel.time <= span[1])
     time, values = channel.time[keep], channel.values[keep]
     width = 2 * round(0.5 * SMOOTH / channel.step) + 1
     if len(values) < width + 2:
-        return Smoothed(time, values, 0.0)
+        return SmoothedSignal(time, values, 0.0)
     noise = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0 * width)
-    return Smoothed(time, compute_moving_mean(values, width), noise)
+    return SmoothedSignal(time, compute_moving_mean(values, width), noise)
 
 
-def pressure_onset(
-    pressure: Smoothed, threshold: tuple[float, float], break_away: float
+def locate_pressure_onset(
+    pressure: SmoothedSignal, threshold: tuple[float, float], break_away: float
 ) -> Boundary | None:
     """Sustained crossing of P0 (`threshold`: value and standard deviation [Pa]); None if never.
 
@@ -58,7 +58,8 @@ def pressure_onset(
     value, std = threshold
     margin = float(np.hypot(std, pressure.noise))
     crossings = [
-        _crossing(pressure, level, break_away) for level in (value - margin, value, value + margin)
+        _find_crossing(pressure, level, break_away)
+        for level in (value - margin, value, value + margin)
     ]
     early, at, late = crossings
     if at is None:
@@ -69,7 +70,7 @@ def pressure_onset(
     return Boundary(at, float(np.hypot(0.5 * max(late - early, 0.0), 0.3 * step)))
 
 
-def _crossing(pressure: Smoothed, level: float, break_away: float) -> float | None:
+def _find_crossing(pressure: SmoothedSignal, level: float, break_away: float) -> float | None:
     """Time [s] of the upward crossing of `level` that lasts, or None."""
     above = pressure.values > level
     if not above.any():
@@ -90,7 +91,7 @@ def _crossing(pressure: Smoothed, level: float, break_away: float) -> float | No
     return float(t[0] + (level - p[0]) / (p[1] - p[0]) * (t[1] - t[0]))
 
 
-def torque_dip_onset(torque: Smoothed, break_away: float, step: float) -> Boundary | None:
+def locate_torque_dip(torque: SmoothedSignal, break_away: float, step: float) -> Boundary | None:
     """Locate the onset of the torque dip towards break-away; None if there is no clear onset.
 
     Only for power-on upshifts, whose torque phase lowers the output torque by the ratios' `step`

@@ -23,11 +23,11 @@ from drivetwin.simulation.dual_clutch import (
     FloatArray,
     Signal,
     State,
-    delayed_samples,
-    inputs_of,
-    plain_start,
+    collect_inputs,
     require_delays,
     run_time,
+    to_core_start,
+    to_delayed_core_samples,
 )
 from drivetwin.simulation.serialize import as_array, as_json, as_names
 
@@ -109,7 +109,7 @@ def simulate_batch(
     """
     if threads < 0:
         raise InputError(f"{threads} threads", "give a number from 1, or 0 for all cores")
-    asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
+    asked = _Asked.from_request(scenarios, time, parameters or {}, outputs, keep)
     values = np.empty(asked.shape)
     try:
         ends = native_simulate_batch(
@@ -122,10 +122,10 @@ def simulate_batch(
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
-    return _batch(values, ends)
+    return _build_batch(values, ends)
 
 
-def batch_sensitivities(
+def simulate_batch_sensitivities(
     model: DualClutch,
     scenarios: Sequence[Scenario],
     time: FloatArray,
@@ -146,8 +146,8 @@ def batch_sensitivities(
     if not by:
         raise InputError("nothing to differentiate by", "name a parameter, or use simulate_batch")
     for scenario in scenarios:
-        require_delays(inputs_of(scenario.engine_torque, scenario.pressures), by)
-    asked = _Asked.of(scenarios, time, parameters or {}, outputs, keep)
+        require_delays(collect_inputs(scenario.engine_torque, scenario.pressures), by)
+    asked = _Asked.from_request(scenarios, time, parameters or {}, outputs, keep)
     try:
         ends, (values, derivatives, last_lock, grazing) = native_batch_sensitivities(
             as_json(model),
@@ -161,7 +161,7 @@ def batch_sensitivities(
         raise InputError(str(error), "correct the model, its inputs or the names") from error
     shape = (asked.shape[0], len(by), *asked.shape[1:])
     return BatchSensitivities(
-        _batch(values.reshape(asked.shape), ends),
+        _build_batch(values.reshape(asked.shape), ends),
         tuple(by),
         derivatives.reshape(shape),
         last_lock.reshape(shape[:2]),
@@ -185,7 +185,7 @@ class _Asked:
     shape: tuple[int, ...]
 
     @classmethod
-    def of(
+    def from_request(
         cls,
         scenarios: Sequence[Scenario],
         time: FloatArray,
@@ -198,7 +198,7 @@ class _Asked:
         keep = Keep(keep) if isinstance(keep, str) else keep
         outputs = as_names(outputs)
         sets = {name: as_array(values) for name, values in parameters.items()}
-        shape = (_runs(sets, scenarios), len(outputs), len(time))
+        shape = (_count_runs(sets, scenarios), len(outputs), len(time))
         table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))
         wanted = np.empty((0, 0)) if isinstance(keep, Keep) else np.asarray(keep, dtype=np.float64)
         if not isinstance(keep, Keep) and wanted.shape != shape[1:]:
@@ -208,23 +208,23 @@ class _Asked:
                 "give one column per output, sampled on the time",
             )
         return cls(
-            [_plain(scenario) for scenario in scenarios],
+            [_to_core_scenario(scenario) for scenario in scenarios],
             (list(sets), np.ascontiguousarray(table)),
             run_time(time),
             (np.ascontiguousarray(wanted), keep.value if isinstance(keep, Keep) else "misfit"),
-            json.dumps([_output(name) for name in outputs]),
+            json.dumps([_parse_output(name) for name in outputs]),
             shape if keep is Keep.COLUMNS else shape[:2],
         )
 
 
-def _batch(
+def _build_batch(
     values: FloatArray, ends: tuple[NDArray[np.uint32], FloatArray, list[tuple[int, str]]]
 ) -> Batch:
     events, last_lock, failed = ends
     return Batch(values, events, last_lock, dict(failed))
 
 
-def _runs(sets: Mapping[str, FloatArray], scenarios: Sequence[Scenario]) -> int:
+def _count_runs(sets: Mapping[str, FloatArray], scenarios: Sequence[Scenario]) -> int:
     """Number of runs that sets and scenarios agree on."""
     counts = {len(values) for values in sets.values()}
     runs = counts.pop() if sets else len(scenarios)
@@ -237,7 +237,7 @@ def _runs(sets: Mapping[str, FloatArray], scenarios: Sequence[Scenario]) -> int:
     return runs
 
 
-def _output(name: str) -> Mapping[str, str]:
+def _parse_output(name: str) -> Mapping[str, str]:
     kind, _, element = name.partition(".")
     if element and kind in ("torque", "slip"):
         return {"friction_torque" if kind == "torque" else "slip": element}
@@ -247,6 +247,6 @@ def _output(name: str) -> Mapping[str, str]:
     return OUTPUTS[name]
 
 
-def _plain(scenario: Scenario) -> _Plain:
-    inputs = inputs_of(scenario.engine_torque, scenario.pressures)
-    return delayed_samples(inputs), plain_start(scenario.start)
+def _to_core_scenario(scenario: Scenario) -> _Plain:
+    inputs = collect_inputs(scenario.engine_torque, scenario.pressures)
+    return to_delayed_core_samples(inputs), to_core_start(scenario.start)

@@ -18,21 +18,27 @@ class Converter:
     capacity: tuple[float, ...]
     torque_ratio: tuple[float, ...]
 
-    def pump_torque(self, pump: FloatArray | float, turbine: FloatArray | float) -> FloatArray:
+    def compute_pump_torque(
+        self, pump: FloatArray | float, turbine: FloatArray | float
+    ) -> FloatArray:
         """Torque that the pump takes [N m] at speeds of pump and turbine [rad/s], pump > 0."""
         capacity = np.interp(np.divide(turbine, pump), self.speed_ratio, self.capacity)
         return np.asarray(capacity * np.square(pump), dtype=np.float64)
 
-    def ratio(self, pump: FloatArray | float, turbine: FloatArray | float) -> FloatArray:
+    def compute_torque_ratio(
+        self, pump: FloatArray | float, turbine: FloatArray | float
+    ) -> FloatArray:
         """Turbine torque over pump torque."""
         ratio = np.interp(np.divide(turbine, pump), self.speed_ratio, self.torque_ratio)
         return np.asarray(ratio, dtype=np.float64)
 
-    def turbine_torque(self, pump: FloatArray | float, turbine: FloatArray | float) -> FloatArray:
+    def compute_turbine_torque(
+        self, pump: FloatArray | float, turbine: FloatArray | float
+    ) -> FloatArray:
         """Torque that the turbine gives [N m] at speeds of pump and turbine [rad/s], pump > 0."""
-        return self.ratio(pump, turbine) * self.pump_torque(pump, turbine)
+        return self.compute_torque_ratio(pump, turbine) * self.compute_pump_torque(pump, turbine)
 
-    def turbine_slopes(
+    def compute_turbine_slopes(
         self, pump: FloatArray, turbine: FloatArray, steps: tuple[float, float]
     ) -> tuple[FloatArray, FloatArray]:
         """Derivatives of the turbine's torque (n,) [N m s/rad] by the speeds of pump and turbine.
@@ -42,10 +48,10 @@ class Converter:
         """
         of_pump = np.minimum(steps[0], 0.5 * pump)
         of_turbine = np.full_like(turbine, steps[1])
-        by_pump = self.turbine_torque(pump + of_pump, turbine) - self.turbine_torque(
-            pump - of_pump, turbine
-        )
-        by_turbine = self.turbine_torque(pump, turbine + of_turbine) - self.turbine_torque(
-            pump, turbine - of_turbine
-        )
+        by_pump = self.compute_turbine_torque(
+            pump + of_pump, turbine
+        ) - self.compute_turbine_torque(pump - of_pump, turbine)
+        by_turbine = self.compute_turbine_torque(
+            pump, turbine + of_turbine
+        ) - self.compute_turbine_torque(pump, turbine - of_turbine)
         return by_pump / (2.0 * of_pump), by_turbine / (2.0 * of_turbine)

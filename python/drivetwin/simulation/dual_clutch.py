@@ -42,12 +42,14 @@ class Stribeck:
     v_s: float
     mu_v: float
 
-    def at(self, slip: FloatArray) -> FloatArray:
+    def evaluate(self, slip: FloatArray) -> FloatArray:
         """μ at slips (n,) [rad/s] of either sign."""
         linear = np.array([self.mu_c, self.mu_s - self.mu_c, self.mu_v])
-        return np.asarray(np.tensordot(linear, self.slopes(slip)[:3], axes=1), dtype=np.float64)
+        return np.asarray(
+            np.tensordot(linear, self.compute_slopes(slip)[:3], axes=1), dtype=np.float64
+        )
 
-    def slopes(self, slip: FloatArray) -> FloatArray:
+    def compute_slopes(self, slip: FloatArray) -> FloatArray:
         """Derivatives (4, n) of μ by mu_c, mu_s - mu_c, mu_v, in which it is linear, and ln v_s."""
         size = np.abs(slip)
         fall = np.exp(-size / self.v_s)
@@ -62,7 +64,7 @@ class FrictionTable:
     slip: tuple[float, ...]
     mu: tuple[float, ...]
 
-    def at(self, slip: FloatArray) -> FloatArray:
+    def evaluate(self, slip: FloatArray) -> FloatArray:
         """μ at slips (n,) [rad/s] of either sign."""
         return np.asarray(np.interp(np.abs(slip), self.slip, self.mu), dtype=np.float64)
 
@@ -97,7 +99,7 @@ class RoadLoad:
     rolling: float = 0.0
     aero: float = 0.0
 
-    def at(self, wheel_speed: float) -> float:
+    def evaluate(self, wheel_speed: float) -> float:
         """Load torque at the wheel [N m] at a speed [rad/s] of either sign."""
         turning = self.rolling * float(np.sign(wheel_speed))
         return self.constant + turning + self.aero * wheel_speed * abs(wheel_speed)
@@ -123,41 +125,43 @@ class DualClutch:
     load: RoadLoad
     elements: tuple[ShiftElement, ...]
 
-    def ratio(self, element: str) -> float:
+    def get_overall_ratio(self, element: str) -> float:
         """Overall ratio ω_e/ω_out with the shift element called `element` locked."""
         held = next(one for one in self.elements if one.name == element)
         return self.i_in * held.i_c * held.i_out
 
-    def efficiency(self, *, driving: bool) -> float:
+    def get_efficiency(self, *, driving: bool) -> float:
         """dφ/dT_g: η, and 1/η by the dissipative law where power flows back, not `driving`."""
         return self.eta if driving or self.loss_law == "paper" else 1.0 / self.eta
 
-    def sides(self, ratio: float, *, driving: bool = True) -> tuple[float, float]:
+    def compute_side_inertias(self, ratio: float, *, driving: bool = True) -> tuple[float, float]:
         """Inertias before and behind the output shaft, at the shaft [kg m^2], in a gear.
 
         `ratio` is the overall one of the gear; `driving` is True if power flows from the engine.
         The drums of open elements are left out.
         """
-        engine = self.J1 * self.efficiency(driving=driving) + self.J2e
+        engine = self.J1 * self.get_efficiency(driving=driving) + self.J2e
         return engine * ratio**2 + self.J_out, self.J_v / self.i_f**2
 
-    def steady_torque(self, engine_torque: float, ratio: float, wheel_speed: float) -> float:
+    def compute_steady_torque(
+        self, engine_torque: float, ratio: float, wheel_speed: float
+    ) -> float:
         """Torque of the output shaft [N m] at which both of its sides accelerate alike.
 
         Eqs. 10 and 11 with equal accelerations and φ(T_g) by the loss law, in the gear of overall
         ratio `ratio`, from the engine's torque [N m] and the wheel's speed [rad/s] of either sign.
         """
-        load = self.load.at(wheel_speed) / self.i_f
-        before, behind = self.sides(ratio)
+        load = self.load.evaluate(wheel_speed) / self.i_f
+        before, behind = self.compute_side_inertias(ratio)
         rate = (self.eta * engine_torque * ratio - load) / (before + behind)
         # T_g = T_e - J1·ω_e': its sign is the same whichever way the power is taken to flow.
         driving = (engine_torque - self.J1 * ratio * rate) * ratio * wheel_speed >= 0.0
-        before, behind = self.sides(ratio, driving=driving)
-        drive = self.efficiency(driving=driving) * engine_torque * ratio
+        before, behind = self.compute_side_inertias(ratio, driving=driving)
+        drive = self.get_efficiency(driving=driving) * engine_torque * ratio
         return load + behind * (drive - load) / (before + behind)
 
 
-def in_series(one: float, other: float) -> float:
+def compute_series_inertia(one: float, other: float) -> float:
     """Inertia [kg m^2] with which two swing against each other, 1/J = 1/J4 + 1/J5."""
     return one * other / (one + other)
 
@@ -316,18 +320,18 @@ def simulate(
     try:
         columns, events, status, energy = native_simulate(
             as_json(model),
-            samples(inputs_of(engine_torque, pressures)),
-            plain_start(start),
+            to_core_samples(collect_inputs(engine_torque, pressures)),
+            to_core_start(start),
             run_time(time),
             options,
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the time grid") from error
     audited = EnergyAudit(*energy) if energy is not None else None
-    return _trajectory(model, time, columns, (events, status, audited))
+    return _build_trajectory(model, time, columns, (events, status, audited))
 
 
-def sensitivities(
+def simulate_sensitivities(
     model: DualClutch,
     engine_torque: Signal,
     pressures: Mapping[str, Signal],
@@ -346,16 +350,20 @@ def sensitivities(
     Raises InputError for an unknown name, the delay of an input that jumps, or an inconsistent
     description.
     """
-    inputs, parameters = inputs_of(engine_torque, pressures), as_names(parameters)
+    inputs, parameters = collect_inputs(engine_torque, pressures), as_names(parameters)
     require_delays(inputs, parameters)
     options = (Accuracy().tolerance, parameters)
     try:
         columns, events, status, derivatives, event_derivatives = native_sensitivities(
-            as_json(model), delayed_samples(inputs), plain_start(start), run_time(time), options
+            as_json(model),
+            to_delayed_core_samples(inputs),
+            to_core_start(start),
+            run_time(time),
+            options,
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
-    run = _trajectory(model, time, columns, (events, status, None))
+    run = _build_trajectory(model, time, columns, (events, status, None))
     by_name = dict(zip(parameters, event_derivatives, strict=True))
     return Sensitivities(run, _Derivatives(model, run, derivatives, tuple(parameters)), by_name)
 
@@ -376,7 +384,7 @@ class _Derivatives(Mapping[str, Trajectory]):
         # All passes but the last are for as many parameters.
         number, place = divmod(self.parameters.index(name), self.passes[0][0].shape[1])
         columns = [column[:, place] for column in self.passes[number]]
-        return _trajectory(self.model, self.run.time, columns, ([], self.run.status, None))
+        return _build_trajectory(self.model, self.run.time, columns, ([], self.run.status, None))
 
     def __iter__(self) -> Iterator[str]:
         return iter(dict.fromkeys(self.parameters))
@@ -385,7 +393,7 @@ class _Derivatives(Mapping[str, Trajectory]):
         return len(set(self.parameters))
 
 
-def inputs_of(engine_torque: Signal, pressures: Mapping[str, Signal]) -> dict[str, Signal]:
+def collect_inputs(engine_torque: Signal, pressures: Mapping[str, Signal]) -> dict[str, Signal]:
     """Collect the inputs of a dual clutch by their names in the core.
 
     Raises InputError where an element has the name of the engine's torque.
@@ -398,12 +406,12 @@ def inputs_of(engine_torque: Signal, pressures: Mapping[str, Signal]) -> dict[st
     return {ENGINE_TORQUE: engine_torque, **pressures}
 
 
-def samples(inputs: Mapping[str, Signal]) -> list[tuple[str, FloatArray, FloatArray]]:
+def to_core_samples(inputs: Mapping[str, Signal]) -> list[tuple[str, FloatArray, FloatArray]]:
     """Inputs as the core takes them: name, times [s] at which the values act, values."""
     return [(name, as_array(one.arrival), as_array(one.values)) for name, one in inputs.items()]
 
 
-def delayed_samples(
+def to_delayed_core_samples(
     inputs: Mapping[str, Signal],
 ) -> list[tuple[str, FloatArray, FloatArray, float]]:
     """Inputs whose delays the core differentiates by: name, sample times [s], values, delay [s]."""
@@ -427,13 +435,13 @@ def require_delays(inputs: Mapping[str, Signal], by: Sequence[str]) -> None:
             )
 
 
-def plain_start(start: State) -> tuple[float, float, float, float, list[str]]:
+def to_core_start(start: State) -> tuple[float, float, float, float, list[str]]:
     """A start as the core takes it. Raises InputError where `locked` is a text."""
     speeds = (start.engine_speed, start.output_speed, start.wheel_speed)
     return (*speeds, start.twist, as_names(start.locked))
 
 
-def _trajectory(
+def _build_trajectory(
     model: DualClutch,
     time: FloatArray,
     columns: Iterable[FloatArray],

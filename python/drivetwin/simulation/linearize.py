@@ -70,14 +70,14 @@ class LinearSystem:
     inputs: tuple[str, ...]
     outputs: tuple[Output, ...]
 
-    def eigenvalues(self) -> NDArray[np.complex128]:
+    def compute_eigenvalues(self) -> NDArray[np.complex128]:
         """Eigenvalues of A [1/s], by magnitude."""
         values = np.asarray(np.linalg.eigvals(self.A), dtype=np.complex128)
         return np.asarray(values[np.argsort(np.abs(values), kind="stable")])
 
-    def oscillations(self) -> tuple[Oscillation, ...]:
+    def find_oscillations(self) -> tuple[Oscillation, ...]:
         """Modes that swing, by frequency; what is critically damped to 1e-12 does not."""
-        values = self.eigenvalues()
+        values = self.compute_eigenvalues()
         sizes = np.abs(values)
         # Round-off parts the two equal eigenvalues of critical damping by its square root.
         pairs = values[values.imag > np.maximum(1e-6 * sizes, 1e-9 * sizes.max(initial=1.0))]
@@ -86,7 +86,7 @@ class LinearSystem:
         ]
         return tuple(sorted(found, key=lambda o: o.frequency))
 
-    def frequency_response(self, frequency: FloatArray) -> NDArray[np.complex128]:
+    def compute_frequency_response(self, frequency: FloatArray) -> NDArray[np.complex128]:
         """Exact response C (jω - A)⁻¹ B + D at `frequency` (n,) [Hz]: (n, outputs, inputs).
 
         States that no input moves, as the slip of a locked element, stay as they are.
@@ -98,25 +98,25 @@ class LinearSystem:
         try:
             states = np.linalg.solve(moved, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
         except np.linalg.LinAlgError:
-            states = np.stack([_forced(one, self.B) for one in moved])
+            states = np.stack([_solve_forced_states(one, self.B) for one in moved])
         return np.asarray(self.C @ states + self.D)
 
 
-def _forced(moved: NDArray[np.complex128], by: FloatArray) -> NDArray[np.complex128]:
+def _solve_forced_states(moved: NDArray[np.complex128], by: FloatArray) -> NDArray[np.complex128]:
     """States X (n, inputs) of `moved` X = `by`, zero in every combination that no input moves.
 
     Such a combination w has w·`moved` = 0 and w·`by` = 0: the slip of a locked element, or the
     difference of the twists of two shafts side by side. Rows and columns are brought to one size,
     so that the zero test does not depend on units. Raises InputError where X is not unique even so.
     """
-    rows = 1.0 / _sizes(np.hstack([moved, by]), 1)
+    rows = 1.0 / _compute_sizes(np.hstack([moved, by]), 1)
     forces = rows * by
-    columns = 1.0 / _sizes(rows * moved, 0)
+    columns = 1.0 / _compute_sizes(rows * moved, 0)
     scaled = rows * moved * columns
-    every = np.hstack([scaled, forces / _sizes(forces, 0)])
+    every = np.hstack([scaled, forces / _compute_sizes(forces, 0)])
     still = null_space(every.conj().T, rcond=_ZERO).conj().T
     held = still * rows.T * columns
-    whole = np.vstack([scaled, held / _sizes(held, 1)])
+    whole = np.vstack([scaled, held / _compute_sizes(held, 1)])
     silent = np.zeros((len(held), by.shape[1]))
     found, _, rank, _ = np.linalg.lstsq(whole, np.vstack([forces, silent]), rcond=_ZERO)
     if rank < len(moved):
@@ -127,7 +127,7 @@ def _forced(moved: NDArray[np.complex128], by: FloatArray) -> NDArray[np.complex
     return np.asarray(columns.T * found)
 
 
-def _sizes(matrix: NDArray[np.complex128] | FloatArray, axis: int) -> FloatArray:
+def _compute_sizes(matrix: NDArray[np.complex128] | FloatArray, axis: int) -> FloatArray:
     """Largest magnitude along an axis, which is kept; 1 where all are zero."""
     largest = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)
     return np.where(largest > 0.0, largest, 1.0)
@@ -162,7 +162,7 @@ def linearise(
     except ValueError as error:
         raise InputError(str(error), "correct the description or the names") from error
     a, b, c, d = matrices
-    held = _held(elements or ())
+    held = _collect_inactive_inputs(elements or ())
     moving = [i for i, name in enumerate(inputs) if name not in held]
     return LinearSystem(
         a,
@@ -188,7 +188,7 @@ def _check(locked: Sequence[str], points: Mapping[str, Slip], outputs: Sequence[
         )
 
 
-def _held(elements: Sequence[Element]) -> set[object]:
+def _collect_inactive_inputs(elements: Sequence[Element]) -> set[object]:
     """Names of the inputs of elements that are not part of the linear system."""
     fields = [(one, _HELD.get(str(one.get("type")))) for one in elements]
     return {one.get(field) for one, field in fields if field}

@@ -22,7 +22,7 @@ from drivetwin.simulation.dual_clutch import (
     FloatArray,
     Signal,
     run_time,
-    samples,
+    to_core_samples,
 )
 from drivetwin.simulation.serialize import as_json, as_names
 
@@ -32,7 +32,7 @@ Output = tuple[OutputKind, str]
 """What to record and of which node or element."""
 
 
-def element(kind: str, name: str, **fields: object) -> Element:
+def build_element(kind: str, name: str, **fields: object) -> Element:
     """Return an element of this type and name with the fields of its kind."""
     return {"type": kind, "name": name, **fields}
 
@@ -100,7 +100,7 @@ def simulate(
         columns, events, status, energy = native_simulate_network(
             as_json(list(elements)),
             json.dumps([{kind: name} for kind, name in outputs]),
-            (samples(sampled), sines),
+            (to_core_samples(sampled), sines),
             (list(start.speeds.items()), list(start.twists.items()), as_names(start.locked)),
             run_time(time),
             (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit),

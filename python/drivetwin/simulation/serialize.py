@@ -22,16 +22,16 @@ def as_json(description: object) -> str:
     are refused by name here: raises InputError, as for anything else that has no place in JSON.
     """
     try:
-        return json.dumps(description, default=_plain, allow_nan=False)
+        return json.dumps(description, default=_to_json_types, allow_nan=False)
     except ValueError:
-        plain = json.loads(json.dumps(description, default=_plain))
-    bad = [key for key, value in _leaves("", plain) if not np.isfinite(value)]
+        plain = json.loads(json.dumps(description, default=_to_json_types))
+    bad = [key for key, value in _iterate_leaves("", plain) if not np.isfinite(value)]
     raise InputError(
         f"not a finite number: {', '.join(bad)}", "give every parameter of the model a value"
     )
 
 
-def _plain(value: object) -> object:
+def _to_json_types(value: object) -> object:
     """Convert a value to JSON-serialisable types."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
@@ -45,14 +45,14 @@ def _plain(value: object) -> object:
     )
 
 
-def _leaves(path: str, value: object) -> Iterator[tuple[str, float]]:
+def _iterate_leaves(path: str, value: object) -> Iterator[tuple[str, float]]:
     if isinstance(value, Mapping):
         for key, item in value.items():
-            yield from _leaves(f"{path}.{key}" if path else str(key), item)
+            yield from _iterate_leaves(f"{path}.{key}" if path else str(key), item)
     elif isinstance(value, list | tuple):
         for i, item in enumerate(value):
             name = item.get("name") if isinstance(item, Mapping) else None
-            yield from _leaves(f"{path}[{i if name is None else name}]", item)
+            yield from _iterate_leaves(f"{path}[{i if name is None else name}]", item)
     elif isinstance(value, float):
         yield path, value
 

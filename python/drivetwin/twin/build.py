@@ -11,7 +11,7 @@ from drivetwin._util.plain_values import plain
 from drivetwin._util.version import program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
-from drivetwin.estimation.result.verdict import KNOWN, designed
+from drivetwin.estimation.result.verdict import KNOWN, from_prior
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
     parameters = dict(found.estimates)
     assumptions = list(found.assumptions)
     if "J_out" not in parameters and card.J_out is not None:
-        parameters["J_out"] = designed("J_out", card.J_out, KNOWN)
+        parameters["J_out"] = from_prior("J_out", card.J_out, KNOWN)
         assumptions.append("Jo′ is the vehicle card's value")
     assumptions += borrowed_friction(found)
     friction, load = _absolute(found)
@@ -37,7 +37,7 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
         i_in=card.i_in,
         final_drive=card.final_drive,
         gears={
-            gear.name: TwinGear(card.ratio(gear.name), card.element_of(gear.name))
+            gear.name: TwinGear(card.compute_ratio(gear.name), card.get_gear_element(gear.name))
             for gear in card.gears
         },
         elements={name: _element(card, name) for name in card.elements},
@@ -61,7 +61,7 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
 def _element(card: VehicleCard, name: str) -> TwinElement:
     """Design data of an element."""
     spec = card.elements[name]
-    i_c, i_out = card.clutch_ratios(name)
+    i_c, i_out = card.get_clutch_ratios(name)
     P0, drum = spec.P0.value, spec.drum_inertia.value
     return TwinElement(spec.kind, i_c, i_out, spec.gain, P0, spec.peak, drum)
 
@@ -72,8 +72,10 @@ def _absolute(found: Identification) -> tuple[dict[str, FrictionCurve], LoadLaw 
     if eta is None or eta.value is None:
         return found.friction, load
     by = (eta.value, eta.std_total or 0.0)
-    friction = {n: one.times(*by) if one.over_eta else one for n, one in found.friction.items()}
-    return friction, load.times(*by) if load is not None and load.over_eta else load
+    friction = {
+        n: one.scale_by_eta(*by) if one.over_eta else one for n, one in found.friction.items()
+    }
+    return friction, load.scale_by_eta(*by) if load is not None and load.over_eta else load
 
 
 def borrowed_friction(found: Identification) -> list[str]:

@@ -65,7 +65,7 @@ class TwinElement:
     peak: float
     drum: float
 
-    def spec(self, name: str) -> ElementSpec:
+    def to_spec(self, name: str) -> ElementSpec:
         """The same as on a vehicle card, all of it taken as known."""
         P0, drum = PriorValue(self.P0), PriorValue(self.drum)
         return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
@@ -105,7 +105,7 @@ class Twin(DisplayMixin):
     load_law: LoadLaw | None = None
     converter: Converter | None = None
 
-    def dual_clutch(
+    def build_dual_clutch(
         self,
         shift: Shift,
         *,
@@ -117,22 +117,22 @@ class Twin(DisplayMixin):
 
         Only Je = J1·η + J2e is identifiable: J′ = Je + Jo′/i_g² gives it, and it is carried as
         J2e = 0, J1 = Je/η. `overrides` sets parameters by id, in place of identified ones: any of
-        `model_ids`, of the two J′ one.
+        `list_model_ids`, of the two J′ one.
         What is known over η only counts times the twin's own η, else times that of the overrides.
-        Without either (`over_eta`) η is 1: the speeds are the same, all torques are then over η.
-        `load` [N m] is T_v/i_f on the road of this shift, known as the twin's own is.
+        Without either (`divide_by_eta`) η is 1: the speeds are the same, all torques are then over
+        η. `load` [N m] is T_v/i_f on the road of this shift, known as the twin's own is.
         Raises MissingParameterError naming every parameter that neither source gives, and
         InputError for a gear or element the twin does not know and for an override without effect.
         """
         given = dict(overrides or {})
         self._refuse_idle(shift, given)
-        gear = self.inertia_gear(shift, given)
+        gear = self.select_inertia_gear(shift, given)
         inertia_id = f"J_prime_{gear}"
-        scale = self.value("eta", given.get("eta", 1.0))
+        scale = self.get_value("eta", given.get("eta", 1.0))
         if load is not None:
             given = {"Tv_over_if": scale * load if self.over_eta else load, **given}
-        values = self._values((*COMMON, inertia_id), given, scale)
-        J_e = values[inertia_id] - values["J_out"] / self.gear(gear).ratio ** 2
+        values = self._get_values((*COMMON, inertia_id), given, scale)
+        J_e = values[inertia_id] - values["J_out"] / self.get_gear(gear).ratio ** 2
         return DualClutch(
             J1=J_e / values["eta"],
             J2e=0.0,
@@ -144,9 +144,9 @@ class Twin(DisplayMixin):
             J_v=values["J_vehicle"],
             k_o=values["k_o"],
             c_o=values["c_o"],
-            load=self._load(values["Tv_over_if"], scale),
+            load=self._build_load(values["Tv_over_if"], scale),
             elements=tuple(
-                self._element(name, partner, given, scale)
+                self._build_element(name, partner, given, scale)
                 for name, partner in (
                     (shift.offgoing, shift.oncoming),
                     (shift.oncoming, shift.offgoing),
@@ -154,14 +154,14 @@ class Twin(DisplayMixin):
             ),
         )
 
-    def model_ids(self, shift: Shift) -> tuple[str, ...]:
+    def list_model_ids(self, shift: Shift) -> tuple[str, ...]:
         """Ids of the parameters that the model of a shift is made from."""
         inertias = (f"J_prime_{gear}" for gear in (shift.start_gear, shift.end_gear))
         elements = (shift.offgoing, shift.oncoming)
         own = (f"{stem}.{element}" for stem in OF_ELEMENT for element in elements)
         return (*COMMON, *inertias, *own)
 
-    def card(self) -> VehicleCard:
+    def build_card(self) -> VehicleCard:
         """The vehicle card, as far as it takes to read another log and find its shifts."""
         return VehicleCard(
             name=self.name,
@@ -172,19 +172,21 @@ class Twin(DisplayMixin):
                 Gear(name, gear.ratio / self.i_in, (gear.element,))
                 for name, gear in self.gears.items()
             ),
-            elements={name: one.spec(name) for name, one in self.elements.items()},
+            elements={name: one.to_spec(name) for name, one in self.elements.items()},
             J_prime_range=self.J_prime_range,
             J_vehicle_range=self.J_vehicle_range,
             channels=self.channels,
             converter=self.converter,
         )
 
-    def _load(self, Tv_over_if: float, scale: float) -> RoadLoad:
+    def _build_load(self, Tv_over_if: float, scale: float) -> RoadLoad:
         """Load at the wheel: constant, or with the part that grows with speed."""
         law = self.load_law or LoadLaw(aero=0.0, std=0.0, mean_speed=0.0)
-        return (law.times(scale) if law.over_eta else law).road_load(Tv_over_if, self.final_drive)
+        return (law.scale_by_eta(scale) if law.over_eta else law).to_road_load(
+            Tv_over_if, self.final_drive
+        )
 
-    def gear(self, name: str) -> TwinGear:
+    def get_gear(self, name: str) -> TwinGear:
         """Gear by its name on the card. Raises InputError where the twin has none such."""
         try:
             return self.gears[name]
@@ -194,7 +196,7 @@ class Twin(DisplayMixin):
                 f"use one of {', '.join(self.gears)}",
             ) from None
 
-    def value(self, parameter_id: str, default: float) -> float:
+    def get_value(self, parameter_id: str, default: float) -> float:
         """Identified value, or `default` where the log could not tell it."""
         estimate = self.parameters.get(parameter_id)
         return default if estimate is None or estimate.value is None else estimate.value
@@ -202,15 +204,18 @@ class Twin(DisplayMixin):
     @property
     def over_eta(self) -> bool:
         """Whether torque-like quantities are known over η only: no output torque was measured."""
-        return self._known("J_vehicle") is None and self._known("J_vehicle" + OVER_ETA) is not None
+        return (
+            self._is_known("J_vehicle") is None
+            and self._is_known("J_vehicle" + OVER_ETA) is not None
+        )
 
-    def _known(self, parameter_id: str) -> float | None:
+    def _is_known(self, parameter_id: str) -> float | None:
         estimate = self.parameters.get(parameter_id)
         return None if estimate is None else estimate.value
 
     def _refuse_idle(self, shift: Shift, given: Mapping[str, float]) -> None:
         """Raise InputError for what the model of a shift does not depend on."""
-        ids = self.model_ids(shift)
+        ids = self.list_model_ids(shift)
         label = f"the model of shift {shift.start_gear}-{shift.end_gear}"
         if idle := [name for name in given if name not in ids]:
             raise InputError(
@@ -223,7 +228,9 @@ class Twin(DisplayMixin):
                 "override one of them",
             )
 
-    def inertia_gear(self, shift: Shift, overrides: Mapping[str, float] | None = None) -> str:
+    def select_inertia_gear(
+        self, shift: Shift, overrides: Mapping[str, float] | None = None
+    ) -> str:
         """Gear whose J′ carries the engine-side inertia in the model of a shift: overridden, else
         stated without an interval, else told most narrowly for its size."""
         given = overrides or {}
@@ -241,17 +248,17 @@ class Twin(DisplayMixin):
 
         return min((shift.start_gear, shift.end_gear), key=rank)
 
-    def _values(
+    def _get_values(
         self, ids: tuple[str, ...], given: Mapping[str, float], scale: float
     ) -> dict[str, float]:
         """Values of `ids`, all of which a model needs."""
         values, missing = {"eta": scale} if self.over_eta else {}, []
         for parameter_id in ids:
-            value = self._value(parameter_id, given, scale)
+            value = self._get_value(parameter_id, given, scale)
             if value is not None:
                 values[parameter_id] = value
             elif parameter_id not in values:
-                missing.append(f"{parameter_id} ({self._why_unknown(parameter_id)})")
+                missing.append(f"{parameter_id} ({self._describe_unknown(parameter_id)})")
         if missing:
             raise MissingParameterError(
                 f"the twin cannot be simulated without {'; '.join(missing)}",
@@ -260,21 +267,23 @@ class Twin(DisplayMixin):
             )
         return values
 
-    def _value(self, parameter_id: str, given: Mapping[str, float], scale: float) -> float | None:
+    def _get_value(
+        self, parameter_id: str, given: Mapping[str, float], scale: float
+    ) -> float | None:
         """Value of one parameter: given, told, or told over η and brought to `scale`."""
-        value = given.get(parameter_id, self._known(parameter_id))
-        ratio = self._known(parameter_id + OVER_ETA)
+        value = given.get(parameter_id, self._is_known(parameter_id))
+        ratio = self._is_known(parameter_id + OVER_ETA)
         if value is None and ratio is not None:
             value = scale * ratio
         return None if value is None else float(value)
 
-    def _why_unknown(self, parameter_id: str) -> str:
+    def _describe_unknown(self, parameter_id: str) -> str:
         estimate = self.parameters.get(parameter_id)
         if estimate is None:
             return "not part of the identification"
         return estimate.reason or estimate.verdict.value
 
-    def _element(
+    def _build_element(
         self, name: str, partner: str, given: Mapping[str, float], scale: float
     ) -> ShiftElement:
         try:
@@ -291,20 +300,20 @@ class Twin(DisplayMixin):
                 "identify from a log where one of them slips under load",
                 Where(file=self.name),
             )
-        P0, drum = (self._value(f"{stem}.{name}", given, scale) for stem in OF_ELEMENT)
+        P0, drum = (self._get_value(f"{stem}.{name}", given, scale) for stem in OF_ELEMENT)
         return ShiftElement(
             name=name,
             i_c=design.i_c,
             i_out=design.i_out,
             gain=design.gain,
             P0=design.P0 if P0 is None else P0,
-            friction=friction_law(curve.times(scale) if curve.over_eta else curve),
+            friction=build_friction_law(curve.scale_by_eta(scale) if curve.over_eta else curve),
             peak=design.peak,
             drum_inertia=design.drum if drum is None else drum,
         )
 
 
-def friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
+def build_friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
     """Fitted Stribeck law, or the smoothed curve continued flat to zero slip."""
     if curve.stribeck is not None:
         return curve.stribeck

@@ -11,24 +11,24 @@ from drivetwin.errors import DrivetwinError, IdentificationError, Where
 from drivetwin.estimation.data.prepare import prepare_shift
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.multi_log.fit import of_one_log
-from drivetwin.estimation.multi_log.prediction_bounds import Expected, expected
+from drivetwin.estimation.multi_log.fit import extract_log
+from drivetwin.estimation.multi_log.prediction_bounds import ShiftPrediction, predict_shifts
 from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.estimation.result.validation import Bound, HeldOut, Validation
-from drivetwin.estimation.result.verdict import judge
+from drivetwin.estimation.result.validation import HeldOut, PredictionInterval, Validation
+from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA
-from drivetwin.shifts.coverage import near, recorded
-from drivetwin.shifts.lockup_clutch import behind_converter, require_closed
+from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
+from drivetwin.shifts.lockup_clutch import refer_to_turbine, require_locked_converter
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import validate
+from drivetwin.validation.simulate_log import simulate_shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 BEFORE = "likelihood, from the gear held before the shift"
 """Method of what is told of a log that was not fitted."""
 
 
-def hold_out(
+def predict_held_shifts(
     found: Identification,
     card: VehicleCard,
     log: ShiftLog,
@@ -40,42 +40,42 @@ def hold_out(
     `number` is that of the log in a fit of several, 0 where `found` is of other shifts of this log
     alone, and the next free one (from 1) for a log that the fit has not seen.
     """
-    return tuple(_one(found, card, log, shift, number) for shift in shifts)
+    return tuple(_predict_shift(found, card, log, shift, number) for shift in shifts)
 
 
-def _one(
+def _predict_shift(
     found: Identification, card: VehicleCard, log: ShiftLog, shift: Shift, number: int
 ) -> HeldOut:
     fit = found.evidence.likelihood
     try:
-        require_closed(log, card, shift)
-        log = behind_converter(log, card, shift)
-        fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
-        shift = near(recorded(log, shift, fills, card.i_in))
-        told = _expected(fit, card, log, shift, number)
-        mine, own = _of_log(found, log, number, told)
-        mine, notes = _with_law(mine, shift)
+        require_locked_converter(log, card, shift)
+        log = refer_to_turbine(log, card, shift)
+        fills = {name: card.get_element(name).P0 for name in (shift.offgoing, shift.oncoming)}
+        shift = trim_to_window(trim_to_recorded(log, shift, fills, card.i_in))
+        told = _predict_misfit(fit, card, log, shift, number)
+        mine, own = _select_log_estimates(found, log, number, told)
+        mine, notes = _ensure_friction_law(mine, shift)
         twin = build_twin(mine, card)
         start = None if told is None else (told.time, told.start)
-        run = validate(twin, log, shift, start=start)
+        run = simulate_shift(twin, log, shift, start=start)
     except DrivetwinError as fault:
         return HeldOut(log.source, shift, None, notes=(fault.what,))
-    bounds = {} if told is None else _of_signals(told.bounds, run, log, card)
+    bounds = {} if told is None else _map_signal_bounds(told.bounds, run, log, card)
     return HeldOut(log.source, shift, run, own, bounds, (*notes, *run.warnings))
 
 
-def _expected(
+def _predict_misfit(
     fit: LikelihoodFit | None, card: VehicleCard, log: ShiftLog, shift: Shift, number: int
-) -> Expected | None:
+) -> ShiftPrediction | None:
     """Predict the misfit expected by the likelihood; None for another method."""
     if fit is None:
         return None
     data = prepare_shift(log, card, shift)
-    return expected(fit, [replace(data, signals=replace(data.signals, log=number))])[0]
+    return predict_shifts(fit, [replace(data, signals=replace(data.signals, log=number))])[0]
 
 
-def _of_log(
-    found: Identification, log: ShiftLog, number: int, told: Expected | None
+def _select_log_estimates(
+    found: Identification, log: ShiftLog, number: int, told: ShiftPrediction | None
 ) -> tuple[Identification, dict[str, Estimate]]:
     """The identification with what the log has of its own: from the fit, else as `told`.
 
@@ -86,7 +86,7 @@ def _of_log(
     if number == 0:
         return found, {}
     if several is not None and number <= len(several.logs):
-        return of_one_log(found, several.logs[number - 1]), {}
+        return extract_log(found, several.logs[number - 1]), {}
     if told is None:
         raise IdentificationError(
             "load and age of the engine torque of a log that was not fitted are told by the "
@@ -94,47 +94,49 @@ def _of_log(
             "use --method likelihood, or hold out a shift of a log whose other shifts are fitted",
             Where(file=log.source),
         )
-    base = found if several is None else of_one_log(found, several.logs[0])
+    base = found if several is None else extract_log(found, several.logs[0])
     load = None if base.load is None else replace(base.load, mean_speed=told.mean_speed)
-    own = _own(base, told)
+    own = _collect_log_specific(base, told)
     estimates = {**base.estimates, **own}
     ordered = {name: one for name, one in estimates.items() if name in own}
     return replace(base, estimates=estimates, load=load), ordered
 
 
-def _own(base: Identification, told: Expected) -> dict[str, Estimate]:
+def _collect_log_specific(base: Identification, told: ShiftPrediction) -> dict[str, Estimate]:
     """Estimates of what the log has of its own; where η is from design also times η."""
     made: dict[str, Estimate] = {}
     for name, (value, std) in told.own.items():
         ratio = name + OVER_ETA
         if ratio in base.estimates:
-            made[ratio] = _estimate(ratio, value, std)
+            made[ratio] = _build_estimate(ratio, value, std)
             eta = base.estimates["eta"].value
             if eta is not None:
-                made[name] = _estimate(name, eta * value, eta * std)
+                made[name] = _build_estimate(name, eta * value, eta * std)
         elif name in base.estimates:
-            made[name] = _estimate(name, value, std)
+            made[name] = _build_estimate(name, value, std)
     return made
 
 
-def _estimate(name: str, value: float, std: float) -> Estimate:
+def _build_estimate(name: str, value: float, std: float) -> Estimate:
     """The best value that there is before the shift, be it as weak as it may."""
-    wide = judge(name, value, std, BEFORE).verdict is not Verdict.IDENTIFIED
+    wide = assess(name, value, std, BEFORE).verdict is not Verdict.IDENTIFIED
     return Estimate(name, value, std, Verdict.WEAK if wide else Verdict.IDENTIFIED, BEFORE)
 
 
-def _of_signals(
-    bounds: Mapping[str, Bound], run: Validation, log: ShiftLog, card: VehicleCard
-) -> dict[str, Bound]:
+def _map_signal_bounds(
+    bounds: Mapping[str, PredictionInterval], run: Validation, log: ShiftLog, card: VehicleCard
+) -> dict[str, PredictionInterval]:
     """Bounds by compared signal; the fit sees the engine's speed where it has the input's."""
     found = dict(bounds)
     if "engine_speed" in found and "engine_speed" not in log:
         one = found.pop("engine_speed")
-        found["input_speed"] = Bound(one.usual / card.i_in, one.largest / card.i_in)
+        found["input_speed"] = PredictionInterval(one.usual / card.i_in, one.largest / card.i_in)
     return {name: one for name, one in found.items() if name in run.fit}
 
 
-def _with_law(found: Identification, shift: Shift) -> tuple[Identification, tuple[str, ...]]:
+def _ensure_friction_law(
+    found: Identification, shift: Shift
+) -> tuple[Identification, tuple[str, ...]]:
     """The identification with a law for the on-coming element, and whose it is if another's.
 
     That of the off-going element if it has one, else that of any other: facings are alike.

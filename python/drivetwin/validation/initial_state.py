@@ -9,7 +9,7 @@ import numpy as np
 
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, Where
-from drivetwin.estimation.data.noise import white_noise
+from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, State
@@ -38,7 +38,7 @@ class _Local:
     scatter: float
 
 
-def calm_moment(log: ShiftLog, span: tuple[float, float]) -> float:
+def find_quiescent_time(log: ShiftLog, span: tuple[float, float]) -> float:
     """First time in `span` [s] at which a local fit describes the output torque, clear of gaps.
 
     In the lock-up oscillation of the shift before, or in a throttle step, the shaft's state cannot
@@ -50,12 +50,12 @@ def calm_moment(log: ShiftLog, span: tuple[float, float]) -> float:
     if "output_torque" not in log or times.size == 0:
         return float(times[0]) if times.size else span[0]
     torque = log["output_torque"]
-    scatter = np.array([_local(torque, float(time)).scatter for time in times])
+    scatter = np.array([_fit_local(torque, float(time)).scatter for time in times])
     calm = scatter <= _CALM * np.median(scatter) + _RIPPLE * float(np.abs(torque.values).max())
     return float(times[np.argmax(calm)])
 
 
-def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> State:
+def estimate_start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> State:
     """State at `time` [s] with the off-going element of `shift` locked.
 
     Output torque and its slope give the shaft's twist and twist rate; the speeds are then pooled
@@ -64,16 +64,18 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
     torque in steady state.
     Raises MissingChannelError where neither input nor output speed is there.
     """
-    ratio = model.ratio(shift.offgoing)
-    torque = _local(log["output_torque"], time) if _runs(log, "output_torque", time) else None
+    ratio = model.get_overall_ratio(shift.offgoing)
+    torque = (
+        _fit_local(log["output_torque"], time) if _is_recorded(log, "output_torque", time) else None
+    )
     rate = torque.slope / model.k_o if torque is not None else 0.0
     motions = []
-    if _runs(log, "input_speed", time):
-        motions.append((_local(log["input_speed"], time), ratio / model.i_in, 0.0))
-    if _runs(log, "output_speed", time):
-        motions.append((_local(log["output_speed"], time), 1.0, 0.0))
-    if _runs(log, "wheel_speed", time):
-        motions.append((_local(log["wheel_speed"], time), 1.0 / model.i_f, rate))
+    if _is_recorded(log, "input_speed", time):
+        motions.append((_fit_local(log["input_speed"], time), ratio / model.i_in, 0.0))
+    if _is_recorded(log, "output_speed", time):
+        motions.append((_fit_local(log["output_speed"], time), 1.0, 0.0))
+    if _is_recorded(log, "wheel_speed", time):
+        motions.append((_fit_local(log["wheel_speed"], time), 1.0 / model.i_f, rate))
     if not motions:
         raise MissingChannelError(
             "no channel for input, output or wheel speed: the simulation has no start",
@@ -87,8 +89,8 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
     if torque is not None:
         carried = torque.value - model.c_o * rate
     else:
-        engine_torque = _local(log["engine_torque"], time).value
-        carried = model.steady_torque(engine_torque, ratio, wheel_speed)
+        engine_torque = _fit_local(log["engine_torque"], time).value
+        carried = model.compute_steady_torque(engine_torque, ratio, wheel_speed)
     return State(
         engine_speed=ratio * output_speed,
         output_speed=output_speed,
@@ -98,12 +100,12 @@ def start_state(model: DualClutch, log: ShiftLog, shift: Shift, time: float) -> 
     )
 
 
-def _runs(log: ShiftLog, role: str, time: float) -> bool:
+def _is_recorded(log: ShiftLog, role: str, time: float) -> bool:
     """Return True if a channel is recorded at `time` [s]."""
     return role in log and bool(log[role].time[0] - _SPAN <= time <= log[role].time[-1])
 
 
-def _local(channel: Channel, time: float) -> _Local:
+def _fit_local(channel: Channel, time: float) -> _Local:
     """Polynomial fit over the first moments from `time`; at least two samples are taken."""
     first = int(np.searchsorted(channel.time, time - 1e-9))
     count = max(2, int(np.searchsorted(channel.time, time + _SPAN) - first))
@@ -115,7 +117,7 @@ def _local(channel: Channel, time: float) -> _Local:
     freedom = max(1, values.size - coefficients.size)
     scatter = float(np.sqrt(np.sum((values - design @ coefficients) ** 2) / freedom))
     # A few samples may by chance agree better than their noise allows.
-    noise = max(scatter, white_noise(channel.values))
+    noise = max(scatter, estimate_white_noise(channel.values))
     floor = 1e-9 * (1.0 + float(np.abs(values).max()))
     return _Local(
         value=float(coefficients[0]),

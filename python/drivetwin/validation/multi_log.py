@@ -6,21 +6,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivetwin._util.progress import part
+from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, Where
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.multi_log.fit import of_one_log
+from drivetwin.estimation.multi_log.fit import extract_log
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.validation import HeldOut
 from drivetwin.pipeline import identify, identify_jointly
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.split_gears import apart
+from drivetwin.shifts.split_gears import split_shared_gears
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.cross_validation import hold_out
-from drivetwin.validation.simulate_log import validated, with_fit
+from drivetwin.validation.cross_validation import predict_held_shifts
+from drivetwin.validation.simulate_log import attach_fit, attach_validation
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -32,7 +32,7 @@ class Source:
     shifts: FoundShifts
     held: frozenset[int] = frozenset()
 
-    def split(self) -> tuple[FoundShifts, FoundShifts]:
+    def split_shifts(self) -> tuple[FoundShifts, FoundShifts]:
         """Shifts to fit and shifts to predict, which share no sample.
 
         Raises InputError for a number that no shift has.
@@ -47,7 +47,7 @@ class Source:
             )
         if not self.held:
             return self.shifts, FoundShifts((), ())
-        numbered = list(enumerate(apart(self.shifts.shifts), 1))
+        numbered = list(enumerate(split_shared_gears(self.shifts.shifts), 1))
         kept = tuple(shift for k, shift in numbered if k not in self.held)
         return (
             FoundShifts(kept, self.shifts.rejected),
@@ -56,7 +56,7 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class JointIdentification:
     """Result of a joint identification: the identification, the fitted logs, a twin by source."""
 
     found: Identification
@@ -66,7 +66,7 @@ class Together:
 
 def identify_together(
     sources: Sequence[Source], card: VehicleCard, method: Method = DEFAULT_METHOD
-) -> Together:
+) -> JointIdentification:
     """Identify one driveline from the shifts of all `sources` that are not held out.
 
     The identification is simulated over the logs (`fit`); `evidence.held_out` has every shift
@@ -74,7 +74,7 @@ def identify_together(
     Raises InputError where nothing is left to fit or several logs are asked of another method,
     and what `identify` and `identify_jointly` raise.
     """
-    splits = [source.split() for source in sources]
+    splits = [source.split_shifts() for source in sources]
     fitted = [k for k, (kept, _) in enumerate(splits) if kept.shifts]
     if not fitted:
         raise InputError(
@@ -82,7 +82,7 @@ def identify_together(
             "leave out a --hold-out, or add a log",
         )
     logs, shifts = [sources[k].log for k in fitted], [splits[k][0] for k in fitted]
-    with part(0.0, 0.85):
+    with scale_progress(0.0, 0.85):
         if len(fitted) == 1:
             found = identify(logs[0], card, shifts[0], method)
             numbers = {fitted[0]: 0}
@@ -90,15 +90,17 @@ def identify_together(
             _require_likelihood(method)
             found = identify_jointly(logs, card, shifts)
             numbers = {k: number for number, k in enumerate(fitted, 1)}
-    with part(0.85, 0.92, "simulating the shifts"):
-        found, twins = _simulated(found, card, logs)
-    with part(0.92, 1.0, "predicting what was held out"):
-        held = _predicted(found, card, sources, [late.shifts for _, late in splits], numbers)
+    with scale_progress(0.85, 0.92, "simulating the shifts"):
+        found, twins = _attach_simulations(found, card, logs)
+    with scale_progress(0.92, 1.0, "predicting what was held out"):
+        held = _predict_held_shifts(
+            found, card, sources, [late.shifts for _, late in splits], numbers
+        )
     if held:
         found = replace(found, evidence=replace(found.evidence, held_out=held))
     read = [*(source.log.inputs for source in sources), card.inputs]
     found = replace(found, inputs={name: sha for one in read for name, sha in one.items()})
-    return Together(found, tuple(logs), twins)
+    return JointIdentification(found, tuple(logs), twins)
 
 
 def _require_likelihood(method: Method) -> None:
@@ -109,19 +111,19 @@ def _require_likelihood(method: Method) -> None:
         )
 
 
-def _simulated(
+def _attach_simulations(
     found: Identification, card: VehicleCard, logs: Sequence[ShiftLog]
 ) -> tuple[Identification, dict[str, Twin]]:
     """The identification with the fit over all logs, each with what it has of its own."""
     several = found.evidence.several
     if several is None:
         twin = build_twin(found, card)
-        return validated(found, twin, logs[0]), {logs[0].source: twin}
+        return attach_validation(found, twin, logs[0]), {logs[0].source: twin}
     twins, views = {}, []
     for share, log in zip(several.logs, logs, strict=True):
-        mine = of_one_log(replace(found, warnings=()), share)
+        mine = extract_log(replace(found, warnings=()), share)
         twins[log.source] = build_twin(mine, card)
-        views.append(validated(mine, twins[log.source], log))
+        views.append(attach_validation(mine, twins[log.source], log))
     shares = tuple(
         replace(share, fit=view.fit) for share, view in zip(several.logs, views, strict=True)
     )
@@ -132,12 +134,12 @@ def _simulated(
         if not view.fit
         for text in view.warnings
     ]
-    found = with_fit(replace(found, warnings=(*found.warnings, *missing)), runs)
+    found = attach_fit(replace(found, warnings=(*found.warnings, *missing)), runs)
     evidence = replace(found.evidence, several=replace(several, logs=shares))
     return replace(found, evidence=evidence), twins
 
 
-def _predicted(
+def _predict_held_shifts(
     found: Identification,
     card: VehicleCard,
     sources: Sequence[Source],
@@ -149,5 +151,5 @@ def _predicted(
     return tuple(
         one
         for k, (source, shifts) in enumerate(zip(sources, held, strict=True))
-        for one in hold_out(found, card, source.log, shifts, numbers.get(k, free))
+        for one in predict_held_shifts(found, card, source.log, shifts, numbers.get(k, free))
     )

@@ -8,20 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.progress import tell
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin._util.progress import notify_progress
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, SignalFit
 from drivetwin.estimation.result.validation import SignalTrace, Validation
-from drivetwin.shifts.coverage import near, recorded
-from drivetwin.shifts.lockup_clutch import behind_converter
-from drivetwin.shifts.pressures import shift_pressures
+from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
+from drivetwin.shifts.lockup_clutch import refer_to_turbine
+from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory, simulate
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.initial_state import calm_moment, start_state
+from drivetwin.validation.initial_state import estimate_start_state, find_quiescent_time
 from drivetwin.vehicle.spec import PriorValue
 
 SIGNALS = ("output_torque", "input_speed", "output_speed")
@@ -35,7 +35,7 @@ Start = tuple[float, State]
 """Time [s] and state from which a simulation starts."""
 
 
-def validate(
+def simulate_shift(
     twin: Twin,
     log: ShiftLog,
     shift: Shift,
@@ -50,26 +50,26 @@ def validate(
     Raises MissingChannelError, MissingParameterError, DamagedChannelError where an input has a gap
     in the shift or a compared channel knows nothing of it; a run that fails returns its status.
     """
-    model = model or twin.dual_clutch(shift)
+    model = model or twin.build_dual_clutch(shift)
     fills = {one.name: PriorValue(one.P0) for one in model.elements}
-    seen = behind_converter(log, twin.card(), shift)
-    shift = near(recorded(seen, shift, fills, model.i_in))
-    window = _window(log, shift)
+    seen = refer_to_turbine(log, twin.build_card(), shift)
+    shift = trim_to_window(trim_to_recorded(seen, shift, fills, model.i_in))
+    window = _select_window(log, shift)
     if start is None:
-        return _simulated(twin, log, shift, model, window)
-    return _simulated(twin, log, shift, model, (start[0], window[1]), start[1])
+        return _simulate_window(twin, log, shift, model, window)
+    return _simulate_window(twin, log, shift, model, (start[0], window[1]), start[1])
 
 
-def simulated_again(before: Validation, twin: Twin, log: ShiftLog, model: DualClutch) -> Validation:
+def rerun_shift(before: Validation, twin: Twin, log: ShiftLog, model: DualClutch) -> Validation:
     """The shift of `before` with another `model`, over the same window of the same log.
 
     For what follows a slider: the search for the window takes longer than the simulation.
     """
     window = (before.phases["before"][0], before.phases["after"][1])
-    return _simulated(twin, log, before.shift, model, window)
+    return _simulate_window(twin, log, before.shift, model, window)
 
 
-def _simulated(
+def _simulate_window(
     twin: Twin,
     log: ShiftLog,
     shift: Shift,
@@ -78,15 +78,17 @@ def _simulated(
     state: State | None = None,
 ) -> Validation:
     """Run and comparison over `window` [s], from `state` or from what the log shows there."""
-    log = behind_converter(log, twin.card(), shift)
-    engine_torque = _moved(log["engine_torque"], -twin.value("te_delay", 0.0))
-    pressures = {name: _signal(each) for name, each in shift_pressures(log, shift).items()}
+    log = refer_to_turbine(log, twin.build_card(), shift)
+    engine_torque = _apply_delay(log["engine_torque"], -twin.get_value("te_delay", 0.0))
+    pressures = {
+        name: _build_signal(each) for name, each in get_shift_pressures(log, shift).items()
+    }
     count = int((window[1] - window[0]) / _GRID + 1e-6)
     time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
-    start = state or start_state(model, log, shift, window[0])
+    start = state or estimate_start_state(model, log, shift, window[0])
     trajectory = simulate(model, engine_torque, pressures, start, time)
-    traces = _traces(model, log, trajectory)
-    phases = phases_of(shift, window)
+    traces = _build_traces(model, log, trajectory)
+    phases = clip_phases(shift, window)
     validation = Validation(
         shift=shift,
         model=model,
@@ -95,27 +97,27 @@ def _simulated(
         pressures=pressures,
         trajectory=trajectory,
         traces=traces,
-        fit={name: _fit(trace, phases) for name, trace in traces.items()},
+        fit={name: _compute_phase_fits(trace, phases) for name, trace in traces.items()},
         status=trajectory.status,
         warnings=(),
     )
-    return replace(validation, warnings=_warnings(twin, validation))
+    return replace(validation, warnings=_collect_warnings(twin, validation))
 
 
-def compared(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> Validation:
+def replace_run(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> Validation:
     """`before` with another run of the same shift in place of its own."""
-    traces = _traces(before.model, log, run)
+    traces = _build_traces(before.model, log, run)
     made = replace(
         before,
         trajectory=run,
         traces=traces,
-        fit={name: _fit(trace, before.phases) for name, trace in traces.items()},
+        fit={name: _compute_phase_fits(trace, before.phases) for name, trace in traces.items()},
         status=run.status,
     )
-    return replace(made, warnings=_warnings(twin, made))
+    return replace(made, warnings=_collect_warnings(twin, made))
 
 
-def with_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
+def attach_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
     """Identification with the fits of its validations entered: pooled over the shifts.
 
     Of their warnings count runs that ended early and those that left the speeds of their own log:
@@ -123,16 +125,16 @@ def with_fit(found: Identification, validations: Sequence[Validation]) -> Identi
     """
     if not validations:
         return found
-    warnings = tuple(text for one in validations for text in _strayed(one))
+    warnings = tuple(text for one in validations for text in _describe_divergence(one))
     return replace(
         found,
-        fit=_pooled_fit(validations),
+        fit=_compute_pooled_fit(validations),
         evidence=replace(found.evidence, validation=tuple(validations)),
         warnings=found.warnings + warnings,
     )
 
 
-def validated(found: Identification, twin: Twin, log: ShiftLog) -> Identification:
+def attach_validation(found: Identification, twin: Twin, log: ShiftLog) -> Identification:
     """Identification with all its shifts simulated and compared.
 
     Where the log could not tell a parameter that the simulation needs, or holds nothing of a shift
@@ -140,21 +142,21 @@ def validated(found: Identification, twin: Twin, log: ShiftLog) -> Identificatio
     same. Raises MissingChannelError.
     """
     try:
-        return with_fit(found, list(_runs(twin, log, found)))
+        return attach_fit(found, list(_simulate_shifts(twin, log, found)))
     except (MissingParameterError, DamagedChannelError) as incomplete:
         return replace(found, warnings=(*found.warnings, f"no validation: {incomplete.what}"))
 
 
-def _runs(twin: Twin, log: ShiftLog, found: Identification) -> Iterator[Validation]:
+def _simulate_shifts(twin: Twin, log: ShiftLog, found: Identification) -> Iterator[Validation]:
     """Simulate one shift after the other, telling how far it is; on hills with its own load."""
     loads = found.evidence.loads
     for count, shift in enumerate(found.shifts):
-        tell(count / len(found.shifts))
-        model = twin.dual_clutch(shift, load=loads[count]) if loads else None
-        yield validate(twin, log, shift, model)
+        notify_progress(count / len(found.shifts))
+        model = twin.build_dual_clutch(shift, load=loads[count]) if loads else None
+        yield simulate_shift(twin, log, shift, model)
 
 
-def fit_of(measured: FloatArray, simulated: FloatArray, mean: FloatArray | float) -> SignalFit:
+def compute_fit(measured: FloatArray, simulated: FloatArray, mean: FloatArray | float) -> SignalFit:
     """Rmse and fit % = 100·(1 - ‖y - ŷ‖/‖y - mean‖) (THEORY section 4); arrays (n,), SI.
 
     `mean` is that of the log, or of each sample's log (n,) where samples of several are pooled.
@@ -168,7 +170,7 @@ def fit_of(measured: FloatArray, simulated: FloatArray, mean: FloatArray | float
     return SignalFit(miss / float(np.sqrt(measured.size)), percent)
 
 
-def phases_of(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[float, float]]:
+def clip_phases(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[float, float]]:
     """The four phases of THEORY section 4, cut to `window`."""
     return {
         "before": (window[0], shift.torque_phase[0]),
@@ -178,12 +180,12 @@ def phases_of(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[floa
     }
 
 
-def _window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
+def _select_window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
     """Span of the shift's four phases that all channels cover, from a calm moment on.
 
     Raises DamagedChannelError for a channel that knows nothing of the shift itself.
     """
-    roles = ["engine_torque", *map(pressure_role, (shift.offgoing, shift.oncoming))]
+    roles = ["engine_torque", *map(make_pressure_role, (shift.offgoing, shift.oncoming))]
     channels = [log[role] for role in (*roles, *(name for name in SIGNALS if name in log))]
     for channel in channels:
         if not channel.time[0] < shift.before[1] < channel.time[-1]:
@@ -195,14 +197,14 @@ def _window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
             )
     start = max(shift.before[0], *(channel.time[0] for channel in channels))
     end = min(shift.after[1], *(channel.time[-1] for channel in channels))
-    return calm_moment(log, (float(start), shift.before[1])), float(end)
+    return find_quiescent_time(log, (float(start), shift.before[1])), float(end)
 
 
-def _signal(channel: Channel) -> Signal:
+def _build_signal(channel: Channel) -> Signal:
     return Signal(channel.time, channel.values)
 
 
-def _moved(channel: Channel, shift: float) -> Signal:
+def _apply_delay(channel: Channel, shift: float) -> Signal:
     """Fresh samples moved by `shift` [s]; the last value is held to the end of the channel."""
     fresh = channel.updates
     time, values = fresh.time + shift, fresh.values
@@ -213,7 +215,7 @@ def _moved(channel: Channel, shift: float) -> Signal:
     return Signal(time, values)
 
 
-def simulated_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatArray]:
+def compute_run_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatArray]:
     """Compute each of SIGNALS (n,) from a run, on its own time; SI."""
     return {
         "output_torque": run.shaft_torque,
@@ -222,8 +224,8 @@ def simulated_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatArra
     }
 
 
-def _traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str, SignalTrace]:
-    simulated = simulated_signals(model, run)
+def _build_traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str, SignalTrace]:
+    simulated = compute_run_signals(model, run)
     traces = {}
     for name in SIGNALS:
         if name not in log:
@@ -240,12 +242,17 @@ def _traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str, Sign
     return traces
 
 
-def _fit(trace: SignalTrace, phases: Mapping[str, tuple[float, float]]) -> dict[str, SignalFit]:
+def _compute_phase_fits(
+    trace: SignalTrace, phases: Mapping[str, tuple[float, float]]
+) -> dict[str, SignalFit]:
     spans = {"all": None, **phases}
-    return {phase: fit_of(*_part(trace, span), trace.log_mean) for phase, span in spans.items()}
+    return {
+        phase: compute_fit(*_clip_trace(trace, span), trace.log_mean)
+        for phase, span in spans.items()
+    }
 
 
-def _pooled_fit(validations: Sequence[Validation]) -> dict[str, dict[str, SignalFit]]:
+def _compute_pooled_fit(validations: Sequence[Validation]) -> dict[str, dict[str, SignalFit]]:
     """Fits over the samples of all shifts together, by signal and phase."""
     pooled: dict[str, dict[str, SignalFit]] = {}
     for name in SIGNALS:
@@ -254,52 +261,54 @@ def _pooled_fit(validations: Sequence[Validation]) -> dict[str, dict[str, Signal
             continue
         pooled[name] = {}
         for phase in ("all", *validations[0].phases):
-            parts = [_part(trace, phases.get(phase)) for trace, phases in traces]
+            parts = [_clip_trace(trace, phases.get(phase)) for trace, phases in traces]
             measured, simulated = (np.concatenate(side) for side in zip(*parts, strict=True))
             means = [
                 np.full(seen.size, trace.log_mean)
                 for (trace, _), (seen, _) in zip(traces, parts, strict=True)
             ]
-            pooled[name][phase] = fit_of(measured, simulated, np.concatenate(means))
+            pooled[name][phase] = compute_fit(measured, simulated, np.concatenate(means))
     return pooled
 
 
-def _part(trace: SignalTrace, span: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
+def _clip_trace(
+    trace: SignalTrace, span: tuple[float, float] | None
+) -> tuple[FloatArray, FloatArray]:
     if span is None:
         return trace.measured, trace.simulated
     inside = (trace.time >= span[0]) & (trace.time <= span[1])
     return trace.measured[inside], trace.simulated[inside]
 
 
-def _warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
+def _collect_warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
     """Say where the run failed or left the range of the log behind the twin."""
     run = validation.trajectory
-    texts = _ended(run)
+    texts = _describe_early_end(run)
     seen = {
-        "slip": _slip_under_load(run),
+        "slip": _collect_loaded_slip(run),
         "pressure": [signal.values for signal in validation.pressures.values()],
         "torque": [validation.engine_torque.values],
         "speed": [run.engine_speed],
     }
     for name, arrays in seen.items():
         if name in twin.validity:
-            texts += _outside(name, arrays, twin.validity[name])
+            texts += _describe_outside(name, arrays, twin.validity[name])
     return tuple(texts)
 
 
-def _ended(run: Trajectory) -> list[str]:
+def _describe_early_end(run: Trajectory) -> list[str]:
     if run.status == "completed":
         return []
     return [f"simulation of the validation ended early: {run.status}"]
 
 
-def _strayed(one: Validation) -> list[str]:
+def _describe_divergence(one: Validation) -> list[str]:
     """Words for a run of the log behind a twin that goes where that log does not."""
-    texts, speed = _ended(one.trajectory), one.traces.get("input_speed")
+    texts, speed = _describe_early_end(one.trajectory), one.traces.get("input_speed")
     if speed is None or not np.isfinite(speed.measured).any():
         return texts
     limits = (float(np.nanmin(speed.measured)), float(np.nanmax(speed.measured)))
-    if (reached := _beyond([speed.simulated], limits)) is None:
+    if (reached := _find_range_excess([speed.simulated], limits)) is None:
         return texts
     shift = one.shift
     return [
@@ -310,7 +319,7 @@ def _strayed(one: Validation) -> list[str]:
     ]
 
 
-def _slip_under_load(run: Trajectory) -> list[FloatArray]:
+def _collect_loaded_slip(run: Trajectory) -> list[FloatArray]:
     """|slip| of each element while it carries torque [rad/s]; an open one may turn at any speed."""
     torques = {name: np.abs(torque) for name, torque in run.clutch_torque.items()}
     least = _CARRIES * max(float(np.nanmax(torque)) for torque in torques.values())
@@ -321,8 +330,10 @@ _RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N·m", "speed": "rad/s"
 """Units of what a twin has a range of."""
 
 
-def _outside(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -> list[str]:
-    if (reached := _beyond(arrays, limits)) is None:
+def _describe_outside(
+    name: str, arrays: list[FloatArray], limits: tuple[float, float]
+) -> list[str]:
+    if (reached := _find_range_excess(arrays, limits)) is None:
         return []
     return [
         f"the simulation leaves the twin's range of {name}: {reached[0]:.4g} to {reached[1]:.4g}, "
@@ -330,7 +341,9 @@ def _outside(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -
     ]
 
 
-def _beyond(arrays: list[FloatArray], limits: tuple[float, float]) -> tuple[float, float] | None:
+def _find_range_excess(
+    arrays: list[FloatArray], limits: tuple[float, float]
+) -> tuple[float, float] | None:
     """Least and greatest value; None where no value lies clearly beyond the limits."""
     values = np.concatenate(arrays)
     values = values[np.isfinite(values)]

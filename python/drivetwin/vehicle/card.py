@@ -7,11 +7,16 @@ import hashlib
 from pathlib import Path
 
 from drivetwin._util.toml import raise_faults, read_toml
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.errors import CardError
-from drivetwin.vehicle.check import card_faults
+from drivetwin.vehicle.check import check_card
 from drivetwin.vehicle.schema import CardFile, SensorsTable
-from drivetwin.vehicle.spec import ElementSpec, Gear, PriorValue, SensorTolerance, brake_ratios
+from drivetwin.vehicle.spec import (
+    ElementSpec,
+    Gear,
+    PriorValue,
+    SensorTolerance,
+)
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 __all__ = [
@@ -33,7 +38,7 @@ def load_card(path: Path | str) -> VehicleCard:
     """
     document = read_toml(path, CardError)
     raise_faults(
-        card_faults(document),
+        check_card(document),
         CardError,
         str(path),
         "correct these keys of the vehicle card; examples/vehicles holds complete cards",
@@ -46,20 +51,20 @@ def load_card(path: Path | str) -> VehicleCard:
         i_in=file.i_in,
         final_drive=file.final_drive,
         gears=tuple(Gear(gear.name, gear.ratio, tuple(gear.elements)) for gear in file.gears),
-        elements={name: table.spec(name) for name, table in file.elements.items()},
+        elements={name: table.to_spec(name) for name, table in file.elements.items()},
         J_prime_range=(file.inertia.J_prime_kgm2[0], file.inertia.J_prime_kgm2[1]),
         J_vehicle_range=(file.inertia.J_vehicle_kgm2[0], file.inertia.J_vehicle_kgm2[1]),
-        J_out=None if J_out is None else J_out.prior(),
-        sensors=_tolerances(file.sensors),
-        channels={role: table.spec() for role, table in file.channels.items()},
+        J_out=None if J_out is None else J_out.to_prior(),
+        sensors=_convert_tolerances(file.sensors),
+        channels={role: table.to_spec() for role, table in file.channels.iterate_roles()},
         source=str(path),
-        known={} if file.eta is None else {"eta": file.eta.prior()},
-        converter=None if file.converter is None else file.converter.spec(),
+        known={} if file.eta is None else {"eta": file.eta.to_prior()},
+        converter=None if file.converter is None else file.converter.to_spec(),
         sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
     )
 
 
-def _tolerances(sensors: SensorsTable) -> dict[str, SensorTolerance]:
+def _convert_tolerances(sensors: SensorsTable) -> dict[str, SensorTolerance]:
     stated = {role: table for role, table in sensors if role != "pressure" and table is not None}
-    stated |= {pressure_role(element): table for element, table in sensors.pressure.items()}
+    stated |= {make_pressure_role(element): table for element, table in sensors.pressure.items()}
     return {role: table.tolerance() for role, table in stated.items()}

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from drivetwin._util.toml import Fault, did_you_mean, schema_faults
+from drivetwin._util.toml import Fault, suggest_spelling, validate_schema
 from drivetwin.vehicle.schema import CardFile, ElementTable, GearTable
 
 Table = TypeVar("Table", bound=BaseModel)
@@ -17,46 +17,49 @@ RATIO_TOLERANCE = 5e-3
 """Relative; design sheets round ratios to three figures."""
 
 
-def card_faults(document: Mapping[str, Any]) -> list[Fault]:
+def check_card(document: Mapping[str, Any]) -> list[Fault]:
     """Return all faults of a card file, those of the schema first.
 
     The checks between tables run on the tables that are sound by themselves, so that one
     misspelt key does not hide an impossible ratio.
     """
     return [
-        *schema_faults(document, CardFile),
-        *_gear_faults(_gears(document)),
-        *_reference_faults(document),
-        *_ratio_faults(_gears(document), _elements(document)),
+        *validate_schema(document, CardFile),
+        *_check_gears(_parse_gears(document)),
+        *_check_references(document),
+        *_check_ratios(_parse_gears(document), _parse_elements(document)),
     ]
 
 
-def _sound(table: object, model: type[Table]) -> Table | None:
+def _is_valid_table(table: object, model: type[Table]) -> Table | None:
     try:
         return model.model_validate(table)
     except ValidationError:
         return None
 
 
-def _items(document: Mapping[str, Any], key: str) -> dict[str, Any]:
+def _get_tables(document: Mapping[str, Any], key: str) -> dict[str, Any]:
     table = document.get(key)
     return table if isinstance(table, dict) else {}
 
 
-def _gears(document: Mapping[str, Any]) -> dict[int, GearTable]:
+def _parse_gears(document: Mapping[str, Any]) -> dict[int, GearTable]:
     listed = document.get("gears")
-    gears = [_sound(table, GearTable) for table in listed] if isinstance(listed, list) else []
+    gears = (
+        [_is_valid_table(table, GearTable) for table in listed] if isinstance(listed, list) else []
+    )
     return {index: gear for index, gear in enumerate(gears) if gear is not None}
 
 
-def _elements(document: Mapping[str, Any]) -> dict[str, ElementTable]:
+def _parse_elements(document: Mapping[str, Any]) -> dict[str, ElementTable]:
     tables = {
-        name: _sound(table, ElementTable) for name, table in _items(document, "elements").items()
+        name: _is_valid_table(table, ElementTable)
+        for name, table in _get_tables(document, "elements").items()
     }
     return {name: table for name, table in tables.items() if table is not None}
 
 
-def _gear_faults(gears: Mapping[int, GearTable]) -> list[Fault]:
+def _check_gears(gears: Mapping[int, GearTable]) -> list[Fault]:
     faults = []
     names: set[str] = set()
     for index, gear in gears.items():
@@ -83,12 +86,14 @@ def _gear_faults(gears: Mapping[int, GearTable]) -> list[Fault]:
     return faults
 
 
-def _reference_faults(document: Mapping[str, Any]) -> list[Fault]:
+def _check_references(document: Mapping[str, Any]) -> list[Fault]:
     """Elements that a gear names but the card does not describe, and the reverse."""
-    described = _items(document, "elements")
-    gears = _gears(document)
+    described = _get_tables(document, "elements")
+    gears = _parse_gears(document)
     faults = [
-        Fault(f"gears[{index}].elements", f"no [elements.{name}]{did_you_mean(name, described)}")
+        Fault(
+            f"gears[{index}].elements", f"no [elements.{name}]{suggest_spelling(name, described)}"
+        )
         for index, gear in gears.items()
         for name in gear.elements
         if name not in described
@@ -103,14 +108,16 @@ def _reference_faults(document: Mapping[str, Any]) -> list[Fault]:
             if name not in used
         ]
     return faults + [
-        Fault(f"{section}.pressure.{name}", f"no [elements.{name}]{did_you_mean(name, described)}")
+        Fault(
+            f"{section}.pressure.{name}", f"no [elements.{name}]{suggest_spelling(name, described)}"
+        )
         for section in ("sensors", "channels")
-        for name in _items(_items(document, section), "pressure")
+        for name in _get_tables(_get_tables(document, section), "pressure")
         if name not in described
     ]
 
 
-def _ratio_faults(
+def _check_ratios(
     gears: Mapping[int, GearTable], elements: Mapping[str, ElementTable]
 ) -> list[Fault]:
     """i_c·i_out must be the ratio of the element's gear; a brake cannot make 1.00."""

@@ -30,7 +30,7 @@ class ConverterTable(StrictModel):
     scale: Annotated[float, Field(gt=0)] = 1.0
 
     @model_validator(mode="after")
-    def _fits(self) -> ConverterTable:
+    def _check_lengths(self) -> ConverterTable:
         lengths = {len(self.torque_ratio), len(self.pump_torque_at_1000rpm_Nm)}
         if lengths != {len(self.speed_ratio)}:
             raise ValueError("torque_ratio and pump_torque go with the points of speed_ratio")
@@ -54,7 +54,7 @@ class ConverterTable(StrictModel):
         return self
 
     @classmethod
-    def of(cls, converter: Converter) -> ConverterTable:
+    def from_converter(cls, converter: Converter) -> ConverterTable:
         """The table of a map in SI."""
         return cls(
             speed_ratio=list(converter.speed_ratio),
@@ -64,7 +64,7 @@ class ConverterTable(StrictModel):
             ],
         )
 
-    def spec(self) -> Converter:
+    def to_spec(self) -> Converter:
         """Return the map in SI."""
         per_square = self.scale / _PER_1000RPM**2
         return Converter(

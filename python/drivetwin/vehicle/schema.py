@@ -21,29 +21,31 @@ class PriorTable(StrictModel):
     value: float = Field(ge=0)
     std: float = Field(default=0.0, ge=0)
 
-    def prior(self, factor: float = 1.0) -> PriorValue:
+    def to_prior(self, factor: float = 1.0) -> PriorValue:
         """Return the value in SI, `factor` being the size of the file's unit."""
         return PriorValue(factor * self.value, factor * self.std)
 
 
-def _known(value: object) -> object:
+def _parse_exact_value(value: object) -> object:
     """Read a bare number as an exact value."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return {"value": value} if is_number else value
 
 
 PriorEntry = Annotated[
-    PriorTable, BeforeValidator(_known, json_schema_input_type=PriorTable | float)
+    PriorTable, BeforeValidator(_parse_exact_value, json_schema_input_type=PriorTable | float)
 ]
 
 
-def _increasing(limits: list[float]) -> list[float]:
+def _require_increasing(limits: list[float]) -> list[float]:
     if not 0 <= limits[0] < limits[1]:
         raise ValueError(f"a range is [low, high] with 0 <= low < high, not {limits}")
     return limits
 
 
-RangeEntry = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
+RangeEntry = Annotated[
+    list[float], Field(min_length=2, max_length=2), AfterValidator(_require_increasing)
+]
 
 
 class GearTable(StrictModel):
@@ -70,7 +72,7 @@ class ElementTable(StrictModel):
     i_out: float | None = None
 
     @model_validator(mode="after")
-    def _complete(self) -> ElementTable:
+    def _check_complete(self) -> ElementTable:
         geometry = (self.surfaces, self.derating, self.area_m2, self.radius_m)
         given = sum(part is not None for part in geometry)
         if (self.gain_m3 is None) == (given == 0) or given not in (0, len(geometry)):
@@ -93,15 +95,15 @@ class ElementTable(StrictModel):
         surfaces, area = self.surfaces or 0, self.area_m2 or 0.0
         return surfaces * (self.derating or 0.0) * area * (self.radius_m or 0.0)
 
-    def spec(self, name: str) -> ElementSpec:
+    def to_spec(self, name: str) -> ElementSpec:
         """Return the element in SI."""
         return ElementSpec(
             name=name,
             kind=self.kind,
             gain=self.gain,
-            P0=self.P0_bar.prior(BAR),
+            P0=self.P0_bar.to_prior(BAR),
             peak=self.peak,
-            drum_inertia=self.drum_inertia_kgm2.prior(),
+            drum_inertia=self.drum_inertia_kgm2.to_prior(),
             i_c=self.i_c,
             i_out=self.i_out,
         )
@@ -126,7 +128,7 @@ class EngineTorqueSensor(SensorTable):
 
     offset_tolerance_Nm: float = Field(default=0.0, ge=0)
 
-    def tolerance(self) -> SensorTolerance:
+    def to_tolerance(self) -> SensorTolerance:
         """Return the tolerances in SI."""
         return SensorTolerance(self.gain_tolerance, self.offset_tolerance_Nm)
 
@@ -136,7 +138,7 @@ class AgedSensor(SensorTable):
 
     age_tolerance_ms: float = Field(default=0.0, ge=0)
 
-    def _with_offset(self, offset: float) -> SensorTolerance:
+    def _make_tolerance(self, offset: float) -> SensorTolerance:
         """All tolerances in SI with that of the offset."""
         return SensorTolerance(self.gain_tolerance, offset, 1e-3 * self.age_tolerance_ms)
 
@@ -146,9 +148,9 @@ class TorqueSensor(AgedSensor):
 
     offset_tolerance_Nm: float = Field(default=0.0, ge=0)
 
-    def tolerance(self) -> SensorTolerance:
+    def to_tolerance(self) -> SensorTolerance:
         """Return the tolerances in SI."""
-        return self._with_offset(self.offset_tolerance_Nm)
+        return self._make_tolerance(self.offset_tolerance_Nm)
 
 
 class SpeedSensor(AgedSensor):
@@ -156,9 +158,9 @@ class SpeedSensor(AgedSensor):
 
     offset_tolerance_rpm: float = Field(default=0.0, ge=0)
 
-    def tolerance(self) -> SensorTolerance:
+    def to_tolerance(self) -> SensorTolerance:
         """Return the tolerances in SI."""
-        return self._with_offset(self.offset_tolerance_rpm * RPM)
+        return self._make_tolerance(self.offset_tolerance_rpm * RPM)
 
 
 class PressureSensor(AgedSensor):
@@ -166,9 +168,9 @@ class PressureSensor(AgedSensor):
 
     offset_tolerance_bar: float = Field(default=0.0, ge=0)
 
-    def tolerance(self) -> SensorTolerance:
+    def to_tolerance(self) -> SensorTolerance:
         """Return the tolerances in SI."""
-        return self._with_offset(self.offset_tolerance_bar * BAR)
+        return self._make_tolerance(self.offset_tolerance_bar * BAR)
 
 
 class SensorsTable(StrictModel):

@@ -59,7 +59,7 @@ class ElementSpec:
     i_out: float | None = None
 
 
-def brake_ratios(ratio: float) -> tuple[float, float]:
+def compute_brake_ratios(ratio: float) -> tuple[float, float]:
     """Return (i_c, i_out) of a brake in a gear of `ratio` i: i_c = i - 1, i_out = i/(i - 1).
 
     Holds where the other elements of the gear are rotating clutches (THEORY section 2); both
@@ -68,7 +68,7 @@ def brake_ratios(ratio: float) -> tuple[float, float]:
     return ratio - 1.0, ratio / (ratio - 1.0)
 
 
-def middle_of(limits: tuple[float, float]) -> float:
+def compute_middle(limits: tuple[float, float]) -> float:
     """A value in the midst of a design range: its geometric mean, a tenth of one from 0 on."""
     low, high = limits
     return math.sqrt(low * high) if low > 0.0 else 0.1 * high

@@ -11,7 +11,13 @@ from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.errors import CardError, Where
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import LossLaw
-from drivetwin.vehicle.spec import ElementSpec, Gear, PriorValue, SensorTolerance, brake_ratios
+from drivetwin.vehicle.spec import (
+    ElementSpec,
+    Gear,
+    PriorValue,
+    SensorTolerance,
+    compute_brake_ratios,
+)
 
 
 @dataclass(frozen=True)
@@ -48,53 +54,55 @@ class VehicleCard:
         """SHA-256 by name of the file that the card was read from; empty without one."""
         return {Path(self.source).name: self.sha256} if self.sha256 else {}
 
-    def gear(self, name: str) -> Gear:
+    def get_gear(self, name: str) -> Gear:
         """Return the gear of this name; raises CardError if the card has none."""
         for gear in self.gears:
             if gear.name == name:
                 return gear
-        raise self._error(
+        raise self._make_error(
             f"the card has no gear {name!r}; it has {', '.join(gear.name for gear in self.gears)}",
             "add it under [[gears]]",
         )
 
-    def ratio(self, name: str) -> float:
+    def compute_ratio(self, name: str) -> float:
         """Return the overall ratio engine to output, i_in·i_c·i_out, of a gear."""
-        return self.i_in * self.gear(name).ratio
+        return self.i_in * self.get_gear(name).ratio
 
-    def element(self, name: str) -> ElementSpec:
+    def get_element(self, name: str) -> ElementSpec:
         """Return a shift element by name; raises CardError if the card has none."""
         try:
             return self.elements[name]
         except KeyError:
-            raise self._error(
+            raise self._make_error(
                 f"the card has no element {name!r}; it has {', '.join(self.elements)}",
                 f"add [elements.{name}]",
             ) from None
 
-    def element_of(self, gear: str) -> str:
+    def get_gear_element(self, gear: str) -> str:
         """Return the one shift element that makes a gear in the dual-clutch picture.
 
         Raises CardError where several elements hold it.
         """
-        elements = self.gear(gear).elements
+        elements = self.get_gear(gear).elements
         if len(elements) != 1:
-            raise self._error(
+            raise self._make_error(
                 f"gear {gear!r} is held by {', '.join(elements)}",
                 "name only the element that changes in the shift; the others are common to both "
                 "gears",
             )
         return elements[0]
 
-    def clutch_ratios(self, element: str) -> tuple[float, float]:
+    def get_clutch_ratios(self, element: str) -> tuple[float, float]:
         """Return (i_c, i_out) of eq. 15: as stated, else of a brake from its gear's ratio."""
-        spec = self.element(element)
+        spec = self.get_element(element)
         if spec.i_c is not None and spec.i_out is not None:
             return spec.i_c, spec.i_out
         for gear in self.gears:
             if element in gear.elements:
-                return brake_ratios(gear.ratio)
-        raise self._error(f"element {element!r} holds no gear", "name it under a gear's elements")
+                return compute_brake_ratios(gear.ratio)
+        raise self._make_error(
+            f"element {element!r} holds no gear", "name it under a gear's elements"
+        )
 
-    def _error(self, what: str, remedy: str) -> CardError:
+    def _make_error(self, what: str, remedy: str) -> CardError:
         return CardError(what, remedy, Where(file=self.source or None))

@@ -25,16 +25,16 @@ def protect(server: Flask, host: str, script_hashes: list[str]) -> None:
     `host` is the address that the server listens on; names beside it and `localhost` are refused.
     """
     server.config["MAX_CONTENT_LENGTH"] = MAX_REQUEST
-    policy = _policy(script_hashes)
+    policy = _build_policy(script_hashes)
 
     @server.before_request
     def refuse_strangers() -> Response | None:
-        if not is_own(request.host, host):
-            return refusal(421, f"this server does not answer to the name {request.host!r}")
+        if not is_own_host(request.host, host):
+            return make_refusal(421, f"this server does not answer to the name {request.host!r}")
         origin = request.headers.get("Origin")
         foreign = origin is not None and urlsplit(origin).netloc != request.host
         if foreign or request.headers.get("Sec-Fetch-Site") == "cross-site":
-            return refusal(403, "this request comes from another site")
+            return make_refusal(403, "this request comes from another site")
         return None
 
     @server.after_request
@@ -45,10 +45,10 @@ def protect(server: Flask, host: str, script_hashes: list[str]) -> None:
     @server.errorhandler(HTTPException)
     def told(error: HTTPException) -> Response:
         too_large = f"a request may have {MAX_REQUEST / 2**20:.0f} MB"
-        return refusal(error.code or 500, too_large if error.code == 413 else error.name)
+        return make_refusal(error.code or 500, too_large if error.code == 413 else error.name)
 
 
-def is_own(named: str, host: str) -> bool:
+def is_own_host(named: str, host: str) -> bool:
     """Return True if the host named by a request is this server.
 
     Addresses cannot be rebound. Of the names, only `localhost` and the listening name are accepted.
@@ -77,12 +77,12 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def refusal(status: int, text: str) -> Response:
+def make_refusal(status: int, text: str) -> Response:
     """Return a response with the reason of the refusal."""
     return Response(json.dumps({"error": text}), status, mimetype="application/json")
 
 
-def _policy(script_hashes: list[str]) -> dict[str, str]:
+def _build_policy(script_hashes: list[str]) -> dict[str, str]:
     scripts = " ".join(["'self'", *script_hashes])
     rules = (
         "default-src 'self'",

@@ -29,7 +29,7 @@ def refuse_expansion(path: Path, label: str, limit: int) -> None:
         while len(tag := file.read(_TAG)) == _TAG:
             kind, size = struct.unpack(f"{order}II", tag)
             start = file.tell()
-            total += _claim(file.read(256), order) if kind == _COMPRESSED else size
+            total += _read_declared_size(file.read(256), order) if kind == _COMPRESSED else size
             file.seek(start + size)
     if total > limit:
         raise RefusedError(
@@ -40,7 +40,7 @@ def refuse_expansion(path: Path, label: str, limit: int) -> None:
         )
 
 
-def _claim(packed: bytes, order: str) -> int:
+def _read_declared_size(packed: bytes, order: str) -> int:
     """Read the declared size [bytes] of a compressed variable; 0 if its header cannot be read."""
     try:
         tag = zlib.decompressobj().decompress(packed, _TAG)

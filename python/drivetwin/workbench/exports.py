@@ -15,8 +15,8 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.export.targets import Target
 from drivetwin.files.twin_conversion import save_twin
 from drivetwin.workbench import jobs
-from drivetwin.workbench.identifying import report_of
-from drivetwin.workbench.session_state import Work
+from drivetwin.workbench.identifying import render_log_report
+from drivetwin.workbench.session_state import SessionState
 
 if TYPE_CHECKING:
     from drivetwin.export.fmu.experiment import Experiment
@@ -43,49 +43,49 @@ class Product:
     content: bytes
 
 
-def produce(work: Work, wanted: Target | Record, scratch: Path) -> Product:
+def make_product(work: SessionState, wanted: Target | Record, scratch: Path) -> Product:
     """Make one file from what is shown; `scratch` is a folder of our own.
 
     Raises InputError where the session has nothing of the kind, and the errors of the writers.
     """
     stem = Path(work.log.name).stem if work.log is not None else "twin"
     if isinstance(wanted, Record):
-        return Product(f"{stem}.{wanted.value}", _record(work, wanted, scratch))
+        return Product(f"{stem}.{wanted.value}", _make_record(work, wanted, scratch))
     if wanted is Target.C:
-        return Product(f"{stem}.c.zip", _sources(work, scratch))
+        return Product(f"{stem}.c.zip", _collect_sources(work, scratch))
     path = scratch / f"{stem}.{wanted.ending}"
-    _write(work, wanted, path)
-    return Product(path.name, _taken(path))
+    _write_product(work, wanted, path)
+    return Product(path.name, _read_file(path))
 
 
-def _write(work: Work, wanted: Target, path: Path) -> None:
+def _write_product(work: SessionState, wanted: Target, path: Path) -> None:
     match wanted:
         case Target.FMU:
             from drivetwin.export.fmu.build import BuildOptions, build_fmu
 
-            subject, experiment = _subject(work)
+            subject, experiment = _get_subject(work)
             build_fmu(subject, path, BuildOptions(experiment=experiment))
         case Target.MODELICA:
             from drivetwin.export.modelica.dual_clutch import write_modelica
 
-            write_modelica(*_subject(work), path)
+            write_modelica(*_get_subject(work), path)
         case _:
             from drivetwin.export.parameters.files import ParameterFormat, write_parameters
-            from drivetwin.export.parameters.of_twin import parameters_of
+            from drivetwin.export.parameters.of_twin import collect_parameters
 
-            content = parameters_of(work.require_twin())
+            content = collect_parameters(work.require_twin())
             write_parameters(content, path, ParameterFormat(wanted.value))
 
 
-def _subject(work: Work) -> tuple[Subject, Experiment | None]:
+def _get_subject(work: SessionState) -> tuple[Subject, Experiment | None]:
     """The model of the shift that is shown, started as it was measured."""
-    from drivetwin.export.fmu.measured import measured_subject
+    from drivetwin.export.fmu.measured import build_measured_subject
 
     twin, shift = work.require_twin(), work.require_shift()
-    return measured_subject(twin, work.require_log(), (shift.start_gear, shift.end_gear))
+    return build_measured_subject(twin, work.require_log(), (shift.start_gear, shift.end_gear))
 
 
-def _record(work: Work, wanted: Record, scratch: Path) -> bytes:
+def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
     path = scratch / wanted.value
     match wanted:
         case Record.TWIN:
@@ -93,20 +93,20 @@ def _record(work: Work, wanted: Record, scratch: Path) -> bytes:
         case Record.RESULT:
             from drivetwin.files.result_file import save_result
 
-            save_result(path, _evidence(work))
+            save_result(path, _get_evidence(work))
         case Record.REPORT:
             log = work.require_log()
-            text: str = jobs.call(report_of, _evidence(work), log, limit=REPORT_LIMIT)
+            text: str = jobs.call(render_log_report, _get_evidence(work), log, limit=REPORT_LIMIT)
             return text.encode()
         case Record.MAPPING:
-            from drivetwin.channels.mapping_file import mapping_text
+            from drivetwin.channels.mapping_file import format_mapping
 
             survey = work.require_opened().survey
-            return mapping_text({**survey.mapping, **work.channels}, survey.options).encode()
-    return _taken(path)
+            return format_mapping({**survey.mapping, **work.channels}, survey.options).encode()
+    return _read_file(path)
 
 
-def _evidence(work: Work) -> Identification:
+def _get_evidence(work: SessionState) -> Identification:
     """The result that is shown. Raises InputError for one from a workspace."""
     found = work.require_outcome().found
     if found is None:
@@ -117,13 +117,13 @@ def _evidence(work: Work) -> Identification:
     return found
 
 
-def _sources(work: Work, scratch: Path) -> bytes:
+def _collect_sources(work: SessionState, scratch: Path) -> bytes:
     """The C sources as one archive; equal twins give equal bytes."""
     from drivetwin.export.c import write_c
 
     folder = scratch / "c"
     folder.mkdir(exist_ok=True)
-    paths = write_c(_subject(work)[0], folder)
+    paths = write_c(_get_subject(work)[0], folder)
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in paths:
@@ -131,7 +131,7 @@ def _sources(work: Work, scratch: Path) -> bytes:
     return packed.getvalue()
 
 
-def _taken(path: Path) -> bytes:
+def _read_file(path: Path) -> bytes:
     content = path.read_bytes()
     path.unlink()
     return content

@@ -13,8 +13,8 @@ from drivetwin.gearbox import (
     Reduction,
     compare,
     estimate,
-    gear_statics,
     reduce,
+    solve_gear,
 )
 
 
@@ -52,15 +52,15 @@ class ReducedShift:
     reason: str = ""
 
 
-def gears_of(box: Gearbox) -> list[GearLine]:
+def list_gears(box: Gearbox) -> list[GearLine]:
     """All gears in the order of the card. Raises InputError where elements make no ratio."""
     return [
-        GearLine(gear.name, gear_statics(box, gear.name).ratio, gear.published, gear.elements)
+        GearLine(gear.name, solve_gear(box, gear.name).ratio, gear.published, gear.elements)
         for gear in box.gears
     ]
 
 
-def members_of(box: Gearbox) -> list[MemberLine]:
+def list_members(box: Gearbox) -> list[MemberLine]:
     """All members with what joins them, input first and output last."""
     joined: dict[str, list[str]] = {}
     for one in box.sets:
@@ -76,17 +76,17 @@ def members_of(box: Gearbox) -> list[MemberLine]:
     return [MemberLine(one, box.inertias.get(one, 0.0), tuple(joined[one])) for one in order]
 
 
-def shifts_of(box: Gearbox) -> dict[str, tuple[str, str]]:
+def list_shifts(box: Gearbox) -> dict[str, tuple[str, str]]:
     """Neighbouring gears (old, new) by the name of their shift, such as `2-3`."""
     return {f"{old.name}-{new.name}": (old.name, new.name) for old, new in pairwise(box.gears)}
 
 
-def reduced(box: Gearbox, shift: str) -> ReducedShift:
+def reduce_shift(box: Gearbox, shift: str) -> ReducedShift:
     """One shift in the dual-clutch form.
 
     Raises InputError for a text that is no shift, ReductionError where there is no such form.
     """
-    shifts = shifts_of(box)
+    shifts = list_shifts(box)
     if shift not in shifts:
         raise InputError(f"{shift!r} is no shift", f"choose one of {', '.join(shifts)}")
     reduction = reduce(box, *shifts[shift])

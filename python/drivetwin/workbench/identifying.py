@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivetwin._util.progress import part
+from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.analysis.experiment_design import examined
+from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.pipeline import identify
@@ -16,9 +16,9 @@ from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.simulate_log import validated
+from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import VehicleCard
-from drivetwin.workbench.jobs import Emit, fault_of
+from drivetwin.workbench.jobs import Emit, to_fault
 
 _WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
 """How long the methods take, relative to each other."""
@@ -63,27 +63,27 @@ def identify_all(emit: Emit, task: Task) -> None:
     shifts = FoundShifts(task.shifts, ())
     for method in task.methods:
         end = start + _WEIGHTS[method] / whole
-        with part(start, end, f"{method.value} method"):
-            emit(_tried(task, shifts, method))
+        with scale_progress(start, end, f"{method.value} method"):
+            emit(_run_method(task, shifts, method))
         start = end
 
 
-def _tried(task: Task, shifts: FoundShifts, method: Method) -> Outcome | Refusal:
+def _run_method(task: Task, shifts: FoundShifts, method: Method) -> Outcome | Refusal:
     """Run one method; return its outcome, or the reason of its failure."""
     try:
-        return _outcome(task, shifts, method)
+        return _make_outcome(task, shifts, method)
     except Exception as error:
-        fault = fault_of(error)
+        fault = to_fault(error)
         return Refusal(method, f"{fault.what} -> {fault.remedy}")
 
 
-def _outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:
+def _make_outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:
     found = identify(task.log, task.card, shifts, method)
     twin = build_twin(found, task.card)
-    return Outcome(method, twin, examined(validated(found, twin, task.log)))
+    return Outcome(method, twin, rank_experiments(attach_validation(found, twin, task.log)))
 
 
-def report_of(emit: Emit, found: Identification, log: ShiftLog) -> None:
+def render_log_report(emit: Emit, found: Identification, log: ShiftLog) -> None:
     """The report of an identification as HTML text; emits it."""
     from drivetwin.report.html import render_report
 

@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
 from typing import Any
 
-from drivetwin._util.progress import listening
+from drivetwin._util.progress import attach_listener
 from drivetwin.errors import DrivetwinError, InputError, Where
 
 Emit = Callable[[object], None]
@@ -41,12 +41,12 @@ class Fault:
     remedy: str
     where: Where = field(default_factory=Where)
 
-    def error(self) -> InputError:
+    def to_error(self) -> InputError:
         """Convert the fault to an exception."""
         return InputError(self.what, self.remedy, self.where)
 
 
-def fault_of(error: Exception) -> Fault:
+def to_fault(error: Exception) -> Fault:
     """Convert an exception to a fault; print the traceback of an unexpected error."""
     match error:
         case DrivetwinError():
@@ -90,14 +90,14 @@ class Job:
         """Time since the start [s]."""
         return time.monotonic() - self.started
 
-    def results(self) -> list[Any]:
+    def get_results(self) -> list[Any]:
         """Return the results received since the last call, without waiting."""
         found: list[Any] = []
         while not self.finished and self.pipe.poll():
             try:
                 message = self.pipe.recv()
             except (EOFError, OSError):
-                self._died()
+                self._raise_if_dead()
                 break
             match message:
                 case Progress(share, text):
@@ -111,7 +111,7 @@ class Job:
                     found.append(message)
         return found
 
-    def wait(self, limit: float) -> list[Any]:
+    def collect_results(self, limit: float) -> list[Any]:
         """Wait for all results; raise InputError on failure or after `limit` [s]."""
         found: list[Any] = []
         while not self.finished:
@@ -122,9 +122,9 @@ class Job:
                     f"this took longer than {limit:.0f} s and was stopped",
                     "hand in a shorter log, or cut it to the shift",
                 )
-            found += self.results()
+            found += self.get_results()
         if self.fault is not None:
-            raise self.fault.error()
+            raise self.fault.to_error()
         return found
 
     def cancel(self) -> None:
@@ -133,7 +133,7 @@ class Job:
             self.process.terminate()
             self._end()
 
-    def _died(self) -> None:
+    def _raise_if_dead(self) -> None:
         self.process.join(_PATIENCE)
         self.fault = Fault(
             f"the process that did this stopped (exit code {self.process.exitcode})",
@@ -152,10 +152,10 @@ class Job:
 
 def start(work: Work, *arguments: object) -> Job:
     """Run `work(emit, *arguments)` in a separate process."""
-    context = _context()
+    context = _get_context()
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(  # type: ignore[attr-defined]
-        target=_child, args=(theirs, work, arguments), daemon=True
+        target=_run_child, args=(theirs, work, arguments), daemon=True
     )
     process.start()
     theirs.close()
@@ -164,19 +164,19 @@ def start(work: Work, *arguments: object) -> Job:
 
 def call(work: Work, *arguments: object, limit: float) -> Any:
     """Run `work` in a separate process; return its only result. Raises InputError on failure."""
-    return start(work, *arguments).wait(limit)[-1]
+    return start(work, *arguments).collect_results(limit)[-1]
 
 
 def warm_up() -> None:
     """Import what jobs need before the first one is started."""
-    start(_nothing)
+    start(_run_nothing)
 
 
-def _nothing(emit: Emit) -> None:
+def _run_nothing(emit: Emit) -> None:
     emit(None)
 
 
-def _context() -> BaseContext:
+def _get_context() -> BaseContext:
     """Children of a server with the libraries loaded start at once; elsewhere they load them."""
     if sys.platform == "win32":
         return multiprocessing.get_context("spawn")
@@ -185,7 +185,7 @@ def _context() -> BaseContext:
     return context
 
 
-def _child(pipe: Connection, work: Work, arguments: tuple[Any, ...]) -> None:
+def _run_child(pipe: Connection, work: Work, arguments: tuple[Any, ...]) -> None:
     last = 0.0
 
     def tell(share: float, text: str) -> None:
@@ -197,10 +197,10 @@ def _child(pipe: Connection, work: Work, arguments: tuple[Any, ...]) -> None:
 
     with suppress(BrokenPipeError, KeyboardInterrupt):
         try:
-            with listening(tell):
+            with attach_listener(tell):
                 work(pipe.send, *arguments)
             pipe.send(_Done())
         except BrokenPipeError:
             raise
         except Exception as error:
-            pipe.send(fault_of(error))
+            pipe.send(to_fault(error))

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from drivetwin._util.display_units import display_of, in_units
+from drivetwin._util.display_units import format_with_unit, get_display_unit
 from drivetwin.errors import InputError, Where
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -39,29 +39,29 @@ class Lock:
     value: float = 0.0
     std: float = 0.0
 
-    def prior(self) -> PriorValue:
+    def to_prior(self) -> PriorValue:
         """As a design value."""
         return PriorValue(self.value, self.std if self.kind is LockKind.PRIOR else 0.0)
 
 
-def lockable(parameter_id: str) -> bool:
+def can_fix(parameter_id: str) -> bool:
     """Return True if the parameter can be fixed."""
     try:
-        return spec_of(parameter_id).stem in LOCKABLE
+        return get_parameter_spec(parameter_id).stem in LOCKABLE
     except InputError:
         return False
 
 
-def checked(parameter_id: str, lock: Lock) -> Lock:
+def check_lock(parameter_id: str, lock: Lock) -> Lock:
     """Return the lock; raise InputError if the parameter does not support it."""
-    spec = spec_of(parameter_id)
+    spec = get_parameter_spec(parameter_id)
     where = Where(key=parameter_id)
     if spec.stem not in LOCKABLE:
         raise InputError("this follows from other parameters", "lock those", where)
     if lock.kind is not LockKind.FREE and not spec.lower <= lock.value <= spec.upper:
         raise InputError(
-            f"{in_units(lock.value, spec.unit)} lies outside {in_units(spec.lower, spec.unit)} to "
-            f"{in_units(spec.upper, spec.unit)}",
+            f"{format_with_unit(lock.value, spec.unit)} lies outside {format_with_unit(spec.lower, spec.unit)} to "
+            f"{format_with_unit(spec.upper, spec.unit)}",
             "lock it at a possible value",
             where,
         )
@@ -72,7 +72,7 @@ def checked(parameter_id: str, lock: Lock) -> Lock:
     return lock
 
 
-def typed(parameter_id: str, kind: LockKind, value: float | None, std: float | None) -> Lock:
+def parse_lock(parameter_id: str, kind: LockKind, value: float | None, std: float | None) -> Lock:
     """The lock of numbers in display units; None where a field is empty.
 
     Raises InputError where no value is stated that is needed.
@@ -81,39 +81,39 @@ def typed(parameter_id: str, kind: LockKind, value: float | None, std: float | N
         return Lock(kind)
     if value is None:
         raise InputError("no value is stated", "type one first", Where(key=parameter_id))
-    factor = display_of(spec_of(parameter_id).unit).factor
+    factor = get_display_unit(get_parameter_spec(parameter_id).unit).factor
     return Lock(kind, value / factor, (std or 0.0) / factor)
 
 
-def card_lock(card: VehicleCard, parameter_id: str) -> Lock:
+def get_card_lock(card: VehicleCard, parameter_id: str) -> Lock:
     """The lock that a card itself puts on a parameter."""
-    prior = _on_card(card, parameter_id)
+    prior = _get_card_prior(card, parameter_id)
     if prior is None:
         return Lock(LockKind.FREE)
     return Lock(LockKind.PRIOR if prior.std > 0.0 else LockKind.FIXED, prior.value, prior.std)
 
 
-def locked(card: VehicleCard, locks: Mapping[str, Lock]) -> VehicleCard:
+def apply_locks(card: VehicleCard, locks: Mapping[str, Lock]) -> VehicleCard:
     """The card as the locks have it. Raises InputError for a lock that cannot be."""
     for name, lock in locks.items():
-        checked(name, lock)
+        check_lock(name, lock)
         element = name.removeprefix("P0.")
         if name == "J_out":
-            card = replace(card, J_out=None if lock.kind is LockKind.FREE else lock.prior())
+            card = replace(card, J_out=None if lock.kind is LockKind.FREE else lock.to_prior())
         elif name.startswith("P0.") and element in card.elements:
             spec = card.elements[element]
             free = PriorValue(spec.P0.value, max(spec.P0.value, WIDE))
-            P0 = free if lock.kind is LockKind.FREE else lock.prior()
+            P0 = free if lock.kind is LockKind.FREE else lock.to_prior()
             card = replace(card, elements={**card.elements, element: replace(spec, P0=P0)})
         elif lock.kind is LockKind.FREE:
             known = {key: value for key, value in card.known.items() if key != name}
             card = replace(card, known=known)
         else:
-            card = replace(card, known={**card.known, name: lock.prior()})
+            card = replace(card, known={**card.known, name: lock.to_prior()})
     return replace(card, sha256="") if locks else card
 
 
-def _on_card(card: VehicleCard, parameter_id: str) -> PriorValue | None:
+def _get_card_prior(card: VehicleCard, parameter_id: str) -> PriorValue | None:
     if parameter_id == "J_out":
         return card.J_out
     if parameter_id.startswith("P0."):

@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivetwin.channels.mapping import ChannelSpec, spec_of
-from drivetwin.channels.pressure_roles import pressure_role
+from drivetwin.channels.mapping import ChannelSpec, make_spec
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
-from drivetwin.channels.roles import ROLES, quantity_of
+from drivetwin.channels.roles import ROLES, get_quantity
 from drivetwin.channels.shiftlog import Quantity
-from drivetwin.channels.units import channel_unit, first_spellings
+from drivetwin.channels.units import list_first_spellings, resolve_channel_unit
 from drivetwin.errors import MappingError, UnitError, Where
 from drivetwin.logs.survey import Column, Survey
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -36,23 +36,23 @@ class Entry:
     reversed: bool
 
 
-def roles_of(card: VehicleCard) -> tuple[str, ...]:
+def list_roles(card: VehicleCard) -> tuple[str, ...]:
     """All roles that a column may have, the pressures of the card's elements last."""
-    return (*ROLES, *(pressure_role(element) for element in card.elements))
+    return (*ROLES, *(make_pressure_role(element) for element in card.elements))
 
 
-def unit_names() -> list[str]:
+def list_unit_names() -> list[str]:
     """The first spelling of each unit, for completion."""
     measured = (Quantity.TORQUE, Quantity.SPEED, Quantity.PRESSURE, Quantity.FRACTION)
-    return [spelling for quantity in measured for spelling in first_spellings(quantity)]
+    return [spelling for quantity in measured for spelling in list_first_spellings(quantity)]
 
 
-def rows_of(survey: Survey) -> list[Row]:
+def list_rows(survey: Survey) -> list[Row]:
     """The columns with the role, unit and sign that they are read with."""
-    return [_row(column, survey) for column in survey.columns]
+    return [_make_row(column, survey) for column in survey.columns]
 
 
-def corrected(survey: Survey, entries: Sequence[Entry]) -> dict[str, ChannelSpec]:
+def apply_entries(survey: Survey, entries: Sequence[Entry]) -> dict[str, ChannelSpec]:
     """Channel specs by role as the user states them; scale, offset and time shift stay.
 
     Raises MappingError where two columns have one role or a column that is recognised by its name
@@ -69,41 +69,43 @@ def corrected(survey: Survey, entries: Sequence[Entry]) -> dict[str, ChannelSpec
                 "give the role to one of them",
             )
         present = survey.mapping.get(entry.role)
-        spec = spec_of(LogColumn(column.name, column.unit, column.group), every)
+        spec = make_spec(LogColumn(column.name, column.unit, column.group), every)
         if present is not None and present.source == column.name:
             spec = replace(present, group=spec.group)
         found[entry.role] = replace(
             spec,
-            unit=_asserted(entry, column),
+            unit=_parse_assertion(entry, column),
             sign=-1 if entry.reversed else 1,
         )
     _refuse_set_aside(survey, found)
     return found
 
 
-def _row(column: Column, survey: Survey) -> Row:
-    role, spec = _spec_for(column, survey.mapping)
+def _make_row(column: Column, survey: Survey) -> Row:
+    role, spec = _make_spec(column, survey.mapping)
     unit = spec.unit if spec is not None and spec.unit is not None else column.unit
     return Row(column, role, unit or "", spec is not None and spec.sign < 0)
 
 
-def _spec_for(column: Column, mapping: Mapping[str, ChannelSpec]) -> tuple[str, ChannelSpec | None]:
+def _make_spec(
+    column: Column, mapping: Mapping[str, ChannelSpec]
+) -> tuple[str, ChannelSpec | None]:
     for role, spec in mapping.items():
         if spec.source == column.name and spec.group in (None, column.group):
             return role, spec
     return "", None
 
 
-def _asserted(entry: Entry, column: Column) -> str | None:
+def _parse_assertion(entry: Entry, column: Column) -> str | None:
     """Return the unit if it differs from the file's unit; check it against the role."""
     unit = entry.unit.strip()
     if unit == (column.unit or ""):
         return None
     where = Where(channel=column.name)
     try:
-        channel_unit(unit, quantity_of(entry.role), where)
+        resolve_channel_unit(unit, get_quantity(entry.role), where)
     except UnitError as error:
-        usual = ", ".join(first_spellings(quantity_of(entry.role)))
+        usual = ", ".join(list_first_spellings(get_quantity(entry.role)))
         raise UnitError(error.what, f"use one of {usual}", where) from None
     return unit
 

@@ -12,9 +12,9 @@ import plotly.graph_objects as go
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
-from drivetwin.report.figures.shift_phases import shift_phases
+from drivetwin.report.figures.shift_phases import plot_shift_phases
 from drivetwin.report.style import ACCENT, MUTED
-from drivetwin.shifts.quality import shift_quality
+from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -44,7 +44,7 @@ LABELS = {
 }
 
 
-def times_of(shift: Shift) -> dict[Boundary, float]:
+def get_boundary_times(shift: Shift) -> dict[Boundary, float]:
     """Time of each boundary [s]."""
     return {
         Boundary.START: shift.before[0],
@@ -55,18 +55,18 @@ def times_of(shift: Shift) -> dict[Boundary, float]:
     }
 
 
-def shown_times(shift: Shift) -> dict[Boundary, float]:
+def get_display_times(shift: Shift) -> dict[Boundary, float]:
     """Time of each boundary [s] as its field shows it."""
-    return {one: round(time, _DECIMALS) for one, time in times_of(shift).items()}
+    return {one: round(time, _DECIMALS) for one, time in get_boundary_times(shift).items()}
 
 
-def typed(shift: Shift, times: Sequence[float | None]) -> dict[Boundary, float]:
+def parse_times(shift: Shift, times: Sequence[float | None]) -> dict[Boundary, float]:
     """Boundaries whose field no longer holds the time it showed, with the one it holds [s].
 
     `times` are those of the fields in the order of Boundary. One that was left alone keeps its
     unrounded time, and so its uncertainty. Raises InputError where a field holds no time.
     """
-    shown = shown_times(shift)
+    shown = get_display_times(shift)
     found: dict[Boundary, float] = {}
     for one, time in zip(Boundary, times, strict=True):
         if time is None:
@@ -76,19 +76,19 @@ def typed(shift: Shift, times: Sequence[float | None]) -> dict[Boundary, float]:
     return found
 
 
-def moved(
+def move_boundaries(
     log: ShiftLog, card: VehicleCard, shift: Shift, changes: Mapping[Boundary, float]
 ) -> Shift:
     """The shift with some boundaries at other times [s]; its quality figures follow.
 
     Raises InputError where a boundary would pass its neighbour or leave the log.
     """
-    times = times_of(shift)
+    times = get_boundary_times(shift)
     changed = {one: time for one, time in changes.items() if abs(time - times[one]) > 1e-9}
     if not changed:
         return shift
     times |= changed
-    _check(log, times)
+    _check_times(log, times)
     start, torque, inertia, lockup, end = (times[one] for one in Boundary)
     names = ", ".join(LABELS[one] for one in Boundary if one in changed)
     warnings = [text for text in shift.warnings if not text.endswith(BY_HAND)]
@@ -102,10 +102,10 @@ def moved(
         sigma={key: value for key, value in shift.sigma.items() if Boundary(key) not in changed},
         warnings=(*warnings, f"boundary {names}: {BY_HAND}"),
     )
-    return replace(fresh, quality=shift_quality(log, card, fresh))
+    return replace(fresh, quality=compute_shift_quality(log, card, fresh))
 
 
-def _check(log: ShiftLog, times: Mapping[Boundary, float]) -> None:
+def _check_times(log: ShiftLog, times: Mapping[Boundary, float]) -> None:
     for one, other in pairwise(Boundary):
         least = 0.0 if one is Boundary.TORQUE else LEAST_PHASE
         if times[other] - times[one] < least:
@@ -123,11 +123,11 @@ def _check(log: ShiftLog, times: Mapping[Boundary, float]) -> None:
         )
 
 
-def phase_figure(log: ShiftLog, shift: Shift) -> go.Figure:
+def plot_phases(log: ShiftLog, shift: Shift) -> go.Figure:
     """The shift with a line at each boundary, to be dragged; the other shapes stay in place."""
-    figure = shift_phases(log, shift)
+    figure = plot_shift_phases(log, shift)
     figure.update_layout(xaxis={"uirevision": f"{shift.start_gear}-{shift.end_gear}"})
-    for one, time in times_of(shift).items():
+    for one, time in get_boundary_times(shift).items():
         outer = one in (Boundary.START, Boundary.END)
         figure.add_shape(
             type="line",
@@ -143,8 +143,8 @@ def phase_figure(log: ShiftLog, shift: Shift) -> go.Figure:
     return figure
 
 
-def dragged(figure: go.Figure, change: Mapping[str, object]) -> dict[Boundary, float]:
-    """Boundaries that a relayout event of the `phase_figure` has moved, with their time [s]."""
+def parse_drag(figure: go.Figure, change: Mapping[str, object]) -> dict[Boundary, float]:
+    """Boundaries that a relayout event of the `plot_phases` has moved, with their time [s]."""
     found: dict[Boundary, float] = {}
     for index, shape in enumerate(figure.layout.shapes):
         time = change.get(f"shapes[{index}].x0")

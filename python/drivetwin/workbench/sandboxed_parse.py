@@ -13,15 +13,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from drivetwin.channels.mapping import ChannelSpec, Mapped
-from drivetwin.channels.mapping_file import mapping_text, read_mapping
+from drivetwin.channels.mapping_file import format_mapping, read_mapping
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError, InputError
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.read import read_log
-from drivetwin.logs.survey import Survey, survey
-from drivetwin.shifts.detect import FoundShifts, find_shifts
+from drivetwin.logs.survey import Survey, survey_recording
+from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.workbench.decompression_limit import refuse_expansion
 from drivetwin.workbench.jobs import Emit
@@ -72,28 +72,28 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     `scratch` is a file of our own for the corrected mapping. Raises the errors of card and file;
     those of the mapping become `fault`, so that it can be corrected.
     """
-    bound_memory()
+    limit_parser_memory()
     labels = {request.log: request.label, request.card: request.card_label}
-    with _labelled(labels):
+    with _apply_labels(labels):
         refuse_expansion(request.log, request.label, MEMORY)
         card = replace(load_card(request.card), source=request.card_label)
         stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
         stated = replace(stated, channels={**stated.channels, **request.channels})
         with open_recording(request.log, stated.options) as recording:
-            looked = survey(recording, str(request.log), card, stated)
+            looked = survey_recording(recording, str(request.log), card, stated)
     try:
-        with _labelled(labels):
-            mapping = _written(scratch, stated.channels, stated.options)
+        with _apply_labels(labels):
+            mapping = _write_mapping(scratch, stated.channels, stated.options)
             read = read_log(request.log, card, mapping)
             log = replace(read, source=request.label, mappings={})
-            found = find_shifts(log, card)
+            found = detect_shifts(log, card)
     except InputError as error:
         emit(Opened(looked, card, fault=str(error)))
         return
     emit(Opened(looked, card, log, found))
 
 
-def time_for(log: Path) -> float:
+def compute_time_limit(log: Path) -> float:
     """Time [s] after which reading a log is given up, by the size of its file."""
     size = log.stat().st_size if log.exists() else 0
     return min(LONGEST + PER_BYTE * size, AT_ALL)
@@ -101,12 +101,12 @@ def time_for(log: Path) -> float:
 
 def open_gearbox(emit: Emit, path: Path, label: str) -> None:
     """Read a gearbox card, called `label` in messages; emits it. Raises CardError."""
-    bound_memory()
-    with _labelled({path: label}):
+    limit_parser_memory()
+    with _apply_labels({path: label}):
         emit(load_gearbox(str(path)))
 
 
-def bound_memory() -> None:
+def limit_parser_memory() -> None:
     """Limit the memory of this process to `MEMORY` more than its present use, if supported."""
     status = Path("/proc/self/statm")
     if sys.platform == "win32" or not status.exists():
@@ -118,7 +118,7 @@ def bound_memory() -> None:
 
 
 @contextmanager
-def _labelled(labels: Mapping[Path, str]) -> Iterator[None]:
+def _apply_labels(labels: Mapping[Path, str]) -> Iterator[None]:
     """Replace paths in errors by the files' labels, because uploads have internal names."""
     try:
         yield
@@ -130,6 +130,6 @@ def _labelled(labels: Mapping[Path, str]) -> Iterator[None]:
         raise InputError(what, error.remedy, replace(error.where, file=file)) from None
 
 
-def _written(path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions) -> Path:
-    path.write_text(mapping_text(channels, options), encoding="utf-8")
+def _write_mapping(path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions) -> Path:
+    path.write_text(format_mapping(channels, options), encoding="utf-8")
     return path

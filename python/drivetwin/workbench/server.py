@@ -15,7 +15,7 @@ from werkzeug.serving import BaseWSGIServer, make_server
 
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.workbench import jobs
-from drivetwin.workbench.access_control import protect, refusal
+from drivetwin.workbench.access_control import make_refusal, protect
 from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.page import Start, build_page
@@ -24,7 +24,7 @@ from drivetwin.workbench.workspace_folder import Folder
 SESSION_HEADER = "X-Drivetwin-Session"
 
 
-def build(folder: Folder, start: Start, host: str = "127.0.0.1") -> tuple[Dash, Sessions]:
+def build_server(folder: Folder, start: Start, host: str = "127.0.0.1") -> tuple[Dash, Sessions]:
     """The application and its sessions, ready to be served on `host`."""
     sessions = Sessions(folder)
     app = Dash(
@@ -37,12 +37,12 @@ def build(folder: Folder, start: Start, host: str = "127.0.0.1") -> tuple[Dash, 
         add_log_handler=False,
     )
     build_page(app, sessions, start)
-    _take_uploads(app, sessions)
+    _register_uploads(app, sessions)
     protect(app.server, host, list(app.csp_hashes()))
     return app, sessions
 
 
-def listen(app: Dash, host: str, port: int) -> BaseWSGIServer:
+def start_server(app: Dash, host: str, port: int) -> BaseWSGIServer:
     """A server on `host` and `port` (0: any free one), not yet serving.
 
     Raises InputError where it cannot listen there.
@@ -61,17 +61,17 @@ def listen(app: Dash, host: str, port: int) -> BaseWSGIServer:
         return make_server(host, port, app.server, threaded=True, fd=bound.fileno())
 
 
-def _take_uploads(app: Dash, sessions: Sessions) -> None:
+def _register_uploads(app: Dash, sessions: Sessions) -> None:
     @app.server.post("/upload/<purpose>")  # type: ignore[untyped-decorator]
     def upload(purpose: str) -> Response:
         limit = LIMITS.get(purpose)
         if limit is None:
-            return refusal(404, "there is no such upload")
+            return make_refusal(404, "there is no such upload")
         request.max_content_length = sys.maxsize  # counted while it is received
         name = request.args.get("name", "")
         try:
             session = sessions.get(request.headers.get(SESSION_HEADER))
-            key = session.receive(request.stream, name, request.content_length, limit)
+            key = session.store_upload(request.stream, name, request.content_length, limit)
         except RefusedError as error:
-            return refusal(400, str(error))
+            return make_refusal(400, str(error))
         return Response(json.dumps({"key": key, "name": name}), mimetype="application/json")

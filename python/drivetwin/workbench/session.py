@@ -19,13 +19,13 @@ from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.gearbox import Gearbox, builtin_gearboxes, load_gearbox
+from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
 from drivetwin.workbench.identifying import Task, identify_all
 from drivetwin.workbench.locks import Lock
-from drivetwin.workbench.mapping import Entry, corrected
+from drivetwin.workbench.mapping import Entry, apply_entries
 from drivetwin.workbench.phases import Boundary
-from drivetwin.workbench.session_state import Source, Work
+from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.workspace_folder import Folder
 
 MOST_SESSIONS = 16
@@ -49,7 +49,7 @@ class Session:
 
     folder: Folder
     scratch: Path
-    work: Work = field(default_factory=Work)
+    work: SessionState = field(default_factory=SessionState)
     job: jobs.Job | None = None
     live: Live | None = None
     gearbox: Gearbox | None = None
@@ -57,10 +57,10 @@ class Session:
     used: float = field(default_factory=time.monotonic)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
-    def receive(self, stream: IO[bytes], name: str, claimed: int | None, limit: int) -> str:
+    def store_upload(self, stream: IO[bytes], name: str, claimed: int | None, limit: int) -> str:
         """Take an upload; returns the key to open it by. Raises RefusedError."""
         key = secrets.token_hex(8)
-        upload = uploads.receive(stream, name, claimed, self.scratch / key, limit)
+        upload = uploads.store_stream(stream, name, claimed, self.scratch / key, limit)
         with self.lock:
             used = {one.path for one in (self.work.log, self.work.card) if one is not None}
             while len(self.uploads) >= MOST_UPLOADS:
@@ -69,17 +69,17 @@ class Session:
             self.uploads[key] = upload
         return key
 
-    def uploaded(self, key: str) -> Source:
+    def get_uploaded(self, key: str) -> Source:
         """Return an upload by its key. Raises RefusedError if it was deleted."""
         upload = self.uploads.get(key)
         if upload is None:
             raise RefusedError("this upload is no longer there", "upload the file again")
         return Source(upload.name, upload.path, uploaded=True)
 
-    def in_folder(self, name: str) -> Source:
+    def get_folder_source(self, name: str) -> Source:
         """A file of the folder. Raises RefusedError for a path that leads elsewhere."""
-        path = self.folder.file(name)
-        return Source(self.folder.name_of(path), path)
+        path = self.folder.get_file(name)
+        return Source(self.folder.get_name(path), path)
 
     def open(self, log: Source, card: Source, mapping: Path | None = None) -> None:
         """Open a log with its card; discard the work on the previous log.
@@ -87,31 +87,31 @@ class Session:
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
         with self.lock:
-            work = Work(log=log, card=card, mapping=mapping)
-            work = work.with_opened(self._read(work, {}))
+            work = SessionState(log=log, card=card, mapping=mapping)
+            work = work.set_opened(self._read(work, {}))
             self.cancel()
             self._set(work)
 
-    def correct(self, entries: Sequence[Entry]) -> None:
+    def correct_mapping(self, entries: Sequence[Entry]) -> None:
         """Read the log again with the corrected mapping; discard the previous results.
 
         Raises MappingError, UnitError; the work stays as it was then, and goes on.
         """
         with self.lock:
-            channels = corrected(self.work.require_opened().survey, entries)
+            channels = apply_entries(self.work.require_opened().survey, entries)
             opened = self._read(self.work, channels)
             self.cancel()
-            self._set(replace(self.work, channels=channels).with_opened(opened))
+            self._set(replace(self.work, channels=channels).set_opened(opened))
 
-    def move(self, index: int, changes: Mapping[Boundary, float]) -> None:
+    def move_boundaries(self, index: int, changes: Mapping[Boundary, float]) -> None:
         """Set boundaries of a shift by hand; none: as detected. Raises InputError."""
         with self.lock:
-            self._set(self.work.with_moves(index, changes))
+            self._set(self.work.apply_moves(index, changes))
 
     def set_lock(self, parameter_id: str, lock: Lock) -> None:
         """Lock a parameter for the next identification. Raises InputError."""
         with self.lock:
-            self.work = self.work.with_lock(parameter_id, lock)
+            self.work = self.work.set_lock(parameter_id, lock)
 
     def identify(self, methods: Sequence[Method]) -> None:
         """Start the identification in a separate process. Raises InputError on failure."""
@@ -120,23 +120,23 @@ class Session:
                 raise InputError("an identification is running", "wait for it or cancel it")
             work = self.work
             work.require_shift()
-            task = Task(work.require_log(), work.locked_card(), work.shifts, tuple(methods))
-            self._set(work.without_results())
+            task = Task(work.require_log(), work.apply_locks_to_card(), work.shifts, tuple(methods))
+            self._set(work.drop_results())
             self.job = jobs.start(identify_all, task)
 
-    def poll(self) -> bool:
+    def collect_job_results(self) -> bool:
         """Take in what the job has found; True where something came or it ended."""
         with self.lock:
             if self.job is None:
                 return False
-            results = self.job.results()
+            results = self.job.get_results()
             for result in results:
-                self._set(self.work.with_result(result))
+                self._set(self.work.add_result(result))
             if not self.job.finished:
                 return bool(results)
             fault, self.job = self.job.fault, None
             if fault is not None:
-                error = fault.error()
+                error = fault.to_error()
                 self._set(replace(self.work, ended=str(error)))
                 raise error
             return True
@@ -162,32 +162,32 @@ class Session:
                 raise InputError("there is no such result", "choose one that is listed")
             self._set(replace(self.work, method=method, changes={}))
 
-    def simulation(self) -> Live:
+    def get_simulation(self) -> Live:
         """Run and figure at the present sliders. Raises what the simulation needs and lacks."""
         with self.lock:
             if self.live is None:
                 work = self.work
                 twin, log = work.require_twin(), work.require_log()
-                identified = what_if.first_run(twin, log, work.require_shift())
-                present = what_if.replay(identified, twin, log, work.changes)
-                self.live = Live(identified, present, what_if.figure_of(identified, present))
+                identified = what_if.simulate_identified(twin, log, work.require_shift())
+                present = what_if.simulate_changes(identified, twin, log, work.changes)
+                self.live = Live(identified, present, what_if.plot_what_if(identified, present))
             return self.live
 
-    def slide(self, changes: Mapping[str, float]) -> dict[int, dict[str, Any]]:
+    def apply_sliders(self, changes: Mapping[str, float]) -> dict[int, dict[str, Any]]:
         """Simulate with other parameters (SI); returns what changes in the figure, by trace."""
         with self.lock:
-            live, work = self.simulation(), self.work
-            present = what_if.replay(
+            live, work = self.get_simulation(), self.work
+            present = what_if.simulate_changes(
                 live.identified, work.require_twin(), work.require_log(), changes
             )
             self.work = replace(work, changes=dict(changes))
             self.live = replace(live, present=present)
-            return what_if.moved_curves(live.figure, present)
+            return what_if.collect_changed_curves(live.figure, present)
 
     def open_gearbox(self, card: Source | str) -> None:
         """Load a gearbox card, or a built-in one by its name. Raises CardError."""
         if isinstance(card, str):
-            if card not in builtin_gearboxes():
+            if card not in list_builtin_gearboxes():
                 raise InputError("no gearbox is named", "choose a built-in one, or name a card")
             self.gearbox = load_gearbox(card)
         else:
@@ -199,18 +199,18 @@ class Session:
     def save(self, name: str) -> str:
         """Save the workspace in the folder; returns the name it has there."""
         with self.lock:
-            path = self.folder.new_file(name, workspace.ENDING)
-            workspace.save(self.work, path, self.folder)
-            return self.folder.name_of(path)
+            path = self.folder.make_new_path(name, workspace.ENDING)
+            workspace.save_workspace(self.work, path, self.folder)
+            return self.folder.get_name(path)
 
     def reopen(self, source: Source) -> None:
         """Go on with a saved workspace. Raises RefusedError, and the errors of log and card."""
         with self.lock:
-            content = workspace.load(source.path, source.name)
-            log, card = workspace.sources_of(content, self.folder, source.name)
-            work = Work(log=log, card=card, channels=content.specs())
-            work = work.with_opened(self._read(work, work.channels))
-            work = workspace.restored(content, work)
+            content = workspace.load_workspace(source.path, source.name)
+            log, card = workspace.locate_sources(content, self.folder, source.name)
+            work = SessionState(log=log, card=card, channels=content.to_specs())
+            work = work.set_opened(self._read(work, work.channels))
+            work = workspace.restore_workspace(content, work)
             self.cancel()
             self._set(work)
 
@@ -219,11 +219,13 @@ class Session:
         self.cancel()
         shutil.rmtree(self.scratch, ignore_errors=True)
 
-    def _set(self, work: Work) -> None:
+    def _set(self, work: SessionState) -> None:
         self.work = work
         self.live = None
 
-    def _read(self, work: Work, channels: Mapping[str, ChannelSpec]) -> sandboxed_parse.Opened:
+    def _read(
+        self, work: SessionState, channels: Mapping[str, ChannelSpec]
+    ) -> sandboxed_parse.Opened:
         if work.log is None or work.card is None:
             raise InputError("no log is open", "open a log and its vehicle card first")
         request = sandboxed_parse.Request(
@@ -236,7 +238,10 @@ class Session:
         )
         scratch = self.scratch / "mapping.toml"
         opened: sandboxed_parse.Opened = jobs.call(
-            sandboxed_parse.open_log, request, scratch, limit=sandboxed_parse.time_for(request.log)
+            sandboxed_parse.open_log,
+            request,
+            scratch,
+            limit=sandboxed_parse.compute_time_limit(request.log),
         )
         return opened
 
@@ -249,7 +254,7 @@ class Sessions:
     _held: dict[str, Session] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def new(self) -> str:
+    def create(self) -> str:
         """Open a session and return its key."""
         key = secrets.token_urlsafe(24)
         scratch = Path(tempfile.mkdtemp(prefix="drivetwin-app-"))

@@ -15,8 +15,8 @@ from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.workbench.identifying import Outcome, Refusal
-from drivetwin.workbench.locks import Lock, card_lock, checked, locked
-from drivetwin.workbench.phases import Boundary, moved
+from drivetwin.workbench.locks import Lock, apply_locks, check_lock, get_card_lock
+from drivetwin.workbench.phases import Boundary, move_boundaries
 from drivetwin.workbench.sandboxed_parse import Opened
 
 
@@ -30,7 +30,7 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
-class Work:
+class SessionState:
     """The state of a session.
 
     `channels` are the corrections of the mapping, `moves` the boundaries set by hand [s] by number
@@ -54,7 +54,7 @@ class Work:
     shift: int = 0
     changes: Mapping[str, float] = field(default_factory=dict)
 
-    def with_opened(self, opened: Opened) -> Work:
+    def set_opened(self, opened: Opened) -> SessionState:
         """After a log was read: what was found from another reading no longer holds."""
         shifts = opened.found.shifts if opened.found is not None else ()
         return replace(
@@ -63,43 +63,43 @@ class Work:
             shifts=shifts,
             moves={},
             shift=0,
-        ).without_results()
+        ).drop_results()
 
-    def with_moves(self, index: int, changes: Mapping[Boundary, float]) -> Work:
+    def apply_moves(self, index: int, changes: Mapping[Boundary, float]) -> SessionState:
         """With boundaries of one shift set by hand; none: as detected. Raises InputError."""
         log, card = self.require_log(), self.require_card()
-        detected = self._detected(index)
+        detected = self._get_detected_shift(index)
         kept = {**self.moves.get(index, {}), **changes} if changes else {}
-        fresh = moved(log, card, detected, kept)
+        fresh = move_boundaries(log, card, detected, kept)
         shifts = tuple(fresh if k == index else one for k, one in enumerate(self.shifts))
         moves = {k: v for k, v in {**self.moves, index: kept}.items() if v}
         return replace(self, shifts=shifts, moves=moves)
 
-    def with_lock(self, parameter_id: str, lock: Lock) -> Work:
+    def set_lock(self, parameter_id: str, lock: Lock) -> SessionState:
         """With one parameter locked; a lock as on the card is none. Raises InputError."""
         kept = {name: one for name, one in self.locks.items() if name != parameter_id}
-        if checked(parameter_id, lock) != card_lock(self.require_card(), parameter_id):
+        if check_lock(parameter_id, lock) != get_card_lock(self.require_card(), parameter_id):
             kept[parameter_id] = lock
         return replace(self, locks=kept)
 
-    def without_results(self) -> Work:
+    def drop_results(self) -> SessionState:
         """Before an identification."""
         return replace(self, results={}, refusals={}, ended="", method=None, changes={})
 
-    def with_result(self, result: Outcome | Refusal) -> Work:
+    def add_result(self, result: Outcome | Refusal) -> SessionState:
         """With what one method found, which is shown from now on."""
         if isinstance(result, Refusal):
             return replace(self, refusals={**self.refusals, result.method: result.text})
         results = {**self.results, result.method: result}
         return replace(self, results=results, method=result.method, changes={})
 
-    def lock_of(self, parameter_id: str) -> Lock:
+    def get_lock(self, parameter_id: str) -> Lock:
         """The lock of a parameter: as set, else as on the card."""
-        return self.locks.get(parameter_id) or card_lock(self.require_card(), parameter_id)
+        return self.locks.get(parameter_id) or get_card_lock(self.require_card(), parameter_id)
 
-    def locked_card(self) -> VehicleCard:
+    def apply_locks_to_card(self) -> VehicleCard:
         """The card as the locks have it."""
-        return locked(self.require_card(), self.locks)
+        return apply_locks(self.require_card(), self.locks)
 
     def require_opened(self) -> Opened:
         """Return the opened log; raise InputError if none is open."""
@@ -137,7 +137,7 @@ class Work:
         """The twin that is shown; raises InputError before an identification."""
         return self.require_outcome().twin
 
-    def _detected(self, index: int) -> Shift:
+    def _get_detected_shift(self, index: int) -> Shift:
         found = self.require_opened().found
         if found is None or not 0 <= index < len(found.shifts):
             raise InputError("there is no such shift", "choose one of the shifts of the log")

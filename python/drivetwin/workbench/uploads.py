@@ -39,7 +39,7 @@ class Upload:
     path: Path
 
 
-def label_of(name: str) -> str:
+def make_label(name: str) -> str:
     """The name that an upload is shown under. Raises RefusedError for one that is a path or none.
 
     Names are compared after NFKC: a full-width slash is a slash.
@@ -54,20 +54,22 @@ def label_of(name: str) -> str:
     return name
 
 
-def receive(stream: IO[bytes], name: str, claimed: int | None, target: Path, limit: int) -> Upload:
+def store_stream(
+    stream: IO[bytes], name: str, claimed: int | None, target: Path, limit: int
+) -> Upload:
     """Write at most `limit` bytes of `stream` to `target`; delete the file if it is refused.
 
     `claimed` is the length that the browser states, None where it states none.
     Raises RefusedError for a bad name, too many bytes, claimed or sent, and none at all.
     """
-    label = label_of(name)
+    label = make_label(name)
     if claimed is not None and claimed > limit:
-        raise _too_large(label, f"{claimed / 1e6:.0f} MB", limit)
+        raise _make_size_error(label, f"{claimed / 1e6:.0f} MB", limit)
     try:
         with target.open("xb") as file:
             size = _copy(stream, file, limit)
         if size > limit:
-            raise _too_large(label, "more", limit)
+            raise _make_size_error(label, "more", limit)
         if size == 0:
             raise RefusedError("the file is empty", "upload a file", Where(file=label))
         if claimed is not None and size != claimed:
@@ -112,7 +114,7 @@ def _copy(stream: IO[bytes], file: IO[bytes], limit: int) -> int:
     return size
 
 
-def _too_large(label: str, size: str, limit: int) -> RefusedError:
+def _make_size_error(label: str, size: str, limit: int) -> RefusedError:
     return RefusedError(
         f"the file has {size}, uploads may have {limit / 1e6:.0f} MB",
         "copy it into the folder of the workbench and open it by its path, or cut the log",

@@ -11,15 +11,15 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from drivetwin._util.display_units import Display, display_of
+from drivetwin._util.display_units import Display, get_display_unit
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.parameters import spec_of
-from drivetwin.report.decimate import focused
-from drivetwin.report.figures.stack import Curve, Panel, stacked
-from drivetwin.report.figures.validation import validation_panels
-from drivetwin.report.labels import parameter_label
-from drivetwin.report.sections.blocks import link_of
+from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.decimate import decimate_around
+from drivetwin.report.figures.stack import Curve, Panel, stack_panels
+from drivetwin.report.figures.validation import build_validation_panels
+from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.sections.blocks import make_link
 from drivetwin.report.style import MUTED
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import (
@@ -30,7 +30,7 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.simulate_log import simulated_again, validate
+from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
 
 FRICTION = "mu."
 """Prefix of the slider that scales the friction of an element; 1 as identified."""
@@ -60,35 +60,37 @@ class Slider:
     step: float
 
     @classmethod
-    def over(cls, id: str, label: str, unit: str, range: tuple[float, float, float]) -> Slider:
+    def from_range(
+        cls, id: str, label: str, unit: str, range: tuple[float, float, float]
+    ) -> Slider:
         """A slider over (low, value, high), rounded to its step."""
         step = 10.0 ** math.floor(math.log10((range[2] - range[0]) / _POSITIONS))
         low, value, high = (float(f"{round(x / step) * step:.12g}") for x in range)
         return cls(id, label, unit, value, low, high, step)
 
 
-def sliders_of(twin: Twin, shift: Shift) -> list[Slider]:
+def list_sliders(twin: Twin, shift: Shift) -> list[Slider]:
     """List the sliders of a shift's simulation: its identifiable parameters."""
-    inertia = f"J_prime_{twin.inertia_gear(shift)}"
+    inertia = f"J_prime_{twin.select_inertia_gear(shift)}"
     names = ("eta", inertia, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
     elements = (shift.offgoing, shift.oncoming)
     ids = (*names, "te_delay", *(f"P0.{element}" for element in elements))
-    told = [_slider(twin, name) for name in ids]
+    told = [_build_slider(twin, name) for name in ids]
     laws = [
-        Slider.over(FRICTION + element, f"μ {element}", "× identified", (0.5, 1.0, 1.5))
+        Slider.from_range(FRICTION + element, f"μ {element}", "× identified", (0.5, 1.0, 1.5))
         for element in elements
     ]
     return [one for one in told if one is not None] + laws
 
 
-def display_for(slider_id: str) -> Display:
+def get_display(slider_id: str) -> Display:
     """Return the display format of a slider's number; friction factors stay unscaled."""
     if slider_id.startswith(FRICTION):
         return Display("× identified")
-    return display_of(spec_of(slider_id).unit)
+    return get_display_unit(get_parameter_spec(slider_id).unit)
 
 
-def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClutch:
+def build_model(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClutch:
     """Build the model of a shift with some parameters changed (SI, by slider id).
 
     Raises MissingParameterError if a parameter was not identified and has no replacement.
@@ -98,80 +100,83 @@ def model_of(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualClut
         for name, value in changes.items()
         if name != "te_delay" and not name.startswith(FRICTION)
     }
-    model = twin.dual_clutch(shift, overrides=overrides)
+    model = twin.build_dual_clutch(shift, overrides=overrides)
     elements = tuple(
-        _scaled(element, changes.get(FRICTION + element.name, 1.0)) for element in model.elements
+        _scale_friction(element, changes.get(FRICTION + element.name, 1.0))
+        for element in model.elements
     )
     return replace(model, elements=elements)
 
 
-def changes_of(sliders: Sequence[Slider], positions: Mapping[str, float]) -> dict[str, float]:
+def collect_changes(sliders: Sequence[Slider], positions: Mapping[str, float]) -> dict[str, float]:
     """Return the parameters (SI) by slider id that differ from their identified values."""
     return {
-        one.id: positions[one.id] / display_for(one.id).factor
+        one.id: positions[one.id] / get_display(one.id).factor
         for one in sliders
         if one.id in positions and abs(positions[one.id] - one.value) > 0.5 * one.step
     }
 
 
-def first_run(twin: Twin, log: ShiftLog, shift: Shift) -> Validation:
-    """The shift with the parameters as identified. Raises as `model_of` and `validate` do."""
-    return validate(twin, log, shift)
+def simulate_identified(twin: Twin, log: ShiftLog, shift: Shift) -> Validation:
+    """The shift with the parameters as identified. Raises as `build_model` and `validate` do."""
+    return simulate_shift(twin, log, shift)
 
 
-def replay(
+def simulate_changes(
     before: Validation, twin: Twin, log: ShiftLog, changes: Mapping[str, float]
 ) -> Validation:
     """The shift of `before` with parameters changed."""
-    model = model_of(twin, before.shift, changes)
-    return simulated_again(before, _delayed(twin, changes), log, model)
+    model = build_model(twin, before.shift, changes)
+    return rerun_shift(before, _apply_delays(twin, changes), log, model)
 
 
-def figure_of(identified: Validation, present: Validation) -> go.Figure:
+def plot_what_if(identified: Validation, present: Validation) -> go.Figure:
     """Simulation over measurement; where parameters are changed also the one as identified."""
-    panels = [_with_identified(panel, identified) for panel in validation_panels(present)]
-    figure = stacked(panels, present.phases, height=_HEIGHT)
-    figure.update_layout(uirevision=link_of(present.shift))
+    panels = [_add_identified(panel, identified) for panel in build_validation_panels(present)]
+    figure = stack_panels(panels, present.phases, height=_HEIGHT)
+    figure.update_layout(uirevision=make_link(present.shift))
     return figure
 
 
-def moved_curves(figure: go.Figure, present: Validation) -> dict[int, dict[str, Any]]:
+def collect_changed_curves(figure: go.Figure, present: Validation) -> dict[int, dict[str, Any]]:
     """New x and y of the traces of `figure_of` that follow the sliders, by their number.
 
     They are packed (`dtype`, `bdata` in base64): half of a move would else be spent on digits.
     """
     view = figure.layout.xaxis.range
     curves = [
-        (panel.display, curve) for panel in validation_panels(present) for curve in panel.curves
+        (panel.display, curve)
+        for panel in build_validation_panels(present)
+        for curve in panel.curves
     ]
     following = [pair for pair in curves if pair[1].name in _FOLLOWING]
     places = [k for k, trace in enumerate(figure.data) if trace.name in _FOLLOWING]
     found = {}
     for place, (display, curve) in zip(places, following, strict=True):
-        time, values = focused(curve.time, curve.values, (view[0], view[1]))
-        found[place] = {"x": _packed(time), "y": _packed(display.of(values))}
+        time, values = decimate_around(curve.time, curve.values, (view[0], view[1]))
+        found[place] = {"x": _encode_values(time), "y": _encode_values(display.to_display(values))}
     return found
 
 
-def _packed(values: FloatArray) -> dict[str, str]:
+def _encode_values(values: FloatArray) -> dict[str, str]:
     """An array as plotly.js reads it without a number being spelled out."""
     return {"dtype": "f4", "bdata": base64.b64encode(values.astype("<f4").tobytes()).decode()}
 
 
-def _slider(twin: Twin, name: str) -> Slider | None:
+def _build_slider(twin: Twin, name: str) -> Slider | None:
     estimate = twin.parameters.get(name)
     if estimate is None or estimate.value is None:
         return None
-    spec, display, value = spec_of(name), display_of(estimate.unit), estimate.value
+    spec, display, value = get_parameter_spec(name), get_display_unit(estimate.unit), estimate.value
     span = max(_SPAN * abs(value), _SIGMAS * (estimate.std_total or 0.0))
     if spec.stem == "te_delay":
         span = _DELAY_SPAN
     low, high = max(value - span, spec.lower), min(value + span, spec.upper)
     shown = (low * display.factor, value * display.factor, high * display.factor)
-    return Slider.over(name, parameter_label(name), display.label, shown)
+    return Slider.from_range(name, get_parameter_label(name), display.label, shown)
 
 
-def _scaled(element: ShiftElement, factor: float) -> ShiftElement:
+def _scale_friction(element: ShiftElement, factor: float) -> ShiftElement:
     law = element.friction
     if isinstance(law, FrictionTable):
         scaled = FrictionTable(law.slip, tuple(factor * mu for mu in law.mu))
@@ -182,7 +187,7 @@ def _scaled(element: ShiftElement, factor: float) -> ShiftElement:
     )
 
 
-def _delayed(twin: Twin, changes: Mapping[str, float]) -> Twin:
+def _apply_delays(twin: Twin, changes: Mapping[str, float]) -> Twin:
     """Return the twin with the engine-torque signal delay of the sliders."""
     if "te_delay" not in changes or "te_delay" not in twin.parameters:
         return twin
@@ -190,7 +195,7 @@ def _delayed(twin: Twin, changes: Mapping[str, float]) -> Twin:
     return replace(twin, parameters={**twin.parameters, "te_delay": estimate})
 
 
-def _with_identified(panel: Panel, identified: Validation) -> Panel:
+def _add_identified(panel: Panel, identified: Validation) -> Panel:
     """A panel of measured and simulated with the run as identified behind the present one."""
     if not any(curve.name == "simulated" for curve in panel.curves):
         return panel

@@ -12,11 +12,11 @@ from typing import Literal
 from pydantic import Field, ValidationError, field_validator
 
 from drivetwin._util.atomic import write_bytes, write_text
-from drivetwin._util.toml import StrictModel, key_path
+from drivetwin._util.toml import StrictModel, format_key_path
 from drivetwin._util.version import program_version
 from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.channels.mapping_file import ChannelTable
-from drivetwin.channels.roles import quantity_of
+from drivetwin.channels.roles import get_quantity
 from drivetwin.errors import RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.twin_conversion import file_of, twin_from_file
@@ -24,7 +24,7 @@ from drivetwin.files.twin_file import TwinFile
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.locks import Lock, LockKind
 from drivetwin.workbench.phases import Boundary
-from drivetwin.workbench.session_state import Source, Work
+from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.workspace_folder import Folder
 
@@ -65,24 +65,24 @@ class WorkspaceFile(StrictModel):
 
     @field_validator("channels")
     @classmethod
-    def _known_roles(cls, channels: dict[str, ChannelTable]) -> dict[str, ChannelTable]:
+    def _check_roles(cls, channels: dict[str, ChannelTable]) -> dict[str, ChannelTable]:
         for role in channels:
             try:
-                quantity_of(role)
+                get_quantity(role)
             except KeyError:
                 raise ValueError(f"{role!r} is no channel role") from None
         return channels
 
-    def specs(self) -> dict[str, ChannelSpec]:
+    def to_specs(self) -> dict[str, ChannelSpec]:
         """Corrections of the mapping by role."""
-        return {role: table.spec() for role, table in self.channels.items()}
+        return {role: table.to_spec() for role, table in self.channels.items()}
 
-    def lock_values(self) -> dict[str, Lock]:
+    def to_locks(self) -> dict[str, Lock]:
         """Locks by parameter id."""
         return {name: Lock(one.kind, one.value, one.std) for name, one in self.locks.items()}
 
 
-def save(work: Work, path: Path, folder: Folder) -> None:
+def save_workspace(work: SessionState, path: Path, folder: Folder) -> None:
     """Write the workspace; the file appears whole or not at all.
 
     Uploaded files are kept beside it, so that it can be reopened. Raises InputError before a log is
@@ -94,12 +94,12 @@ def save(work: Work, path: Path, folder: Folder) -> None:
             "a file of this name exists and is no workspace", "choose another name",
             Where(file=path.name),
         )  # fmt: skip
-    log, card = (_kept(one, path.parent, folder) for one in (work.log, work.card))
+    log, card = (_make_file_entry(one, path.parent, folder) for one in (work.log, work.card))
     content = WorkspaceFile(
         program=program_version(),
         log=log,
         card=card,
-        channels={role: _table(spec) for role, spec in work.channels.items()},
+        channels={role: _make_channel_table(spec) for role, spec in work.channels.items()},
         phases={index: dict(times) for index, times in work.moves.items()},
         locks={
             name: LockEntry(kind=one.kind, value=one.value, std=one.std)
@@ -113,7 +113,7 @@ def save(work: Work, path: Path, folder: Folder) -> None:
     write_text(path, content.model_dump_json(by_alias=True, indent=1) + "\n")
 
 
-def load(path: Path, label: str) -> WorkspaceFile:
+def load_workspace(path: Path, label: str) -> WorkspaceFile:
     """Read a workspace. Raises RefusedError that names every fault by its key."""
     where = Where(file=label)
     if path.stat().st_size > LARGEST:
@@ -123,7 +123,9 @@ def load(path: Path, label: str) -> WorkspaceFile:
         return WorkspaceFile.model_validate_json(path.read_bytes())
     except ValidationError as error:
         faults = error.errors(include_url=False, include_context=False, include_input=False)
-        listed = "; ".join(f"{key_path(one['loc'])} {one['msg']}".strip() for one in faults[:5])
+        listed = "; ".join(
+            f"{format_key_path(one['loc'])} {one['msg']}".strip() for one in faults[:5]
+        )
         raise RefusedError(
             f"this is no workspace of this version: {listed}",
             "hand in a workspace that the workbench has saved",
@@ -131,20 +133,20 @@ def load(path: Path, label: str) -> WorkspaceFile:
         ) from None
 
 
-def sources_of(content: WorkspaceFile, folder: Folder, label: str) -> tuple[Source, Source]:
+def locate_sources(content: WorkspaceFile, folder: Folder, label: str) -> tuple[Source, Source]:
     """Locate log and card of a workspace in the folder. Raises RefusedError if one has changed."""
-    return _found(content.log, folder, label), _found(content.card, folder, label)
+    return _locate_source(content.log, folder, label), _locate_source(content.card, folder, label)
 
 
-def restored(content: WorkspaceFile, work: Work) -> Work:
+def restore_workspace(content: WorkspaceFile, work: SessionState) -> SessionState:
     """Return `work`, whose log was read again, with the saved state of the workspace.
 
     Raises InputError where phases, locks or sliders do not belong to the log.
     """
     for index, times in content.phases.items():
-        work = work.with_moves(index, times)
-    for name, lock in content.lock_values().items():
-        work = work.with_lock(name, lock)
+        work = work.apply_moves(index, times)
+    for name, lock in content.to_locks().items():
+        work = work.set_lock(name, lock)
     results = {
         method: Outcome(method, twin_from_file(twin)) for method, twin in content.twins.items()
     }
@@ -155,9 +157,9 @@ def restored(content: WorkspaceFile, work: Work) -> Work:
     return work
 
 
-def _found(entry: FileEntry, folder: Folder, label: str) -> Source:
-    path = folder.file(entry.path)
-    if digest(path) != entry.sha256:
+def _locate_source(entry: FileEntry, folder: Folder, label: str) -> Source:
+    path = folder.get_file(entry.path)
+    if compute_digest(path) != entry.sha256:
         raise RefusedError(
             f"{entry.path} is no longer the file that the workspace was saved with",
             "put the original file back, or open the changed one as a new log",
@@ -166,20 +168,20 @@ def _found(entry: FileEntry, folder: Folder, label: str) -> Source:
     return Source(entry.path, path)
 
 
-def digest(path: Path) -> str:
+def compute_digest(path: Path) -> str:
     """SHA-256 of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _kept(source: Source | None, beside: Path, folder: Folder) -> FileEntry:
+def _make_file_entry(source: Source | None, beside: Path, folder: Folder) -> FileEntry:
     if source is None:
         raise RefusedError("no log is open", "open a log and its vehicle card first")
     if not source.uploaded:
-        return FileEntry(path=source.name, sha256=digest(source.path))
-    target = folder.new_file(folder.name_of(beside / source.name), "")
-    content = digest(source.path)
-    if target.exists() and digest(target) != content:
+        return FileEntry(path=source.name, sha256=compute_digest(source.path))
+    target = folder.make_new_path(folder.get_name(beside / source.name), "")
+    content = compute_digest(source.path)
+    if target.exists() and compute_digest(target) != content:
         raise RefusedError(
             f"the upload {source.name} cannot be kept: another file has its name",
             "save the workspace into another folder",
@@ -187,18 +189,18 @@ def _kept(source: Source | None, beside: Path, folder: Folder) -> FileEntry:
         )
     if not target.exists():
         write_bytes(target, source.path.read_bytes())
-    return FileEntry(path=folder.name_of(target), sha256=content)
+    return FileEntry(path=folder.get_name(target), sha256=content)
 
 
 def _is_workspace(path: Path) -> bool:
     try:
-        load(path, path.name)
+        load_workspace(path, path.name)
     except RefusedError:
         return False
     return True
 
 
-def _table(spec: ChannelSpec) -> ChannelTable:
+def _make_channel_table(spec: ChannelSpec) -> ChannelTable:
     values: Mapping[str, object] = {
         "source": spec.source,
         "group": spec.group,

@@ -23,19 +23,19 @@ class Folder:
     root: Path
 
     @classmethod
-    def at(cls, path: Path) -> Folder:
+    def from_path(cls, path: Path) -> Folder:
         """Open the folder at `path`; raise RefusedError if it does not exist."""
         root = path.resolve()
         if not root.is_dir():
             raise RefusedError("this is no folder", "start in a folder", Where(file=str(path)))
         return cls(root)
 
-    def file(self, name: str) -> Path:
+    def get_file(self, name: str) -> Path:
         """A regular file inside the folder by its path in it; links are followed, then checked.
 
         Raises RefusedError for a path that leads outside, to nothing, or to no regular file.
         """
-        path = self._inside(name)
+        path = self._resolve_inside(name)
         if not path.is_file():
             raise RefusedError(
                 "there is no such file in the folder of the workbench",
@@ -44,12 +44,12 @@ class Folder:
             )
         return path
 
-    def new_file(self, name: str, suffix: str) -> Path:
+    def make_new_path(self, name: str, suffix: str) -> Path:
         """Return the path of a new file called `name`; append `suffix` if it is missing.
 
         Raises RefusedError for a path that leads outside or into a folder that does not exist.
         """
-        path = self._inside(name if name.endswith(suffix) else name + suffix)
+        path = self._resolve_inside(name if name.endswith(suffix) else name + suffix)
         if path.name == suffix or not path.parent.is_dir() or path.is_dir():
             raise RefusedError(
                 "no file can be written there",
@@ -58,16 +58,16 @@ class Folder:
             )
         return path
 
-    def name_of(self, path: Path) -> str:
+    def get_name(self, path: Path) -> str:
         """Return the path of a file relative to the folder, with forward slashes."""
         return path.relative_to(self.root).as_posix()
 
-    def names(self, endings: Collection[str]) -> list[str]:
+    def list_names(self, endings: Collection[str]) -> list[str]:
         """Names of files with one of the `endings`, for completion; hidden ones are left out."""
         found = sorted(name for name in self._walk() if name.lower().endswith(tuple(endings)))
         return found[:MAX_LISTED]
 
-    def _inside(self, name: str) -> Path:
+    def _resolve_inside(self, name: str) -> Path:
         what = "this path leads outside the folder of the workbench"
         try:
             path = (self.root / name.strip()).resolve()

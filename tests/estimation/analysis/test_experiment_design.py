@@ -10,20 +10,29 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.analysis.experiment_design import LEAST_KNOWN, examined, suggest
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.analysis.experiment_design import (
+    LEAST_KNOWN,
+    compute_rankings,
+    rank_experiments,
+)
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.fit import noise_power
-from drivetwin.estimation.likelihood.parametrization import LAW, own_of
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import of_log
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.fit import compute_variance_inflation
+from drivetwin.estimation.likelihood.parametrization import LAW, map_log_names
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import make_log_id
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.suggestion import NONE_HELPS, Experiment, Prospect, Suggestion
+from drivetwin.estimation.result.suggestion import (
+    NONE_HELPS,
+    ExpectedPrecision,
+    Experiment,
+    ExperimentRanking,
+)
 from tests.estimation.asked import by_the_paper, slowed, stepped, still, uncertain_fills
 
 
 def test_throttle_steps_tell_the_age_of_a_torque_that_stood_still() -> None:
-    first = suggest(still())[0]
+    first = compute_rankings(still())[0]
     assert first.parameter == "te_delay"
     assert first.verdict is Verdict.NOT_IDENTIFIABLE
     assert first.half_width == np.inf
@@ -41,13 +50,13 @@ def test_throttle_steps_tell_the_age_of_a_torque_that_stood_still() -> None:
 def test_the_same_shift_again_halves_the_variance() -> None:
     """True of what no prior and no start state shares with the log."""
     found = still()
-    (told,) = (s for s in suggest(found) if s.parameter == "c_o")
+    (told,) = (s for s in compute_rankings(found) if s.parameter == "c_o")
     again = next(p for p in told.prospects if p.experiment is Experiment.AGAIN)
     assert again.half_width == pytest.approx(told.half_width / np.sqrt(2.0), rel=0.02)
 
 
 def test_order_is_by_worth_and_least_known_are_told_too() -> None:
-    found = suggest(stepped())
+    found = compute_rankings(stepped())
     assert len(found) == LEAST_KNOWN
     for one in found:
         assert one.verdict is Verdict.IDENTIFIED
@@ -56,12 +65,12 @@ def test_order_is_by_worth_and_least_known_are_told_too() -> None:
         assert widths[0] < one.half_width
 
 
-def _suggestion(now: float, *widths: float) -> Suggestion:
+def _suggestion(now: float, *widths: float) -> ExperimentRanking:
     prospects = tuple(
-        Prospect(each, 1, width, Verdict.IDENTIFIED)
+        ExpectedPrecision(each, 1, width, Verdict.IDENTIFIED)
         for each, width in zip(Experiment, widths, strict=False)
     )
-    return Suggestion("P0.B2", Verdict.IDENTIFIED, now, prospects)
+    return ExperimentRanking("P0.B2", Verdict.IDENTIFIED, now, prospects)
 
 
 def test_an_experiment_that_hardly_narrows_is_not_named() -> None:
@@ -74,14 +83,14 @@ def test_an_experiment_that_hardly_narrows_is_not_named() -> None:
 
 
 def test_of_an_open_parameter_an_experiment_that_leaves_it_open_is_not_named() -> None:
-    width = Prospect(Experiment.AGAIN, 4, 0.04, Verdict.NOT_IDENTIFIABLE)
-    one = Suggestion("te_delay", Verdict.NOT_IDENTIFIABLE, np.inf, (width,))
+    width = ExpectedPrecision(Experiment.AGAIN, 4, 0.04, Verdict.NOT_IDENTIFIABLE)
+    one = ExperimentRanking("te_delay", Verdict.NOT_IDENTIFIABLE, np.inf, (width,))
     assert one.text == NONE_HELPS
 
 
 def _followed_by_another_shift(found: Identification) -> Identification:
     """The identification as if its shift were followed by one to a gear 4, which K makes."""
-    fit, signals = likelihood_of(found)
+    fit, signals = get_likelihood_fit(found)
     (part,), (shown,) = fit.problem.parts, signals
     first, record = part.structure, part.record
     oncoming = replace(first.driveline.oncoming, name="K", a=5.0, b=6.0)  # a brake of ratio 1.2
@@ -119,7 +128,7 @@ def _followed_by_another_shift(found: Identification) -> Identification:
 
 def test_of_several_shifts_an_element_is_told_by_one_that_moves_it() -> None:
     both = _followed_by_another_shift(uncertain_fills())
-    (told,) = suggest(replace(both, estimates={"P0.B2": both.estimates["P0.B2"]}))
+    (told,) = compute_rankings(replace(both, estimates={"P0.B2": both.estimates["P0.B2"]}))
     again = next(each for each in told.prospects if each.experiment is Experiment.AGAIN)
     assert again.shift == "2→3"
     assert again.half_width < 0.8 * told.half_width
@@ -131,7 +140,7 @@ def test_what_sensors_decide_no_experiment_narrows() -> None:
     c_o = found.estimates["c_o"]
     assert c_o.std_noise is not None
     wide = replace(c_o, std_systematic=20.0 * c_o.std_noise)
-    told = suggest(replace(found, estimates={**found.estimates, "c_o": wide}))
+    told = compute_rankings(replace(found, estimates={**found.estimates, "c_o": wide}))
     (one,) = (s for s in told if s.parameter == "c_o")
     assert not one.prospects
     assert "calibrate" in one.text
@@ -139,35 +148,41 @@ def test_what_sensors_decide_no_experiment_narrows() -> None:
 
 def test_other_methods_have_no_information_to_compare() -> None:
     with pytest.raises(IdentificationError, match="likelihood"):
-        suggest(by_the_paper())
+        compute_rankings(by_the_paper())
 
 
 def test_an_identification_takes_up_what_would_tell_it_more() -> None:
-    told = examined(still())
+    told = rank_experiments(still())
     assert [one.parameter for one in told.evidence.suggestions][:1] == ["te_delay"]
-    assert examined(by_the_paper()) is by_the_paper()
+    assert rank_experiments(by_the_paper()) is by_the_paper()
     known = {n: e for n, e in still().estimates.items() if e.verdict is Verdict.IDENTIFIED}
     sure = replace(still(), estimates=known)
-    assert examined(sure) is sure
+    assert rank_experiments(sure) is sure
 
 
 def test_an_experiment_has_the_slow_errors_of_the_log() -> None:
     """Else the same shift again would seem to narrow what the sensors' filters have widened."""
     half, power = [], []
     for found in (still(), slowed(still())):
-        (told,) = (one for one in suggest(found) if one.parameter == "c_o")
+        (told,) = (one for one in compute_rankings(found) if one.parameter == "c_o")
         half.append(next(p for p in told.prospects if p.experiment is Experiment.AGAIN).half_width)
-        fit, _ = likelihood_of(found)
-        power.append(noise_power(fit, np.eye(len(fit.point.names))[[fit.point.names.index("c_o")]]))
+        fit, _ = get_likelihood_fit(found)
+        power.append(
+            compute_variance_inflation(
+                fit, np.eye(len(fit.point.names))[[fit.point.names.index("c_o")]]
+            )
+        )
     assert power[1] > 2.0 * power[0]
     assert half[1] / half[0] == pytest.approx(np.sqrt(power[1] / power[0]), rel=1e-6)
 
 
 def _numbered(found: Identification, log: int) -> Identification:
     """The identification as if its log were number `log` of several."""
-    fit, signals = likelihood_of(found)
-    own = own_of(log)
-    point = Point(tuple(own.get(name, name) for name in fit.point.names), fit.point.values)
+    fit, signals = get_likelihood_fit(found)
+    own = map_log_names(log)
+    point = ParameterVector(
+        tuple(own.get(name, name) for name in fit.point.names), fit.point.values
+    )
     parts = tuple(
         replace(one, structure=replace(one.structure, log=log)) for one in fit.problem.parts
     )
@@ -177,12 +192,12 @@ def _numbered(found: Identification, log: int) -> Identification:
         likelihood=replace(fit, problem=problem, point=point, mean=point),
         signals=tuple(replace(one, log=log) for one in signals),
     )
-    estimates = [replace(one, id=of_log(one.id, log)) for one in found.estimates.values()]
+    estimates = [replace(one, id=make_log_id(one.id, log)) for one in found.estimates.values()]
     return replace(found, evidence=evidence, estimates={one.id: one for one in estimates})
 
 
 def test_of_several_logs_the_age_of_a_still_torque_is_promised_no_more_than_of_one() -> None:
-    alone, one_of_two = suggest(still())[0], suggest(_numbered(still(), 2))[0]
+    alone, one_of_two = compute_rankings(still())[0], compute_rankings(_numbered(still(), 2))[0]
     assert one_of_two.parameter == "te_delay.2"
     assert [(p.experiment, p.verdict) for p in one_of_two.prospects] == [
         (p.experiment, p.verdict) for p in alone.prospects

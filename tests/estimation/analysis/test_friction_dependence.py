@@ -16,9 +16,9 @@ from drivetwin.dyno.actuators import Actuator, Program
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis import friction_dependence as module
-from drivetwin.estimation.analysis.friction_dependence import Departure, Kind, departures
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.analysis.friction_dependence import Departure, Kind, estimate_departures
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.identification import Identification
 from drivetwin.simulation.dual_clutch import FrictionTable, ShiftElement
 from tests.estimation.asked import DURATION, RATE, stepped
@@ -45,7 +45,7 @@ def _dragging() -> Identification:
         log_file, card_file, _ = write_run(Path(folder) / "log.csv", replace(made, scenario=base))
         card = drivetwin.load_card(card_file)
         log = drivetwin.read_log(log_file, card)
-        return drivetwin.identify_shifts(log, card, drivetwin.find_shifts(log, card))
+        return drivetwin.identify(log, card, drivetwin.detect_shifts(log, card))
 
 
 def _by(found: tuple[Departure, ...], kind: Kind) -> dict[str, Departure]:
@@ -53,14 +53,14 @@ def _by(found: tuple[Departure, ...], kind: Kind) -> dict[str, Departure]:
 
 
 def test_finds_the_drag_of_open_clutches() -> None:
-    told = _by(departures(_dragging()), Kind.DRAG)
+    told = _by(estimate_departures(_dragging()), Kind.DRAG)
     for name, true in DRAG.items():
         assert told[name].text == "seen"
         assert told[name].value == pytest.approx(true, abs=3.5 * told[name].std)
 
 
 def test_sees_none_where_there_is_none() -> None:
-    found = departures(stepped())
+    found = estimate_departures(stepped())
     assert found
     for one in found:
         assert one.text != "seen", one
@@ -71,9 +71,9 @@ def test_slow_errors_of_a_sensor_make_a_departure_less_sure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Noise of the output torque that stays for 50 samples; nothing found is put back."""
-    monkeypatch.setattr(module, "_put_back", lambda *_: None)
+    monkeypatch.setattr(module, "_subtract_effects", lambda *_: None)
     found = stepped()
-    fit, _ = likelihood_of(found)
+    fit, _ = get_likelihood_fit(found)
     (residual,), (part,) = fit.normal.residuals, fit.problem.parts
     count = part.record.outputs[0].values.size
     held = np.repeat(np.random.default_rng(1).standard_normal(count // 50 + 1), 50)[:count]
@@ -81,7 +81,10 @@ def test_slow_errors_of_a_sensor_make_a_departure_less_sure(
     slow[:count] += part.record.sigma[:count] * held
     wrong = replace(fit, normal=replace(fit.normal, residuals=(slow,)))
     evidence = replace(found.evidence, likelihood=wrong)
-    sure, unsure = departures(found), departures(replace(found, evidence=evidence))
+    sure, unsure = (
+        estimate_departures(found),
+        estimate_departures(replace(found, evidence=evidence)),
+    )
     for before, after in zip(sure, unsure, strict=True):
         assert after.std >= 0.99 * before.std
     assert max(a.std / b.std for a, b in zip(unsure, sure, strict=True)) > 1.2
@@ -89,15 +92,18 @@ def test_slow_errors_of_a_sensor_make_a_departure_less_sure(
 
 def test_a_steady_temperature_tells_nothing_and_a_moving_one_is_looked_at() -> None:
     time = np.array([0.0, DURATION])
-    still = departures(stepped(), Sampled(time, np.full(2, 353.0)))
+    still = estimate_departures(stepped(), MeasuredSignal(time, np.full(2, 353.0)))
     assert not _by(still, Kind.TEMPERATURE)
-    moving = _by(departures(stepped(), Sampled(time, np.array([340.0, 360.0]))), Kind.TEMPERATURE)
+    moving = _by(
+        estimate_departures(stepped(), MeasuredSignal(time, np.array([340.0, 360.0]))),
+        Kind.TEMPERATURE,
+    )
     assert moving["B3"].std > 0.0
     assert moving["B3"].text != "seen"
     # Oil that drops out for a second, in which the shift lies, has not changed meanwhile.
     dense = np.linspace(0.0, DURATION, 34)
     kept = dense[(dense < 2.0) | (dense > 3.0)]
-    gappy = Sampled(kept, np.interp(kept, time, [340.0, 360.0]))
+    gappy = MeasuredSignal(kept, np.interp(kept, time, [340.0, 360.0]))
     assert gappy.gaps
-    again = _by(departures(stepped(), gappy), Kind.TEMPERATURE)
+    again = _by(estimate_departures(stepped(), gappy), Kind.TEMPERATURE)
     assert again["B3"].std == pytest.approx(moving["B3"].std, rel=1e-3)

@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.analysis.friction_shape import BENDS, shaped, shaped_friction
-from drivetwin.estimation.analysis.friction_shape_prior import Shape
+from drivetwin.estimation.analysis.friction_shape import BENDS, fit_friction_shape, project_shape
+from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.asked import by_the_paper, stepped
 
 
 def test_free_shape_holds_the_truth() -> None:
     found = stepped()
-    one = shaped_friction(found, Shape.FREE, {})
+    one = fit_friction_shape(found, FrictionShape.FREE, {})
     curve = one.curves["B3"]
-    truth = load_scenario("paper").model.elements[1].friction.at(curve.slip)
+    truth = load_scenario("paper").model.elements[1].friction.evaluate(curve.slip)
     inside = (truth >= curve.mu_lo) & (truth <= curve.mu_hi)
     assert inside.mean() > 0.8
     assert np.abs(curve.mu - truth).max() < 0.004
@@ -37,7 +37,8 @@ def test_free_shape_holds_the_truth() -> None:
 def test_falling_shape_falls_and_sensors_widen_its_band() -> None:
     tolerance = {"output_torque": SensorTolerance(gain=0.01)}
     narrow, wide = (
-        shaped_friction(stepped(), Shape.FALLING, given).curves["B3"] for given in ({}, tolerance)
+        fit_friction_shape(stepped(), FrictionShape.FALLING, given).curves["B3"]
+        for given in ({}, tolerance)
     )
     assert np.diff(narrow.mu).max() <= 1e-9
     assert np.mean(wide.mu_hi - wide.mu_lo) > 1.5 * np.mean(narrow.mu_hi - narrow.mu_lo)
@@ -46,25 +47,29 @@ def test_falling_shape_falls_and_sensors_widen_its_band() -> None:
 def test_without_a_torque_scale_a_shape_is_over_eta_as_its_law_was() -> None:
     found = stepped()
     ratio = replace(found, friction={"B3": replace(found.friction["B3"], over_eta=True)})
-    curve = shaped_friction(ratio, Shape.FREE, {}).curves["B3"]
+    curve = fit_friction_shape(ratio, FrictionShape.FREE, {}).curves["B3"]
     assert curve.over_eta
     assert curve.method_text == "likelihood, free shape, μ over η"
 
 
 def test_other_methods_are_refused() -> None:
     with pytest.raises(IdentificationError, match="paper method"):
-        shaped_friction(by_the_paper(), Shape.FREE, {})
+        fit_friction_shape(by_the_paper(), FrictionShape.FREE, {})
 
 
 @settings(max_examples=40)
-@given(st.integers(0, 10_000), st.integers(2, 8), st.sampled_from([Shape.FALLING, Shape.RISING]))
-def test_is_monotone_and_no_neighbour_is_nearer(seed: int, size: int, shape: Shape) -> None:
+@given(
+    st.integers(0, 10_000),
+    st.integers(2, 8),
+    st.sampled_from([FrictionShape.FALLING, FrictionShape.RISING]),
+)
+def test_is_monotone_and_no_neighbour_is_nearer(seed: int, size: int, shape: FrictionShape) -> None:
     rng = np.random.default_rng(seed)
     factor = rng.standard_normal((size, size)) + 2.0 * np.eye(size)
     covariance = factor @ factor.T
     free = rng.standard_normal(size)
-    mu, within = shaped(shape, free, covariance)
-    steps = np.diff(mu) if shape is Shape.RISING else -np.diff(mu)
+    mu, within = project_shape(shape, free, covariance)
+    steps = np.diff(mu) if shape is FrictionShape.RISING else -np.diff(mu)
     assert steps.min() > -1e-8
     inverse = np.linalg.inv(covariance)
 
@@ -74,14 +79,14 @@ def test_is_monotone_and_no_neighbour_is_nearer(seed: int, size: int, shape: Sha
     best = distance(mu)
     for _ in range(20):
         other = np.sort(mu + 0.1 * rng.standard_normal(size))
-        other = other if shape is Shape.RISING else other[::-1]
+        other = other if shape is FrictionShape.RISING else other[::-1]
         assert distance(other) > best - 1e-7
     assert np.all(np.linalg.eigvalsh(covariance - within) > -1e-7 * np.trace(covariance))
 
 
 def test_a_curve_of_that_shape_stays_as_it_is() -> None:
     mu, covariance = np.array([0.14, 0.12, 0.11]), 1e-6 * np.eye(3)
-    for shape in (Shape.FREE, Shape.FALLING):
-        told, within = shaped(shape, mu, covariance)
+    for shape in (FrictionShape.FREE, FrictionShape.FALLING):
+        told, within = project_shape(shape, mu, covariance)
         assert told == pytest.approx(mu, abs=1e-9)
         assert within == pytest.approx(covariance, abs=1e-12)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError, InputError
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of, profile
+from drivetwin.estimation.analysis.profile_likelihood import compute_profile, get_likelihood_fit
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from tests.estimation.asked import by_the_paper, slowed, stepped
 
 
 def test_of_a_parameter_that_acts_linearly_is_that_of_the_covariance() -> None:
-    one = profile(stepped(), "eta")
+    one = compute_profile(stepped(), "eta")
     half = 0.5 * (one.linear[1] - one.linear[0])
     assert one.interval == pytest.approx(one.linear, abs=0.1 * half)
     distance = (one.values - one.estimate) / (half / 1.96)
@@ -24,7 +24,7 @@ def test_of_a_parameter_that_acts_linearly_is_that_of_the_covariance() -> None:
 
 
 def test_slow_errors_widen_it_like_the_covariance() -> None:
-    one = profile(slowed(stepped()), "eta")
+    one = compute_profile(slowed(stepped()), "eta")
     half = 0.5 * (one.linear[1] - one.linear[0])
     assert half > 1.4 * 1.96 * (stepped().estimates["eta"].std_noise or 0.0)
     assert one.interval == pytest.approx(one.linear, abs=0.15 * half)
@@ -32,23 +32,25 @@ def test_slow_errors_widen_it_like_the_covariance() -> None:
 
 def test_is_the_least_cost_with_the_parameter_held() -> None:
     """Jo′ acts through the locks, not quite linearly; held by a hard prior Q is searched anew."""
-    one = profile(stepped(), "J_out")
-    fit, _ = likelihood_of(stepped())
+    one = compute_profile(stepped(), "J_out")
+    fit, _ = get_likelihood_fit(stepped())
     place = fit.point.names.index("J_out")
     for k in (1, -2):
-        held = replace(fit.problem, prior=fit.problem.prior.held(place, float(one.values[k])))
+        held = replace(
+            fit.problem, prior=fit.problem.prior.fix_parameter(place, float(one.values[k]))
+        )
         start = fit.point.values.copy()
         start[place] = one.values[k]
-        found = minimise(held, fit.point.moved(start))
+        found = minimise(held, fit.point.replace_values(start))
         assert found is not None
-        data = found.normal.cost - held.prior.cost(found.point.values)
-        least = data + fit.problem.prior.cost(found.point.values)
+        data = found.normal.cost - held.prior.compute_prior_cost(found.point.values)
+        least = data + fit.problem.prior.compute_prior_cost(found.point.values)
         rise = (least - fit.normal.cost) / max(fit.chi2, 1.0)
         assert one.rise[k] == pytest.approx(rise, abs=0.1)
 
 
 def test_rises_to_both_sides_of_a_parameter_of_several_unknowns() -> None:
-    one = profile(stepped(), "J_prime_3")
+    one = compute_profile(stepped(), "J_prime_3")
     middle = int(np.argmin(one.rise))
     assert np.all(np.diff(one.rise[middle:]) > 0.0)
     assert np.all(np.diff(one.rise[: middle + 1]) < 0.0)
@@ -60,16 +62,16 @@ def test_rises_to_both_sides_of_a_parameter_of_several_unknowns() -> None:
 @pytest.mark.parametrize(("name", "match"), [("k_x", "choose one of eta"), ("P0.B2", "design")])
 def test_refuses_what_does_not_move(name: str, match: str) -> None:
     with pytest.raises(InputError, match=match):
-        profile(stepped(), name)
+        compute_profile(stepped(), name)
 
 
 def test_refuses_other_methods() -> None:
     with pytest.raises(IdentificationError, match="paper method"):
-        profile(by_the_paper(), "eta")
+        compute_profile(by_the_paper(), "eta")
 
 
 def test_of_a_search_that_was_given_up_it_is_told_why() -> None:
     evidence = replace(by_the_paper().evidence, gave_up="the work ran out")
     with pytest.raises(IdentificationError, match=r"gave up on this log.+ the work ran") as told:
-        likelihood_of(replace(by_the_paper(), evidence=evidence))
+        get_likelihood_fit(replace(by_the_paper(), evidence=evidence))
     assert "--method likelihood" not in told.value.remedy

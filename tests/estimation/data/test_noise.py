@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from drivetwin.estimation.data.noise import resolution, white_noise
+from drivetwin.estimation.data.noise import estimate_resolution, estimate_white_noise
 
 
 def test_noise_is_found_under_a_driveline_oscillation_and_a_step() -> None:
@@ -16,14 +16,14 @@ def test_noise_is_found_under_a_driveline_oscillation_and_a_step() -> None:
     time = np.arange(0.0, 6.0, 1e-3)
     signal = 2000.0 + 1500.0 * np.sin(2 * np.pi * 12.0 * time) + 3000.0 * (time > 3.0)
     noisy = signal + 30.0 * rng.standard_normal(time.size)
-    assert white_noise(noisy) == pytest.approx(30.0, rel=0.05)
+    assert estimate_white_noise(noisy) == pytest.approx(30.0, rel=0.05)
 
 
 def test_rounding_step_is_found_and_none_where_values_are_continuous() -> None:
     rng = np.random.default_rng(2)
     values = 1000.0 + 20.0 * rng.standard_normal(400)
-    assert resolution(11.0 * np.round(values / 11.0)) == pytest.approx(11.0)
-    assert resolution(values) == 0.0
+    assert estimate_resolution(11.0 * np.round(values / 11.0)) == pytest.approx(11.0)
+    assert estimate_resolution(values) == 0.0
 
 
 def test_a_rounding_step_is_found_where_ramps_alone_move_the_signal() -> None:
@@ -35,4 +35,4 @@ def test_a_rounding_step_is_found_where_ramps_alone_move_the_signal() -> None:
     rounded = 11.0 * np.round(values / 11.0)
     jumps = np.abs(np.diff(rounded))
     assert jumps[jumps > 0.0].min() > 11.0
-    assert resolution(rounded) == pytest.approx(11.0)
+    assert estimate_resolution(rounded) == pytest.approx(11.0)

@@ -11,10 +11,15 @@ import pytest
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.estimation.data import prepare as preparation
-from drivetwin.estimation.data.prepare import prepare, prepare_shift, sampled, tolerances_of
-from drivetwin.estimation.data.select_shifts import BESIDE, balanced
+from drivetwin.estimation.data.prepare import (
+    collect_tolerances,
+    prepare,
+    prepare_shift,
+    prepare_signal,
+)
+from drivetwin.estimation.data.select_shifts import BESIDE, drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog, ShiftSignals
-from drivetwin.estimation.linear.multi_shift import disturbed
+from drivetwin.estimation.linear.multi_shift import apply_sensor_error
 from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import RejectedShift, Shift
@@ -73,7 +78,7 @@ def test_of_a_long_log_the_estimators_see_what_is_near_the_shift() -> None:
     for signal in seen:
         assert signal.time[0] == pytest.approx(95.0 - BESIDE, abs=0.011)
         assert signal.time[-1] == pytest.approx(104.0 + BESIDE, abs=0.011)
-    assert signals.engine_torque.sigma == sampled(log["engine_torque"]).sigma
+    assert signals.engine_torque.sigma == prepare_signal(log["engine_torque"]).sigma
     whole = signals_of(log, replace(one, before=(0.0, 100.0), after=(100.6, 200.0)))
     assert whole.engine_torque.time.size == log["engine_torque"].time.size
 
@@ -86,20 +91,20 @@ def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_spe
     }
     log, card = drive(), replace(CARD, i_in=1.2, sensors=sensors)
     other = {"output_torque": sensors["output_torque"]}
-    found = tolerances_of(log, card, shift(100.0))
+    found = collect_tolerances(log, card, shift(100.0))
     assert found == {**other, "engine_speed": SensorTolerance(1e-3, 0.6)}
     # What such an error does to the log is what it does to the signals.
     wrong = replace(log["input_speed"], values=1.001 * log["input_speed"].values + 0.5)
     changed = replace(log, channels={**log.channels, "input_speed": wrong})
     there = prepare_shift(changed, card, shift(100.0)).signals
     right = prepare_shift(log, card, shift(100.0)).signals
-    here = disturbed(right, "engine_speed", SensorTolerance(1e-3, 0.6))
+    here = apply_sensor_error(right, "engine_speed", SensorTolerance(1e-3, 0.6))
     assert here.engine_speed.values == pytest.approx(there.engine_speed.values)
     engine = replace(
         log["input_speed"], role="engine_speed", values=1.2 * log["input_speed"].values
     )
     both = replace(log, channels={**log.channels, "engine_speed": engine})
-    assert tolerances_of(both, card, shift(100.0)) == {
+    assert collect_tolerances(both, card, shift(100.0)) == {
         **other,
         "engine_speed": sensors["engine_speed"],
     }
@@ -109,17 +114,17 @@ def test_rows_that_show_values_late_make_ages_uncertain() -> None:
     log = drive()
     late = {role: replace(one, late=0.01) for role, one in log.channels.items()}
     card = replace(CARD, sensors={"output_torque": SensorTolerance(0.01, 30.0, 4e-3)})
-    found = tolerances_of(replace(log, channels=late), card, shift(100.0))
+    found = collect_tolerances(replace(log, channels=late), card, shift(100.0))
     spread = 0.01 / float(np.sqrt(12.0))
     assert found["output_torque"] == SensorTolerance(0.01, 30.0, float(np.hypot(4e-3, spread)))
     assert found["engine_speed"] == found["pressure.B2"] == SensorTolerance(age=spread)
     assert "input_speed" not in found
-    assert tolerances_of(log, card, shift(100.0)) == card.sensors
+    assert collect_tolerances(log, card, shift(100.0)) == card.sensors
 
 
 def test_what_is_older_has_the_values_of_before() -> None:
     signals = signals_of(drive(), shift(100.0))
-    older = disturbed(signals, "output_torque", SensorTolerance(age=2e-3)).output_torque
+    older = apply_sensor_error(signals, "output_torque", SensorTolerance(age=2e-3)).output_torque
     assert older.time == pytest.approx(signals.output_torque.time + 2e-3)
     assert older.values == pytest.approx(signals.output_torque.values)
 
@@ -134,7 +139,7 @@ def test_what_is_fitted_is_near_the_shifts_chosen(monkeypatch: pytest.MonkeyPatc
     ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
         return tuple(shifts[1:]), (RejectedShift(shifts[0].inertia_phase, "left out"),)
 
-    monkeypatch.setattr(preparation, "chosen", chosen)
+    monkeypatch.setattr(preparation, "select_shifts", chosen)
     (one,) = _prepare(drive(), CARD).signals
     assert one.shift.before == (150.0 - BEFORE, 150.0)
     assert one.shift.after == (150.6, 150.6 + AFTER)
@@ -145,7 +150,9 @@ def test_a_shift_in_overrun_does_not_stop_the_others(monkeypatch: pytest.MonkeyP
     torque = log["output_torque"]
     coasting = np.where(torque.time < 115.0, -100.0, 100.0) + (torque.values - 100.0)
     changed = {**log.channels, "output_torque": replace(torque, values=coasting)}
-    monkeypatch.setattr(preparation, "chosen", lambda _all, _i_f, shifts: (tuple(shifts), ()))
+    monkeypatch.setattr(
+        preparation, "select_shifts", lambda _all, _i_f, shifts: (tuple(shifts), ())
+    )
     card = replace(CARD, loss_law="dissipative")
-    (one,) = balanced(_prepare(replace(log, channels=changed), card)).signals
+    (one,) = drop_unbalanced(_prepare(replace(log, channels=changed), card)).signals
     assert one.shift.before[1] == 150.0

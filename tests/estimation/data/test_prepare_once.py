@@ -16,8 +16,8 @@ from drivetwin.channels.update_raster import find_updates
 from drivetwin.estimation.data import prepare
 from drivetwin.estimation.result.method import Method
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import find_shifts
-from drivetwin.shifts.lockup_clutch import behind_converter
+from drivetwin.shifts.detect import detect_shifts
+from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.estimation.asked import record_log
@@ -51,11 +51,11 @@ def test_each_channel_and_each_shift_is_prepared_once(
 
     def count_referrals(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog:
         referred.append(shift)
-        return behind_converter(log, card, shift)
+        return refer_to_turbine(log, card, shift)
 
     monkeypatch.setattr(shiftlog, "find_updates", count_updates)
-    monkeypatch.setattr(prepare, "behind_converter", count_referrals)
-    found = find_shifts(log, card)
+    monkeypatch.setattr(prepare, "refer_to_turbine", count_referrals)
+    found = detect_shifts(log, card)
     identify(log, card, found, method)
     assert len(columns) == len(log.channels) == len({id(one) for one in columns})
     assert len(referred) == len(found.shifts)

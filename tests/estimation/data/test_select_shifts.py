@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.estimation.data.load_stationarity import own_load
-from drivetwin.estimation.data.prepare import sampled
-from drivetwin.estimation.data.select_shifts import MOST, chosen
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.load_stationarity import fit_constant_load
+from drivetwin.estimation.data.prepare import prepare_signal
+from drivetwin.estimation.data.select_shifts import MAX_SHIFTS, select_shifts
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -47,7 +47,7 @@ def drive(braked: tuple[float, float] = BRAKED) -> tuple[FloatArray, FloatArray,
 
 def channels(
     torque: FloatArray | None = None, wheel: FloatArray | None = None
-) -> tuple[Sampled, Sampled]:
+) -> tuple[MeasuredSignal, MeasuredSignal]:
     """Output torque and wheel speed of the `drive`, or others at its times."""
     time, *braked = drive()
     values = (
@@ -56,23 +56,23 @@ def channels(
     )
     roles = ("output_torque", Quantity.TORQUE), ("wheel_speed", Quantity.SPEED)
     torque_, wheel_ = (
-        sampled(Channel(role, quantity, time, column, role, ""))
+        prepare_signal(Channel(role, quantity, time, column, role, ""))
         for (role, quantity), column in zip(roles, values, strict=True)
     )
     return torque_, wheel_
 
 
 def choose(
-    given: tuple[Sampled, Sampled] | None, shifts: Sequence[Shift]
+    given: tuple[MeasuredSignal, MeasuredSignal] | None, shifts: Sequence[Shift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
-    return chosen(given, CARD.final_drive, shifts)
+    return select_shifts(given, CARD.final_drive, shifts)
 
 
 def test_a_brake_leaves_much_of_the_vehicles_balance() -> None:
     time, torque, wheel = drive()
-    torque_, wheel_ = Sampled(time, torque, 20.0), Sampled(time, wheel, 0.03)
+    torque_, wheel_ = MeasuredSignal(time, torque, 20.0), MeasuredSignal(time, wheel, 0.03)
     steady, braked, brief = (
-        own_load(torque_, wheel_, CARD.final_drive, span)
+        fit_constant_load(torque_, wheel_, CARD.final_drive, span)
         for span in ((15.0, 25.0), (39.0, 47.0), (39.0, 39.3))
     )
     assert steady is not None
@@ -89,8 +89,8 @@ def test_a_brake_that_looks_like_inertia_is_seen_against_the_other_shifts() -> N
     span = (time > 38.0) & (time < 48.0)
     torque = torque.copy()
     torque[span] += 0.3 * (torque[span] - 800.0)
-    torque_, wheel_ = Sampled(time, torque, 20.0), Sampled(time, wheel, 0.03)
-    alone = own_load(torque_, wheel_, CARD.final_drive, (38.5, 47.5))
+    torque_, wheel_ = MeasuredSignal(time, torque, 20.0), MeasuredSignal(time, wheel, 0.03)
+    alone = fit_constant_load(torque_, wheel_, CARD.final_drive, (38.5, 47.5))
     assert alone is not None
     assert alone.left < 1.5
     spans = [shift(20.0), shift(43.0), shift(60.0), shift(75.0)]
@@ -121,17 +121,17 @@ def test_a_shift_that_tells_nothing_of_its_load_is_left_out() -> None:
 
 
 def test_no_more_shifts_than_tell_something_new() -> None:
-    usual = [shift(50.0 + 5.0 * k) for k in range(MOST + 5)]
+    usual = [shift(50.0 + 5.0 * k) for k in range(MAX_SHIFTS + 5)]
     rare = replace(shift(150.0), kind=ShiftKind.POWER_OFF_UP)
     kept, refused = choose(channels(), (*usual, rare))
-    assert len(kept) == MOST
+    assert len(kept) == MAX_SHIFTS
     assert rare in kept
     assert list(kept) == sorted(kept, key=lambda one: one.lockup_time)
-    assert len(refused) == len(usual) + 1 - MOST
+    assert len(refused) == len(usual) + 1 - MAX_SHIFTS
     assert all("not needed" in one.reason for one in refused)
 
 
 def test_without_an_output_torque_the_first_of_each_kind_are_taken() -> None:
-    usual = tuple(shift(50.0 + 5.0 * k) for k in range(MOST + 1))
+    usual = tuple(shift(50.0 + 5.0 * k) for k in range(MAX_SHIFTS + 1))
     kept, _ = choose(None, usual)
-    assert kept == usual[:MOST]
+    assert kept == usual[:MAX_SHIFTS]

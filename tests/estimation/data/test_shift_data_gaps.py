@@ -14,7 +14,7 @@ import pytest
 
 from drivetwin.channels.shiftlog import FloatArray, ShiftLog
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import card_text, log_text
+from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.identification import Identification
@@ -22,7 +22,7 @@ from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.shared_results import shared
@@ -36,8 +36,8 @@ def whole() -> tuple[ShiftLog, VehicleCard]:
     with TemporaryDirectory() as text:
         folder = Path(text)
         bench = run(load_scenario("paper_steps"), seed=3)
-        (folder / "log.csv").write_text(log_text(bench))
-        (folder / "card.toml").write_text(card_text(bench.scenario))
+        (folder / "log.csv").write_text(format_log(bench))
+        (folder / "card.toml").write_text(format_card(bench.scenario))
         card = load_card(folder / "card.toml")
         return read_log(folder / "log.csv", card), card
 
@@ -53,12 +53,12 @@ def without(role: str, span: tuple[float, float]) -> ShiftLog:
 @shared
 def undamaged(method: Method) -> Mapping[str, Estimate]:
     log, card = whole()
-    return identify(log, card, find_shifts(log, card), method).estimates
+    return identify(log, card, detect_shifts(log, card), method).estimates
 
 
 def identified(log: ShiftLog, method: Method) -> Identification:
     _, card = whole()
-    return identify(log, card, find_shifts(log, card), method)
+    return identify(log, card, detect_shifts(log, card), method)
 
 
 def holds(found: Identification, method: Method) -> list[str]:

@@ -8,10 +8,10 @@ import numpy as np
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import Problem
-from drivetwin.estimation.likelihood.optimize.multistart import fit
-from drivetwin.estimation.likelihood.priors import problem_of
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.optimize.objective import ParameterVector
 from tests.support.bench import Bench, Knowledge, record_bench
 from tests.support.shared_results import shared
 
@@ -50,17 +50,17 @@ def truth_of(made: Bench) -> dict[str, float]:
     return values
 
 
-def problem(made: Bench, off: float = 0.0) -> tuple[Problem, Point]:
+def problem(made: Bench, off: float = 0.0) -> tuple[LikelihoodObjective, ParameterVector]:
     """The fit of a log, started `off` (relative) beside the truth, alternately up and down."""
     guess = {
         name: value * (1.0 + off * (-1) ** k)
         for k, (name, value) in enumerate(truth_of(made).items())
     }
-    return problem_of([made.signals], [made.driveline], made.run.scenario.model.loss_law, guess)
+    return build_problem([made.signals], [made.driveline], made.run.scenario.model.loss_law, guess)
 
 
 @shared
 def fitted(seed: int = 0) -> LikelihoodFit:
     made = bench(seed)
     posed, start = problem(made)
-    return fit(posed, start, [made.signals.shift])
+    return fit_multistart(posed, start, [made.signals.shift])

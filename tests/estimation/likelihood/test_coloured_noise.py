@@ -10,7 +10,11 @@ import pytest
 from scipy.signal import lfilter
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of, spread_of
+from drivetwin.estimation.likelihood.fit import (
+    LikelihoodFit,
+    compute_covariance,
+    invert_information,
+)
 from tests.estimation.likelihood.fixtures import fitted
 
 FILTER = 0.8
@@ -32,13 +36,13 @@ def _draws(fit: LikelihoodFit, count: int, slow: bool) -> FloatArray:
 
 
 def _spread(fit: LikelihoodFit, residual: FloatArray) -> FloatArray:
-    return spread_of(fit.problem, replace(fit.normal, residuals=(residual,)), 1.0)
+    return compute_covariance(fit.problem, replace(fit.normal, residuals=(residual,)), 1.0)
 
 
 def test_a_filtered_sensor_widens_intervals_to_what_its_noise_does() -> None:
     fit = fitted()
     noise = _draws(fit, 100, slow=True)
-    plain = covariance_of(fit.normal.information)
+    plain = invert_information(fit.normal.information)
     moves = plain @ (fit.normal.regressors[0].T @ noise)
     told = _spread(fit, noise[:, 0])
     for name in ("eta", "Tv_over_if", "J_vehicle"):
@@ -51,6 +55,6 @@ def test_a_filtered_sensor_widens_intervals_to_what_its_noise_does() -> None:
 
 def test_white_noise_widens_nothing() -> None:
     fit = fitted()
-    plain = covariance_of(fit.normal.information)
+    plain = invert_information(fit.normal.information)
     told = _spread(fit, _draws(fit, 1, slow=False)[:, 0])
     assert told == pytest.approx(plain, rel=1e-12, abs=0.0)

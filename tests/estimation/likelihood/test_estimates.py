@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.estimation.likelihood.estimates import conclude
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
-from drivetwin.estimation.linear.multi_shift import disturbed
+from drivetwin.estimation.likelihood.estimates import build_estimates
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.linear.multi_shift import apply_sensor_error
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
@@ -24,12 +24,12 @@ OFFSET = 50.0
 
 def _inertia(offset: float) -> Estimate:
     made = bench(know=CLOSE)
-    signals = disturbed(made.signals, "output_torque", SensorTolerance(offset=offset))
+    signals = apply_sensor_error(made.signals, "output_torque", SensorTolerance(offset=offset))
     posed, start = problem(replace(made, signals=signals))
-    fit = nearest(posed, start)
+    fit = fit_local(posed, start)
     assert fit is not None
     tolerances = {"output_torque": SensorTolerance(offset=OFFSET)}
-    return conclude(fit, [signals], [made.driveline], {}, tolerances).estimates["J_out"]
+    return build_estimates(fit, [signals], [made.driveline], {}, tolerances).estimates["J_out"]
 
 
 def test_a_design_value_that_the_log_moves_is_as_wrong_as_its_sensors() -> None:
@@ -47,7 +47,7 @@ def test_a_design_value_that_the_log_moves_is_as_wrong_as_its_sensors() -> None:
 def test_a_drum_known_better_than_on_the_card_keeps_its_value_however_wide() -> None:
     made = bench(know=Knowledge(J_out=0.1, drum=0.03))
     posed, start = problem(made)
-    fit = nearest(posed, start)
+    fit = fit_local(posed, start)
     assert fit is not None
     name = made.driveline.oncoming.name
     k = fit.point.names.index(f"{name}.drum")
@@ -55,8 +55,10 @@ def test_a_drum_known_better_than_on_the_card_keeps_its_value_however_wide() -> 
     values[k] = 0.007
     covariance[k, :] *= 0.022 / np.sqrt(fit.covariance[k, k])
     covariance[:, k] *= 0.022 / np.sqrt(fit.covariance[k, k])
-    known = replace(fit, mean=fit.point.moved(values), covariance=covariance)
-    told = conclude(known, [made.signals], [made.driveline], {}, {}).estimates[f"drum.{name}"]
+    known = replace(fit, mean=fit.point.replace_values(values), covariance=covariance)
+    told = build_estimates(known, [made.signals], [made.driveline], {}, {}).estimates[
+        f"drum.{name}"
+    ]
     assert told.value == pytest.approx(0.007)
     assert told.verdict is Verdict.WEAK
 
@@ -66,14 +68,14 @@ def test_a_design_value_that_the_log_contradicts_is_told_with_what_rests_on_it()
     truth = made.run.scenario.model.J_out
     wrong = replace(made.driveline, J_out=PriorValue(2.0 * truth, 0.08 * truth))
     posed, start = problem(replace(made, driveline=wrong))
-    fit = nearest(posed, start)
+    fit = fit_local(posed, start)
     assert fit is not None
-    told = conclude(fit, [made.signals], [wrong], {}, {})
+    told = build_estimates(fit, [made.signals], [wrong], {}, {})
     (text,) = [one for one in told.warnings if one.startswith("J_out: the vehicle card says")]
     assert f"{2.0 * truth:.4g}" in text
     assert told.estimates["J_out"].verdict is Verdict.WEAK
     assert "without the card's J_out" in told.estimates["k_o"].reason
     assert told.estimates["k_o"].verdict is Verdict.WEAK
     assert told.estimates["Tv_over_if"].verdict is Verdict.IDENTIFIED
-    sound = conclude(fitted(), [made.signals], [made.driveline], {}, {})
+    sound = build_estimates(fitted(), [made.signals], [made.driveline], {}, {})
     assert not [one for one in sound.warnings if "the vehicle card says" in one]

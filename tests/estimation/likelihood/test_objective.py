@@ -9,25 +9,25 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.noise.residual_covariance import Whiteness
-from drivetwin.estimation.likelihood.objective import Problem
+from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from tests.estimation.likelihood.fixtures import bench, problem
 
 
 @dataclass(frozen=True)
-class _Lost(Whiteness):
+class _Lost(Whitener):
     """A weighting under which the column `place` has a square of the wrong sign, or none has."""
 
     place: int | None = None
 
-    def weighted(self, columns: FloatArray) -> FloatArray:
-        found = super().weighted(columns)
+    def apply_inverse(self, columns: FloatArray) -> FloatArray:
+        found = super().apply_inverse(columns)
         if self.place is not None and found.ndim == 2:
             found[:, self.place] *= -1.0
         return found
 
 
-def _weighted_by(posed: Problem, place: int | None) -> Problem:
+def _weighted_by(posed: LikelihoodObjective, place: int | None) -> LikelihoodObjective:
     """The problem under that weighting; column 0 is the residual, then come the slopes."""
     parts = (
         replace(one, weighting=_Lost(one.weighting.variance, one.weighting.path, place))

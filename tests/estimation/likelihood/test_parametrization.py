@@ -10,18 +10,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.estimation.data.prepare import driveline_of
-from drivetwin.estimation.data.shift_data import Coupling
+from drivetwin.estimation.data.prepare import build_driveline
+from drivetwin.estimation.data.shift_data import ShiftElementKinematics
 from drivetwin.estimation.likelihood.parametrization import LAW, RETRACTION_SLIPS, retract
-from drivetwin.estimation.likelihood.priors import problem_of
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import oscillation, parameters
-from drivetwin.estimation.linear.friction_points import stribeck
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
+    compute_oscillation,
+    compute_parameters,
+)
+from drivetwin.estimation.linear.friction_points import evaluate_stribeck
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.likelihood.fixtures import bench, truth_of
 from tests.shifts.fixtures import make_card
 
-IDLE = Coupling("K2", 1.4, 1.4, 4.6e-2, PriorValue(8e4), PriorValue(0.2, 0.1))
+IDLE = ShiftElementKinematics("K2", 1.4, 1.4, 4.6e-2, PriorValue(8e4), PriorValue(0.2, 0.1))
 DRUM = "K2.drum"
 
 
@@ -29,37 +32,42 @@ def test_an_idle_drum_turns_with_the_shift() -> None:
     made = bench()
     couplings = {**made.driveline.couplings, "K2": IDLE}
     driveline = replace(made.driveline, couplings=couplings)
-    posed, point = problem_of([made.signals], [driveline], "paper", {**truth_of(made), DRUM: 0.2})
+    posed, point = build_problem(
+        [made.signals], [driveline], "paper", {**truth_of(made), DRUM: 0.2}
+    )
     part = posed.parts[0]
     assert DRUM in point.names
-    assert part.structure.model(point).elements[2].drum_inertia == 0.2
-    found = part.linearised(point)
+    assert part.structure.build_model(point).elements[2].drum_inertia == 0.2
+    found = part.linearise(point)
     assert found is not None
     k = point.names.index(DRUM)
     step = np.zeros(point.values.size)
     step[k] = 1e-3
-    runs = [part.run(point.moved(point.values + sign * step)) for sign in (1.0, -1.0)]
+    runs = [part.simulate(point.replace_values(point.values + sign * step)) for sign in (1.0, -1.0)]
     assert runs[0] is not None
     assert runs[1] is not None
-    slope = (part.record.stacked(runs[0]) - part.record.stacked(runs[1])) / 2e-3
+    slope = (part.record.sample_run(runs[0]) - part.record.sample_run(runs[1])) / 2e-3
     before = part.record.time[part.record.outputs[0].place] < made.signals.shift.before[1] - 0.05
     column = found[1][: before.size, k]
     assert np.linalg.norm((column - slope[: before.size])[before]) < 1e-3 * np.linalg.norm(
         slope[: before.size][before]
     )
-    told = parameters(posed, point, [made.signals])
+    told = compute_parameters(posed, point, [made.signals])
     assert told["drum.K2"] == pytest.approx(0.2)
-    frequency, _ = oscillation(part.structure, point)
-    assert frequency < oscillation(part.structure, point.moved(point.values - 100.0 * step))[0]
+    frequency, _ = compute_oscillation(part.structure, point)
+    assert (
+        frequency
+        < compute_oscillation(part.structure, point.replace_values(point.values - 100.0 * step))[0]
+    )
 
 
 def test_an_element_breaks_away_at_the_peak_that_the_card_states() -> None:
     """The twin is simulated with it, so a fit without it would tell another friction."""
     made, card = bench(), make_card({"2": 1.91, "3": 1.43})
     elements = {**card.elements, "B3": replace(card.elements["B3"], peak=1.25)}
-    driveline = driveline_of(replace(card, elements=elements), made.signals.shift)
-    posed, point = problem_of([made.signals], [driveline], "paper", truth_of(made))
-    model = posed.parts[0].structure.model(point)
+    driveline = build_driveline(replace(card, elements=elements), made.signals.shift)
+    posed, point = build_problem([made.signals], [driveline], "paper", truth_of(made))
+    model = posed.parts[0].structure.build_model(point)
     assert {one.name: one.peak for one in model.elements} == {"B2": 1.0, "B3": 1.25}
 
 
@@ -73,9 +81,9 @@ START = np.array([0.9, 0.11, 0.02, 1e-4, np.log(12.0), 0.12])
 )
 def test_the_law_takes_the_step_in_its_values(mu: list[float], by_scale: float) -> None:
     step = np.array([0.01, mu[0], mu[1], 1e-2 * mu[2], by_scale, 0.003])
-    before, slopes = stribeck(START[1:5], RETRACTION_SLIPS)
-    found = retract(Point(NAMES, START), step)
-    assert stribeck(found[1:5], RETRACTION_SLIPS)[0] == pytest.approx(
+    before, slopes = evaluate_stribeck(START[1:5], RETRACTION_SLIPS)
+    found = retract(ParameterVector(NAMES, START), step)
+    assert evaluate_stribeck(found[1:5], RETRACTION_SLIPS)[0] == pytest.approx(
         before + slopes.T @ step[1:5], abs=1e-9
     )
     assert found[4] == START[4] + by_scale
@@ -84,4 +92,4 @@ def test_the_law_takes_the_step_in_its_values(mu: list[float], by_scale: float) 
 
 def test_without_a_change_of_v_s_the_step_is_straight() -> None:
     step = np.array([0.0, 1e-3, -2e-3, 1e-5, 0.0, 0.0])
-    assert retract(Point(NAMES, START), step) == pytest.approx(START + step)
+    assert retract(ParameterVector(NAMES, START), step) == pytest.approx(START + step)

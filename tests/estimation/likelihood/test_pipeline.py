@@ -10,8 +10,8 @@ import pytest
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData
-from drivetwin.estimation.likelihood.pipeline import DISAGREE, likelihood
-from drivetwin.estimation.linear.estimates import conclude
+from drivetwin.estimation.likelihood.pipeline import DISAGREE, estimate_likelihood
+from drivetwin.estimation.linear.estimates import assess_shifts
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
 from drivetwin.simulation.dual_clutch import RoadLoad
 from tests.support.bench import Bench, Knowledge, record_bench
@@ -27,8 +27,8 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     signals, drivelines = [made.signals], [made.driveline]
     shifts = [identify_shift(made.signals, made.driveline, 5.0)]
-    linear = conclude(shifts, signals, drivelines, {})
-    told, _ = likelihood(signals, drivelines, (linear, shifts), DESIGN)
+    linear = assess_shifts(shifts, signals, drivelines, {})
+    told, _ = estimate_likelihood(signals, drivelines, (linear, shifts), DESIGN)
     assert told.load is not None
     assert sum("grows with the square of the speed" in text for text in told.warnings) == 1
     linear_J, J = linear.estimates["J_vehicle"], told.estimates["J_vehicle"]
@@ -67,9 +67,9 @@ def _started_from(
         seen.append(given[3])
         raise IdentificationError("seen", "")
 
-    monkeypatch.setattr("drivetwin.estimation.likelihood.pipeline.choose", caught)
+    monkeypatch.setattr("drivetwin.estimation.likelihood.pipeline.select_model", caught)
     signals, drivelines = [made.signals], [made.driveline]
-    linear = conclude([shift], signals, drivelines, {})
+    linear = assess_shifts([shift], signals, drivelines, {})
     with pytest.raises(IdentificationError, match="seen"):
-        likelihood(signals, drivelines, (linear, [shift]), DESIGN)
+        estimate_likelihood(signals, drivelines, (linear, [shift]), DESIGN)
     return seen[0]

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.estimation.likelihood.objective import Problem
-from drivetwin.estimation.likelihood.optimize.multistart import fit
-from drivetwin.estimation.likelihood.priors import BOUNDS, problem_of
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
+from drivetwin.estimation.likelihood.priors import BOUNDS, build_problem
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.likelihood.fixtures import bench, fitted, problem, truth_of
 
@@ -33,11 +33,11 @@ def test_output_inertia_is_sought_about_its_design_value() -> None:
 STEP = 1e-6
 
 
-def _posed(known: dict[str, PriorValue]) -> tuple[Problem, Point]:
+def _posed(known: dict[str, PriorValue]) -> tuple[LikelihoodObjective, ParameterVector]:
     made = bench()
     driveline = replace(made.driveline, known=known)
     loss_law = made.run.scenario.model.loss_law
-    return problem_of([made.signals], [driveline], loss_law, truth_of(made))
+    return build_problem([made.signals], [driveline], loss_law, truth_of(made))
 
 
 def _first_gear() -> str:
@@ -48,22 +48,24 @@ def test_a_fixed_gear_inertia_is_met_exactly() -> None:
     known = {f"J_prime_{_first_gear()}": PriorValue(16.9)}
     problem, start = _posed(known)
     assert "J_e" not in start.names
-    best = fit(problem, start, [bench().signals.shift])
-    told = parameters(best.problem, best.point, [bench().signals])
+    best = fit_multistart(problem, start, [bench().signals.shift])
+    told = compute_parameters(best.problem, best.point, [bench().signals])
     assert told[f"J_prime_{_first_gear()}"] == pytest.approx(16.9, rel=1e-12)
-    free = parameters(fitted().problem, fitted().point, [bench().signals])
+    free = compute_parameters(fitted().problem, fitted().point, [bench().signals])
     assert told["eta"] != pytest.approx(free["eta"], rel=1e-4)
 
 
 def test_the_core_is_told_how_a_tied_inertia_moves() -> None:
     problem, start = _posed({f"J_prime_{_first_gear()}": PriorValue(16.9)})
     structure = problem.parts[0].structure
-    names, matrix = structure.slopes(start)
+    names, matrix = structure.compute_jacobian(start)
     for unknown in ("J_out", "eta"):
         k = start.names.index(unknown)
         step = np.zeros_like(start.values)
         step[k] = STEP * start.values[k]
-        models = [structure.model(start.moved(start.values + s)) for s in (step, -step)]
+        models = [
+            structure.build_model(start.replace_values(start.values + s)) for s in (step, -step)
+        ]
         by_difference = (models[0].J1 - models[1].J1) / (2.0 * step[k])
         assert matrix[names.index("J1"), k] == pytest.approx(by_difference, rel=1e-6)
 
@@ -76,7 +78,9 @@ def test_a_prior_on_a_gear_inertia_is_one_on_the_sum() -> None:
     for step in (0.0, 0.3, -0.2):
         values = start.values.copy()
         values[start.names.index("J_e")] = J_e + step
-        difference = with_sum.prior.cost(values) - without.prior.cost(values)
+        difference = with_sum.prior.compute_prior_cost(values) - without.prior.compute_prior_cost(
+            values
+        )
         miss = (J_e + step + J_out / ratio**2 - 17.0) / 0.1
         if step == 0.0:
             offset = difference - miss**2
@@ -87,7 +91,7 @@ def test_a_prior_on_a_gear_inertia_is_one_on_the_sum() -> None:
 def test_what_is_fixed_is_no_unknown(name: str) -> None:
     problem, start = _posed({name: PriorValue(0.5)})
     assert name not in start.names
-    assert problem.parts[0].structure.value(start, name) == 0.5
+    assert problem.parts[0].structure.get_value(start, name) == 0.5
 
 
 def test_two_fixed_gear_inertias_are_refused() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.linear.combine_shifts import combine
+from drivetwin.estimation.linear.combine_shifts import merge_shifts
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.vehicle.spec import PriorValue
 
@@ -37,7 +37,7 @@ def test_a_parameter_that_follows_from_others_still_does() -> None:
         ids = ("J_vehicle", f"f_d_{gear}", "k_o")
         return _shift(ids, [x, z, 2.0 * x + z], covariance)
 
-    ids, values, covariance = combine([shift("3", 5.1, 7.2, 0.01), shift("4", 4.9, 7.4, 0.3)])
+    ids, values, covariance = merge_shifts([shift("3", 5.1, 7.2, 0.01), shift("4", 4.9, 7.4, 0.3)])
     found = dict(zip(ids, values, strict=True))
     stds = dict(zip(ids, np.sqrt(np.diag(covariance)), strict=True))
     for gear in ("3", "4"):
@@ -60,7 +60,7 @@ def test_what_is_made_by_a_product_tells_no_more_than_its_factors() -> None:
         covariance = slopes @ np.diag([std_J**2, std_rate**2]) @ slopes.T
         return _shift(("J_vehicle", "c_o", "zeta_3"), [J, 2.0 * rate * J, rate / omega], covariance)
 
-    ids, values, covariance = combine([shift() for _ in range(9)])
+    ids, values, covariance = merge_shifts([shift() for _ in range(9)])
     std = np.sqrt(np.diag(covariance))
     # As if exact the slopes contradict each other, and J seems to be told eighty times better.
     assert std[0] == pytest.approx(std_J / 3.0, rel=0.15)
@@ -71,9 +71,9 @@ def test_what_is_made_by_a_product_tells_no_more_than_its_factors() -> None:
 def test_shifts_that_contradict_each_other_widen_the_interval() -> None:
     spread = np.diag([3.0**2])
     agreeing = [_shift(("c_o",), [c], spread) for c in (168.0, 170.0, 173.0)]
-    _, value, covariance = combine(agreeing)
+    _, value, covariance = merge_shifts(agreeing)
     assert covariance[0, 0] == pytest.approx(3.0**2 / 3.0, rel=1e-3)
-    _, value, covariance = combine([*agreeing, _shift(("c_o",), [60.0], spread)])
+    _, value, covariance = merge_shifts([*agreeing, _shift(("c_o",), [60.0], spread)])
     assert np.sqrt(covariance[0, 0]) == pytest.approx(27.6, abs=0.5)
     assert abs(value[0] - 170.0) < 1.96 * np.sqrt(covariance[0, 0])
 
@@ -84,7 +84,7 @@ def test_equal_shifts_halve_the_variance_but_for_the_prior() -> None:
     std = (prior.std**-2 + data**-2) ** -0.5
     spread = np.diag([0.01**2, std**2])
     one = _shift(("eta", "J_out"), [0.85, 1.05], spread, {"J_out": prior})
-    ids, values, covariance = combine([one, one])
+    ids, values, covariance = merge_shifts([one, one])
     assert ids == ("eta", "J_out")
     assert covariance[0, 0] == pytest.approx(0.01**2 / 2.0, rel=1e-5)
     assert covariance[1, 1] == pytest.approx(1.0 / (prior.std**-2 + 2.0 * data**-2), rel=1e-5)
@@ -102,7 +102,7 @@ def test_shifts_that_tell_nothing_leave_the_design_value_its_width(count: int) -
         {"P0.B3": design, "te_delay": age},
     )
     other = _shift(("P0.B4",), [8e4], np.array([[5e3**2]]), {"P0.B4": design})
-    ids, values, covariance = combine([silent] * count + [other])
+    ids, values, covariance = merge_shifts([silent] * count + [other])
     assert ids == ("P0.B3", "te_delay", "P0.B4")
     assert values == pytest.approx([design.value, age.value, design.value])
     assert np.sqrt(np.diag(covariance)) == pytest.approx([5e3, 0.03, 5e3], rel=1e-6)
@@ -124,17 +124,17 @@ def test_a_nuisance_that_two_shifts_share_is_eliminated_from_both_together() -> 
     for row in seen:
         values, covariance = posterior((row,))
         shifts.append(_shift(("eta", "drum.B2"), values.tolist(), covariance, priors))
-    ids, found, spread = combine(shifts)
+    ids, found, spread = merge_shifts(shifts)
     together, exact = posterior(seen)
     assert ids == ("eta",)
     assert found[0] == pytest.approx(together[0], rel=1e-4)
     assert spread[0, 0] == pytest.approx(exact[0, 0], rel=1e-3)
-    assert combine(shifts[:1])[0] == ("eta",)
+    assert merge_shifts(shifts[:1])[0] == ("eta",)
 
 
 def test_one_shift_stays_as_it_is() -> None:
     one = _shift(("eta",), [0.85], np.array([[1e-4]]))
-    ids, values, covariance = combine([one])
+    ids, values, covariance = merge_shifts([one])
     assert (ids, values[0], covariance[0, 0]) == (("eta",), 0.85, 1e-4)
 
 
@@ -146,10 +146,10 @@ def test_loads_that_differ_leave_the_inertia_as_it_is() -> None:
         rows = np.array([[0.01, 0.0, 0.0], [0.0, 40.0, 0.0], [0.0, with_J3, 4.0]])
         return _shift(ids, [0.9, J3, load], rows @ rows.T)
 
-    told, values, covariance = combine([shift(4010.0, 900.0, 8.0), shift(3990.0, 300.0, -8.0)])
+    told, values, covariance = merge_shifts([shift(4010.0, 900.0, 8.0), shift(3990.0, 300.0, -8.0)])
     assert told == ids
     assert values == pytest.approx([0.9, 4000.0, 598.0])
     assert covariance[1, 1] == pytest.approx(40.0**2 / 2.0, rel=1e-3)
-    _, values, covariance = combine([shift(4010.0, 604.0, 8.0), shift(3990.0, 596.0, -8.0)])
+    _, values, covariance = merge_shifts([shift(4010.0, 604.0, 8.0), shift(3990.0, 596.0, -8.0)])
     assert values[1] == pytest.approx(4000.0 - 16.0, abs=5.0)
     assert covariance[1, 1] < 0.5 * 40.0**2 / 2.0

@@ -7,43 +7,47 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.linear.estimates import MISFIT, conclude
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
+from drivetwin.estimation.linear.estimates import MISFIT, assess_shifts
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.estimate_set import Conclusions, labels_of, low_gear_notes
+from drivetwin.estimation.result.estimate_set import (
+    EstimateSet,
+    collect_low_gear_notes,
+    collect_shift_labels,
+)
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.asked import stepped, still
 
 
 def test_a_gear_with_still_torque_is_named() -> None:
-    notes = low_gear_notes(still().evidence.signals)
+    notes = collect_low_gear_notes(still().evidence.signals)
     assert set(notes) == {"eta", "J_prime_2", "J_prime_3"}
     assert "gear 2 alone" in notes["eta"]
 
 
 def test_another_shift_from_that_gear_with_steps_tells_it() -> None:
     both = (*still().evidence.signals, *stepped().evidence.signals)
-    assert low_gear_notes(both) == {}
+    assert collect_low_gear_notes(both) == {}
 
 
 def test_the_same_shift_twice_is_told_apart_by_its_lock_up() -> None:
     (first,) = stepped().evidence.signals
     later = replace(first, shift=replace(first.shift, lockup_time=12.5))
-    assert labels_of([first]) == ["shift 2-3"]
-    assert labels_of([first, later])[1] == "shift 2-3 at 12.50 s"
+    assert collect_shift_labels([first]) == ["shift 2-3"]
+    assert collect_shift_labels([first, later])[1] == "shift 2-3 at 12.50 s"
     apart = [replace(first, log=1), replace(later, log=2)]
-    assert labels_of(apart) == ["log 1, shift 2-3", "log 2, shift 2-3"]
+    assert collect_shift_labels(apart) == ["log 1, shift 2-3", "log 2, shift 2-3"]
 
 
-def _with_J_out(value: float, known: PriorValue | None, sensors: float = 0.0) -> Conclusions:
+def _with_J_out(value: float, known: PriorValue | None, sensors: float = 0.0) -> EstimateSet:
     """The conclusions of the linear fit of a log as if it had found Jo′ to be `value`."""
     found = stepped()
     (shift,), signals = found.evidence.integral, found.evidence.signals
     values = shift.values.copy()
     values[shift.ids.index("J_out")] = value
-    driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
+    driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
     driveline = replace(driveline, J_out=known)
-    return conclude([replace(shift, values=values)], signals, [driveline], {"J_out": sensors})
+    return assess_shifts([replace(shift, values=values)], signals, [driveline], {"J_out": sensors})
 
 
 def test_where_the_linear_fit_gives_the_impossible_the_card_stands() -> None:
@@ -76,11 +80,11 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
 ) -> None:
     found = stepped()
     (shift,), signals = found.evidence.integral, found.evidence.signals
-    driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
+    driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
     before = getattr(shift, stage)
     for chi2, verdict in ((0.9 * MISFIT, Verdict.IDENTIFIED), (1.1 * MISFIT, Verdict.WEAK)):
         after = replace(before, fit=replace(before.fit, chi2=chi2))
-        told = conclude([replace(shift, **{stage: after})], signals, [driveline], {}).estimates
+        told = assess_shifts([replace(shift, **{stage: after})], signals, [driveline], {}).estimates
         assert told[touched].verdict is verdict
         assert told[spared].verdict is Verdict.IDENTIFIED
     assert "11 times the noise power" in told[touched].reason
@@ -90,14 +94,14 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
 def test_what_many_shifts_have_in_common_is_told_once(count: int, named: str) -> None:
     found = stepped()
     (shift,), (signals,) = found.evidence.integral, found.evidence.signals
-    driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
+    driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
     shifts, every = [], []
     for i in range(count):
         fit = replace(shift.load.fit, chi2=2.0 + i)
         load = replace(shift.load, fit=fit, speed_trend=10.0 + i)
         shifts.append(replace(shift, load=load))
         every.append(replace(signals, shift=replace(signals.shift, lockup_time=10.0 + i)))
-    told = conclude(shifts, every, [driveline] * count, {}).warnings
+    told = assess_shifts(shifts, every, [driveline] * count, {}).warnings
     noisy = [text for text in told if "times the noise power" in text]
     trends = [text for text in told if "changes with speed" in text]
     power, trend = ("2.0", "10.0") if count == 1 else ("2.0 to 5.0", "10.0 to 13.0")
@@ -109,7 +113,7 @@ def test_what_many_shifts_have_in_common_is_told_once(count: int, named: str) ->
 def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:
     found = stepped()
     (shift,), signals = found.evidence.integral, found.evidence.signals
-    driveline = likelihood_of(found)[0].problem.parts[0].structure.driveline
+    driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
     name, design = f"P0.{driveline.oncoming.name}", PriorValue(8e4, 5e3)
     coupling = replace(driveline.oncoming, P0=design)
     couplings = {**driveline.couplings, coupling.name: coupling}
@@ -118,7 +122,7 @@ def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> No
     place = shift.ids.index(name)
     covariance[place, place] = design.std**2
     silent = replace(shift, covariance=covariance, priors={**shift.priors, name: design})
-    told = conclude([silent] * 3, [*signals] * 3, [driveline] * 3, {}).estimates
+    told = assess_shifts([silent] * 3, [*signals] * 3, [driveline] * 3, {}).estimates
     assert told[name].verdict is Verdict.DESIGN
     assert told[name].std_noise == pytest.approx(design.std)
     assert "te_rounding" not in told

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.estimation.linear.inertia_in_gear import HeldGear, held_gear
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.linear.inertia_in_gear import HeldGear, estimate_gear_inertia
 from drivetwin.estimation.result.estimate import Verdict
 from tests.support.coverage import assert_covers, vary_draws
 
@@ -30,12 +30,12 @@ def told(seed: int, length: float = 20.0, swing: float = 250.0, grade: float = 1
     speed = 120.0 + np.cumsum(rate) * 1e-3 + 0.8 * np.sin(2.0 * np.pi * 4.4 * fine)
     slow = slice(None, None, 20)
     noise = rng.normal(size=fine[slow].size)
-    return held_gear(
+    return estimate_gear_inertia(
         "3",
         RATIO,
         (0.0, length),
-        Sampled(fine[slow], np.round(torque[slow] / 11.0) * 11.0),
-        Sampled(fine[slow], speed[slow] + 0.05 * noise),
+        MeasuredSignal(fine[slow], np.round(torque[slow] / 11.0) * 11.0),
+        MeasuredSignal(fine[slow], speed[slow] + 0.05 * noise),
     )
 
 
@@ -61,9 +61,11 @@ def test_a_short_gear_and_a_steady_pedal_are_refused() -> None:
 
 def test_gaps_are_left_out() -> None:
     time = np.arange(0.0, 20.0, 0.02)
-    torque = Sampled(time, 200.0 + 100.0 * np.sin(time))
+    torque = MeasuredSignal(time, 200.0 + 100.0 * np.sin(time))
     keep = np.arange(time.size) % 100 < 50
-    one = held_gear("3", RATIO, (0.0, 20.0), Sampled(time[keep], torque.values[keep]), torque)
+    one = estimate_gear_inertia(
+        "3", RATIO, (0.0, 20.0), MeasuredSignal(time[keep], torque.values[keep]), torque
+    )
     assert one.verdict is Verdict.NOT_IDENTIFIABLE
     assert one.reason.startswith("only 0.0 s")
     assert one.span == pytest.approx((0.0, 20.0))
@@ -71,6 +73,9 @@ def test_gaps_are_left_out() -> None:
 
 def test_a_torque_that_stays_zero_tells_nothing() -> None:
     time = np.arange(0.0, 20.0, 0.02)
-    still, speed = Sampled(time, np.zeros_like(time)), Sampled(time, 100.0 + np.sin(time))
-    one = held_gear("3", RATIO, (0.0, 20.0), still, speed)
+    still, speed = (
+        MeasuredSignal(time, np.zeros_like(time)),
+        MeasuredSignal(time, 100.0 + np.sin(time)),
+    )
+    one = estimate_gear_inertia("3", RATIO, (0.0, 20.0), still, speed)
     assert one.verdict is Verdict.NOT_IDENTIFIABLE

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import white_noise
-from drivetwin.estimation.data.segments import MomentumSettings, off_going_free
-from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
-from drivetwin.estimation.linear.friction_points import stribeck_at
-from drivetwin.estimation.linear.momentum_balance import rounding_error
+from drivetwin.estimation.data.noise import estimate_white_noise
+from drivetwin.estimation.data.segments import MomentumSettings, find_off_going_release
+from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
+from drivetwin.estimation.linear.friction_points import evaluate_fitted_stribeck
+from drivetwin.estimation.linear.momentum_balance import estimate_rounding_error
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
@@ -50,7 +50,7 @@ def compare(found: IntegralShift, truth: Truth, rel: float, rel_mu: float) -> No
     for name, value in truth_of(truth).items():
         assert values[name] == pytest.approx(value, rel=rel), name
     assert found.friction is not None
-    mu = stribeck_at(found.friction, SLIPS)
+    mu = evaluate_fitted_stribeck(found.friction, SLIPS)
     assert mu == pytest.approx([truth.mu(s) for s in SLIPS], rel=rel_mu)
 
 
@@ -80,7 +80,7 @@ def test_an_off_going_element_of_unknown_or_no_fill_pressure_still_leaves_an_ine
     signals, driveline = constant.signals(), Truth().driveline()
     unknown = replace(driveline, offgoing=replace(driveline.offgoing, P0=P0))
     settings = MomentumSettings()
-    known, free = (off_going_free(signals, one, settings) for one in (driveline, unknown))
+    known, free = (find_off_going_release(signals, one, settings) for one in (driveline, unknown))
     assert known < free < known + 0.05
     compare(identify_shift(signals, unknown, 12.0), Truth(), 5e-4, 5e-4)
 
@@ -92,7 +92,7 @@ def test_an_off_going_element_that_lingers_about_its_fill_pressure_is_never_free
     low = signals.pressures["B2"]
     held = replace(low, values=np.maximum(low.values, Truth().P0 + 3e3))
     lingering = replace(signals, pressures={**signals.pressures, "B2": held})
-    free = off_going_free(lingering, driveline, MomentumSettings())
+    free = find_off_going_release(lingering, driveline, MomentumSettings())
     assert free == pytest.approx(signals.shift.lockup_time, abs=2e-3)
 
 
@@ -119,7 +119,7 @@ def test_age_of_the_engine_torque_is_found(stepped: Run, age: float) -> None:
     signals = stepped.signals()
     fresh = stepped.time[::10]
     values = np.array([stepped.manoeuvre.engine_torque(t - age) for t in fresh])
-    late = replace(signals, engine_torque=Sampled(fresh, values, 5.0))
+    late = replace(signals, engine_torque=MeasuredSignal(fresh, values, 5.0))
     found = identify_shift(late, Truth().driveline(), 12.0)
     estimates = dict(zip(found.ids, found.values, strict=True))
     assert estimates["te_delay"] == pytest.approx(age, abs=1e-4)
@@ -168,7 +168,7 @@ def test_what_was_known_beforehand_is_told_with_the_values(stepped: Run, ring: b
     found = identify_shift(signals, told, 12.0)
     assert ("shaft" in found.refusals) != ring
     design = {"J_out": PriorValue(0.9, 0.09), "P0.B3": PriorValue(8e4, 5e3)}
-    rounding = rounding_error(signals.engine_torque, signals.torque_resolution)
+    rounding = estimate_rounding_error(signals.engine_torque, signals.torque_resolution)
     torque = {
         "te_delay": MomentumSettings().delay_prior,
         "te_rounding": PriorValue(0.0, rounding),
@@ -178,7 +178,7 @@ def test_what_was_known_beforehand_is_told_with_the_values(stepped: Run, ring: b
     for name, prior in found.priors.items():
         assert stds[name] <= prior.std * (1.0 + 1e-9), name
     place = found.ids.index("drum.B3")
-    assert found.values[place] == pytest.approx(found.momentum.value("drum.B3"))
+    assert found.values[place] == pytest.approx(found.momentum.get_value("drum.B3"))
 
 
 def reference_signals(name: str, filled: float) -> ShiftSignals:
@@ -192,8 +192,8 @@ def reference_signals(name: str, filled: float) -> ShiftSignals:
     lock = next(e["time"] for e in events if e["clutch"] == 3 and e["to"] == "stick")
     time = data["time_s"]
 
-    def signal(column: str, sigma: float) -> Sampled:
-        return Sampled(time, data[column], sigma)
+    def signal(column: str, sigma: float) -> MeasuredSignal:
+        return MeasuredSignal(time, data[column], sigma)
 
     shift = Shift(
         "2",
@@ -208,7 +208,7 @@ def reference_signals(name: str, filled: float) -> ShiftSignals:
         lock,
     )
     return ShiftSignals(
-        signal("T_e_Nm", white_noise(data["T_e_Nm"])),
+        signal("T_e_Nm", estimate_white_noise(data["T_e_Nm"])),
         signal("T_o_Nm", 30.0),
         signal("omega_e_rad_s", 0.05),
         signal("omega_out_rad_s", 0.03),
@@ -238,5 +238,5 @@ def test_drum_inertias_known_from_design_are_taken_out() -> None:
     assert ignorant.friction is not None
     assert found.friction is not None
     truth = np.array([Truth().mu(s) for s in SLIPS])
-    assert np.all(stribeck_at(ignorant.friction, SLIPS) < 0.97 * truth)
-    assert stribeck_at(found.friction, SLIPS) == pytest.approx(truth, rel=2e-3)
+    assert np.all(evaluate_fitted_stribeck(ignorant.friction, SLIPS) < 0.97 * truth)
+    assert evaluate_fitted_stribeck(found.friction, SLIPS) == pytest.approx(truth, rel=2e-3)

@@ -8,15 +8,17 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.estimation.linear.resonance import resonance
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.linear.resonance import fit_resonance
 
 TIME = np.arange(5.0, 8.0, 0.02)
 
 
-def speed(swing: FloatArray, seed: int = 0, noise: float = 0.1) -> Sampled:
+def speed(swing: FloatArray, seed: int = 0, noise: float = 0.1) -> MeasuredSignal:
     rng = np.random.default_rng(seed)
-    return Sampled(TIME, 150.0 + 4.0 * (TIME - 5.0) + swing + noise * rng.normal(size=TIME.size))
+    return MeasuredSignal(
+        TIME, 150.0 + 4.0 * (TIME - 5.0) + swing + noise * rng.normal(size=TIME.size)
+    )
 
 
 def decay(f: float, zeta: float) -> FloatArray:
@@ -27,7 +29,7 @@ def decay(f: float, zeta: float) -> FloatArray:
 
 @pytest.mark.parametrize(("f", "zeta"), [(4.4, 0.08), (7.0, 0.05), (11.0, 0.04)])
 def test_a_decay_is_found(f: float, zeta: float) -> None:
-    found = resonance(speed(decay(f, zeta)), 5.0, 8.0)
+    found = fit_resonance(speed(decay(f, zeta)), 5.0, 8.0)
     assert abs(found.f_d - f) < max(3.0 * found.f_d_std, 0.05)
     assert abs(found.zeta - zeta) < max(3.0 * found.zeta_std, 0.02)
     assert found.f_d_std < 0.1 * f
@@ -38,14 +40,14 @@ def test_a_decay_is_found(f: float, zeta: float) -> None:
 def test_noise_is_refused(seed: int) -> None:
     rough = np.cumsum(np.random.default_rng(seed).normal(size=TIME.size))
     with pytest.raises(IdentificationError, match="no clean decay"):
-        resonance(speed(0.5 * rough, seed), 5.0, 8.0)
+        fit_resonance(speed(0.5 * rough, seed), 5.0, 8.0)
 
 
 def test_a_steady_swing_is_refused() -> None:
     with pytest.raises(IdentificationError, match="no clean decay"):
-        resonance(speed(2.0 * np.sin(2.0 * np.pi * 5.0 * TIME)), 5.0, 8.0)
+        fit_resonance(speed(2.0 * np.sin(2.0 * np.pi * 5.0 * TIME)), 5.0, 8.0)
 
 
 def test_too_short_a_gear_is_refused() -> None:
     with pytest.raises(IdentificationError, match="no clean decay"):
-        resonance(speed(decay(4.4, 0.08)), 5.0, 5.4)
+        fit_resonance(speed(decay(4.4, 0.08)), 5.0, 5.4)

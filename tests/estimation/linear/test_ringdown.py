@@ -8,15 +8,15 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.linear.ringdown import (
     Drive,
+    compute_forced_response,
+    compute_shaft_parameters,
     fit_ringdown,
-    forced_response,
-    quiet,
-    stiffness_and_damping,
+    remove_jitter,
 )
-from drivetwin.estimation.paper.ringdown import paper_ringdown
+from drivetwin.estimation.paper.ringdown import estimate_paper_ringdown
 from tests.support.coverage import assert_covers, vary_draws
 
 TIME = np.arange(0.0, 2.0, 1e-3)
@@ -33,7 +33,7 @@ def test_fit_is_unbiased_and_its_intervals_cover(draws: int) -> None:
     rates, omegas, inside = [], [], np.zeros(2, dtype=int)
     for seed in range(draws):
         noise = 30.0 * np.random.default_rng(seed).standard_normal(TIME.size)
-        found = fit_ringdown(Sampled(TIME, ring() + noise, 30.0), 0.0, 2.0, None)
+        found = fit_ringdown(MeasuredSignal(TIME, ring() + noise, 30.0), 0.0, 2.0, None)
         rates.append(found.decay_rate)
         omegas.append(found.omega_d)
         inside[0] += abs(found.f_d - OMEGA / (2 * np.pi)) < 1.96 * found.f_d_std
@@ -48,11 +48,11 @@ HIGH_RATE, HIGH_OMEGA = 28.9, 190.5
 """A ring in a high gear: 30 Hz, 3.3 samples of 10 ms a period, and a damping ratio of 0.15."""
 
 
-def high_gear(amplitude: float, seed: int) -> Sampled:
+def high_gear(amplitude: float, seed: int) -> MeasuredSignal:
     time = np.arange(0.0, 1.6, 0.01)
     wave = amplitude * np.exp(-HIGH_RATE * time) * np.cos(HIGH_OMEGA * time + 0.4 + seed)
     noise = 20.0 * np.random.default_rng(seed).standard_normal(time.size)
-    return Sampled(time, 1000.0 + 40.0 * time + wave + noise, 20.0)
+    return MeasuredSignal(time, 1000.0 + 40.0 * time + wave + noise, 20.0)
 
 
 @vary_draws()
@@ -77,15 +77,15 @@ def test_a_ring_that_the_samples_do_not_resolve_is_refused() -> None:
     time = np.arange(0.0, 1.6, 0.01)
     wave = 900.0 * np.exp(-6.0 * time) * np.cos(2.0 * np.pi * 47.0 * time)
     with pytest.raises(IdentificationError, match="no clean lock-up oscillation"):
-        fit_ringdown(Sampled(time, 1000.0 + wave, 20.0), 0.0, 1.6, None)
+        fit_ringdown(MeasuredSignal(time, 1000.0 + wave, 20.0), 0.0, 1.6, None)
 
 
 def test_a_moving_engine_torque_is_accounted_for() -> None:
     push = 800.0 * np.clip((TIME - 0.3) / 0.08, 0.0, 1.0)
-    torque = ring() + forced_response(RATE, OMEGA, TIME, push)
-    drive = Drive(Sampled(TIME, 500.0 + push / 1.2), 1.2)
-    told = fit_ringdown(Sampled(TIME, torque, 1.0), 0.0, 2.0, drive)
-    blind = fit_ringdown(Sampled(TIME, torque, 1.0), 0.0, 2.0, None)
+    torque = ring() + compute_forced_response(RATE, OMEGA, TIME, push)
+    drive = Drive(MeasuredSignal(TIME, 500.0 + push / 1.2), 1.2)
+    told = fit_ringdown(MeasuredSignal(TIME, torque, 1.0), 0.0, 2.0, drive)
+    blind = fit_ringdown(MeasuredSignal(TIME, torque, 1.0), 0.0, 2.0, None)
     assert told.decay_rate == pytest.approx(RATE, rel=2e-3)
     assert abs(blind.decay_rate / RATE - 1.0) > 0.03
 
@@ -95,16 +95,16 @@ JITTER = 20.0
 [N m]."""
 
 
-def jittering(own: float, seen: float, seed: int) -> tuple[Sampled, Drive]:
+def jittering(own: float, seen: float, seed: int) -> tuple[MeasuredSignal, Drive]:
     """A ring under an engine torque that changes by itself, measured every 10 ms with noise."""
     random = np.random.default_rng(seed)
     knots = np.arange(-0.2, 2.01, 0.01)
     acting = own * random.standard_normal(knots.size)
     before = np.arange(-0.2, 2.0, 1e-3)
-    push = forced_response(RATE, OMEGA, before, np.interp(before, knots, acting))[200:]
+    push = compute_forced_response(RATE, OMEGA, before, np.interp(before, knots, acting))[200:]
     torque = ring(600.0) + push + 3.0 * random.standard_normal(TIME.size)
     measured = 500.0 + acting + seen * random.standard_normal(knots.size)
-    return Sampled(TIME, torque, 3.0), Drive(Sampled(knots, measured, seen), 1.0)
+    return MeasuredSignal(TIME, torque, 3.0), Drive(MeasuredSignal(knots, measured, seen), 1.0)
 
 
 @vary_draws()
@@ -122,7 +122,7 @@ def test_intervals_cover_under_a_torque_that_jitters(own: float, seen: float, dr
 
 
 def test_paper_reads_the_extremes() -> None:
-    found = paper_ringdown(Sampled(TIME, ring(), 10.0), 0.0, 2.0)
+    found = estimate_paper_ringdown(MeasuredSignal(TIME, ring(), 10.0), 0.0, 2.0)
     assert found.omega_d == pytest.approx(OMEGA, rel=5e-3)
     assert found.decay_rate == pytest.approx(RATE, rel=0.05)
     assert found.extremes_time.size >= 6
@@ -131,21 +131,21 @@ def test_paper_reads_the_extremes() -> None:
 def test_noise_alone_is_refused() -> None:
     noise = 30.0 * np.random.default_rng(3).standard_normal(TIME.size)
     with pytest.raises(IdentificationError, match="no clean lock-up oscillation"):
-        paper_ringdown(Sampled(TIME, 1800.0 + noise, 30.0), 0.0, 2.0)
+        estimate_paper_ringdown(MeasuredSignal(TIME, 1800.0 + noise, 30.0), 0.0, 2.0)
     with pytest.raises(IdentificationError, match="no clean lock-up oscillation"):
-        fit_ringdown(Sampled(TIME, 1800.0 + noise, 30.0), 0.0, 2.0, None)
+        fit_ringdown(MeasuredSignal(TIME, 1800.0 + noise, 30.0), 0.0, 2.0, None)
 
 
 def test_too_short_a_stretch_is_refused() -> None:
     with pytest.raises(IdentificationError, match=r"less than 0\.15 s"):
-        fit_ringdown(Sampled(TIME, ring(), 1.0), 1.85, 2.0, None)
+        fit_ringdown(MeasuredSignal(TIME, ring(), 1.0), 1.85, 2.0, None)
 
 
 def test_quiet_straightens_jitter_and_keeps_steps() -> None:
     time = np.arange(0.0, 2.0, 0.01)
     level = np.where(time < 1.0, 1000.0, 1400.0)
     noisy = level + 5.0 * np.random.default_rng(4).standard_normal(time.size)
-    calm = quiet(Sampled(time, noisy, 5.0)).values
+    calm = remove_jitter(MeasuredSignal(time, noisy, 5.0)).values
     away = np.abs(time - 1.0) > 0.1
     assert np.max(np.abs(calm - level)[away]) < 4.0
     assert np.max(np.abs(calm - level)) < 25.0
@@ -156,6 +156,6 @@ def test_stiffness_and_damping_invert_the_two_mass_formulas() -> None:
     J = J4 * J5 / (J4 + J5)
     rate = c / (2.0 * J)
     omega = np.sqrt(k / J - rate**2)
-    assert stiffness_and_damping(rate, float(omega), J4, J5) == pytest.approx([k, c])
+    assert compute_shaft_parameters(rate, float(omega), J4, J5) == pytest.approx([k, c])
     with pytest.raises(IdentificationError, match="both must be positive"):
-        stiffness_and_damping(rate, float(omega), J4, -1.0)
+        compute_shaft_parameters(rate, float(omega), J4, -1.0)

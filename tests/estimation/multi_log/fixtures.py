@@ -14,9 +14,9 @@ from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.shifts.detect import usable_shifts
+from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import RoadLoad
-from drivetwin.validation.multi_log import Source, Together, identify_together
+from drivetwin.validation.multi_log import JointIdentification, Source, identify_together
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.estimation.asked import DURATION
 from tests.support.shared_results import shared
@@ -43,7 +43,7 @@ def source(made: Scenario, seed: int, held: frozenset[int] = frozenset()) -> Sou
         file, card_file, _ = write_run(Path(folder) / f"log{seed}.csv", run(made, seed=seed))
         card = drivetwin.load_card(card_file)
         log = drivetwin.read_log(file, card)
-    return Source(log, usable_shifts(log, card), held)
+    return Source(log, require_shifts(log, card), held)
 
 
 @cache
@@ -61,13 +61,13 @@ def pair() -> tuple[Source, Source]:
 
 
 @shared
-def together() -> Together:
+def together() -> JointIdentification:
     """Both fitted as one, and a third one predicted."""
     third = source(scenario(), 23, frozenset({1}))
     return identify_together([*pair(), third], card())
 
 
 @shared
-def loaded() -> Together:
+def loaded() -> JointIdentification:
     """Two logs of which the second has a payload that the first has not."""
     return identify_together([pair()[0], source(scenario(payload=1.03), 24)], card())

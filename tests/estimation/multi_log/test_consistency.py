@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.fit import noise_power
-from drivetwin.estimation.multi_log.consistency import Pull, homogeneity, shared_of
+from drivetwin.estimation.likelihood.fit import compute_variance_inflation
+from drivetwin.estimation.multi_log.consistency import LogScore, compute_homogeneity, find_shared
 from drivetwin.estimation.result.multi_log import Consistency
 from tests.estimation.multi_log.fixtures import loaded, together
 
 DRAWS = 120
 
 
-def _pulls(rng: np.random.Generator, logs: int, size: int, rank: int) -> list[Pull]:
+def _pulls(rng: np.random.Generator, logs: int, size: int, rank: int) -> list[LogScore]:
     """Pulls of `logs` at their common minimum, of `size` unknowns each tells `rank` directions."""
     rows = [rng.standard_normal((rank, size)) for _ in range(logs)]
     noise = [rng.standard_normal(rank) for _ in range(logs)]
@@ -33,7 +33,7 @@ def _pulls(rng: np.random.Generator, logs: int, size: int, rank: int) -> list[Pu
     power, directions = np.linalg.eigh(total)
     root = directions[:, power > 1e-9] / np.sqrt(power[power > 1e-9])
     return [
-        Pull(k, root.T @ a.T @ a @ root, -root.T @ a.T @ (e - a @ best))
+        LogScore(k, root.T @ a.T @ a @ root, -root.T @ a.T @ (e - a @ best))
         for k, (a, e) in enumerate(zip(rows, noise, strict=True))
     ]
 
@@ -42,7 +42,7 @@ def _pulls(rng: np.random.Generator, logs: int, size: int, rank: int) -> list[Pu
 @given(st.integers(2, 4), st.integers(2, 5), st.integers(0, 10**6))
 def test_of_logs_that_agree_it_is_chi_squared(logs: int, size: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    found = [homogeneity(_pulls(rng, logs, size, 12)) for _ in range(DRAWS)]
+    found = [compute_homogeneity(_pulls(rng, logs, size, 12)) for _ in range(DRAWS)]
     assert max(degrees for _, degrees in found) == (logs - 1) * size
     p = [chi2.sf(square, degrees) for square, degrees in found]
     # Uniform: mean 1/2 with a standard deviation of 1/sqrt(12·DRAWS).
@@ -50,9 +50,9 @@ def test_of_logs_that_agree_it_is_chi_squared(logs: int, size: int, seed: int) -
 
 
 def test_logs_that_tell_different_things_cannot_disagree() -> None:
-    one = Pull(1, np.diag([1.0, 0.0]), np.zeros(2))
-    other = Pull(2, np.diag([0.0, 1.0]), np.zeros(2))
-    assert homogeneity([one, other]) == (0.0, 0)
+    one = LogScore(1, np.diag([1.0, 0.0]), np.zeros(2))
+    other = LogScore(2, np.diag([0.0, 1.0]), np.zeros(2))
+    assert compute_homogeneity([one, other]) == (0.0, 0)
 
 
 def _tested(found: Identification) -> Consistency:
@@ -61,16 +61,16 @@ def _tested(found: Identification) -> Consistency:
 
 
 def test_slow_noise_of_a_sensor_counts_before_logs_disagree() -> None:
-    fit, _ = likelihood_of(together().found)
-    shared = np.eye(len(fit.point.names))[shared_of(fit)]
-    assert noise_power(fit, shared) == pytest.approx(max(fit.chi2, 1.0), rel=1e-6)
+    fit, _ = get_likelihood_fit(together().found)
+    shared = np.eye(len(fit.point.names))[find_shared(fit)]
+    assert compute_variance_inflation(fit, shared) == pytest.approx(max(fit.chi2, 1.0), rel=1e-6)
     rng = np.random.default_rng(1)
     slow = []
     for part in fit.problem.parts:
         noise = rng.standard_normal(part.record.size)
         slow.append(part.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], noise))
     loud = replace(fit, normal=replace(fit.normal, residuals=tuple(slow)))
-    assert noise_power(loud, shared) > 2.0
+    assert compute_variance_inflation(loud, shared) > 2.0
 
 
 def test_logs_of_one_vehicle_agree() -> None:

@@ -10,19 +10,19 @@ import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError, InputError
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.prepare import prepare
-from drivetwin.estimation.likelihood.fit import covariance_of
-from drivetwin.estimation.likelihood.parametrization import OWN
-from drivetwin.estimation.multi_log.consistency import shared_of
+from drivetwin.estimation.likelihood.fit import invert_information
+from drivetwin.estimation.likelihood.parametrization import LOG_SPECIFIC
+from drivetwin.estimation.multi_log.consistency import find_shared
 from drivetwin.estimation.multi_log.fit import (
-    common_tolerances,
-    farthest,
-    of_one_log,
-    start_of,
+    compute_start,
+    extract_log,
+    find_largest_differences,
+    merge_tolerances,
 )
 from drivetwin.estimation.result.multi_log import Several
-from drivetwin.parameters import log_of
+from drivetwin.parameters import split_log_number
 from drivetwin.pipeline import identify, identify_jointly
 from tests.estimation.asked import still
 from tests.estimation.multi_log.fixtures import (
@@ -44,16 +44,16 @@ def _several() -> Several:
 
 def test_the_common_covariance_is_that_of_the_summed_information() -> None:
     """Each log alone counts the design prior; of two logs one of them is one too many."""
-    fit, _ = likelihood_of(together().found)
-    shared = shared_of(fit)
+    fit, _ = get_likelihood_fit(together().found)
+    shared = find_shared(fit)
     names = [fit.point.names[k] for k in shared]
     summed = -fit.problem.prior.precision[np.ix_(shared, shared)]
     for log, number in zip(pair(), (1, 2), strict=True):
-        alone, _ = likelihood_of(identify(log.log, card(), log.shifts))
+        alone, _ = get_likelihood_fit(identify(log.log, card(), log.shifts))
         place = [alone.point.names.index(name) for name in names]
         assert len(place) == len(shared), number
-        summed = summed + covariance_of(alone.covariance[np.ix_(place, place)])
-    by_sum = np.sqrt(np.diag(covariance_of(summed)))
+        summed = summed + invert_information(alone.covariance[np.ix_(place, place)])
+    by_sum = np.sqrt(np.diag(invert_information(summed)))
     common = np.sqrt(np.diag(fit.covariance)[shared])
     # The weighting is formed at slightly different points, and chi2 above 1 widens.
     assert common == pytest.approx(by_sum, rel=0.1)
@@ -61,11 +61,11 @@ def test_the_common_covariance_is_that_of_the_summed_information() -> None:
 
 def test_two_equal_logs_halve_the_variance() -> None:
     for name in ("eta", "J_vehicle", "te_delay.1"):
-        alone = _several().logs[0].alone[log_of(name)[0]].std_noise
+        alone = _several().logs[0].alone[split_log_number(name)[0]].std_noise
         common = together().found.estimates[name].std_noise
         assert alone is not None
         assert common is not None
-        share = 1.0 if log_of(name)[1] else 2.0**-0.5
+        share = 1.0 if split_log_number(name)[1] else 2.0**-0.5
         assert common == pytest.approx(share * alone, rel=0.2), name
 
 
@@ -88,12 +88,12 @@ def test_the_log_that_shows_values_latest_tells_how_old_they_may_be(first: float
     for one, late in zip(pair(), (first, 0.01 - first), strict=True):
         channels = {r: replace(c, late=late) for r, c in one.log.channels.items()}
         prepared.append(prepare(replace(one.log, channels=channels), card(), one.shifts))
-    tolerances = common_tolerances(prepared)
+    tolerances = merge_tolerances(prepared)
     assert tolerances["output_torque"].age == pytest.approx(0.01 / np.sqrt(12.0))
 
 
 def test_a_design_prior_counts_once() -> None:
-    fit, _ = likelihood_of(together().found)
+    fit, _ = get_likelihood_fit(together().found)
     known = card().J_out
     assert known is not None
     place = fit.point.names.index("J_out")
@@ -101,14 +101,14 @@ def test_a_design_prior_counts_once() -> None:
 
 
 def test_each_log_has_its_own_and_nothing_else() -> None:
-    names = likelihood_of(together().found)[0].point.names
-    assert not set(OWN) & set(names)
-    assert {f"log{k}.{name}" for k in (1, 2) for name in OWN[:2]} <= set(names)
+    names = get_likelihood_fit(together().found)[0].point.names
+    assert not set(LOG_SPECIFIC) & set(names)
+    assert {f"log{k}.{name}" for k in (1, 2) for name in LOG_SPECIFIC[:2]} <= set(names)
 
 
 def test_what_is_told_of_one_log_has_plain_ids() -> None:
     found = together().found
-    second = of_one_log(found, _several().logs[1])
+    second = extract_log(found, _several().logs[1])
     assert second.estimates["Tv_over_if"].value == found.estimates["Tv_over_if.2"].value
     assert second.estimates["Tv_over_if"].id == "Tv_over_if"
     assert set(second.estimates) == set(_several().logs[1].alone)
@@ -119,10 +119,10 @@ def test_what_is_told_of_one_log_has_plain_ids() -> None:
 
 def test_the_start_is_the_mean_by_information() -> None:
     found = still()
-    fit, _ = likelihood_of(found)
-    start = start_of([found, found])
+    fit, _ = get_likelihood_fit(found)
+    start = compute_start([found, found])
     for name, value in zip(fit.mean.names, fit.mean.values, strict=True):
-        if not name.startswith("start") and name not in OWN:
+        if not name.startswith("start") and name not in LOG_SPECIFIC:
             assert start[name] == pytest.approx(value, rel=1e-4, abs=1e-7), name
 
 
@@ -148,7 +148,7 @@ def test_logs_of_different_vehicles_are_refused_with_what_differs() -> None:
 
 
 def test_logs_that_agree_have_nothing_that_differs() -> None:
-    assert farthest([still(), still()]) == []
+    assert find_largest_differences([still(), still()]) == []
 
 
 def test_a_disagreement_widens_and_weakens_what_it_concerns() -> None:
@@ -169,6 +169,6 @@ def test_each_log_keeps_the_loads_of_its_own_shifts() -> None:
     counts = [len(share.shifts) for share in several.logs]
     loads = tuple(float(k) for k in range(sum(counts)))
     hilly = replace(found, evidence=replace(found.evidence, loads=loads))
-    told = [of_one_log(hilly, share).evidence.loads for share in several.logs]
+    told = [extract_log(hilly, share).evidence.loads for share in several.logs]
     assert [len(one) for one in told] == counts
     assert tuple(load for one in told for load in one) == loads

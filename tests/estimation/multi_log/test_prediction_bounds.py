@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.prepare import prepare_shift
 from drivetwin.estimation.data.shift_data import ShiftData
-from drivetwin.estimation.multi_log.prediction_bounds import Expected, expected
+from drivetwin.estimation.multi_log.prediction_bounds import ShiftPrediction, predict_shifts
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, together
 from tests.support.shared_results import shared
 
@@ -23,10 +23,10 @@ def _prepared(number: int) -> ShiftData:
 
 
 @shared
-def _of_second() -> Expected:
+def _of_second() -> ShiftPrediction:
     """The second log of the pair as if it were unknown to a fit that it took part in."""
     data = _prepared(9)
-    return expected(likelihood_of(together().found)[0], [data])[0]
+    return predict_shifts(get_likelihood_fit(together().found)[0], [data])[0]
 
 
 def test_load_and_age_come_from_the_gear_before_the_shift() -> None:
@@ -52,12 +52,12 @@ def test_no_error_is_allowed_below_the_sensor_noise() -> None:
 
 def test_a_log_of_the_fit_keeps_its_own() -> None:
     data = _prepared(2)
-    fit = likelihood_of(together().found)[0]
-    assert expected(fit, [data])[0].own == {}
+    fit = get_likelihood_fit(together().found)[0]
+    assert predict_shifts(fit, [data])[0].own == {}
 
 
 def test_equal_seeds_give_equal_bounds() -> None:
     data = _prepared(9)
-    again = expected(likelihood_of(together().found)[0], [data])[0]
+    again = predict_shifts(get_likelihood_fit(together().found)[0], [data])[0]
     assert again.bounds == _of_second().bounds
     assert np.isclose(again.mean_speed, _of_second().mean_speed)

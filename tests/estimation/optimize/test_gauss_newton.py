@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.objective import Problem
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.gauss_newton import GAUSS_NEWTON, minimise
-from drivetwin.estimation.optimize.objective import Normal, Point
+from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 
 NAMES = ("a", "b", "c")
@@ -31,18 +31,18 @@ def test_correlated_unknowns_at_their_bounds(
 ) -> None:
     precision = np.full((3, 3), correlation) + (1.0 - correlation) * np.eye(3)
     upper = np.full(3, room)
-    problem = Problem((), Prior(np.array(mean), 1e4 * precision), -upper, upper)
-    found = minimise(problem, Point(NAMES, np.zeros(3)))
+    problem = LikelihoodObjective((), Prior(np.array(mean), 1e4 * precision), -upper, upper)
+    found = minimise(problem, ParameterVector(NAMES, np.zeros(3)))
     assert found is not None
     assert found.converged
     root = np.linalg.cholesky(precision).T
     best = lsq_linear(root, root @ np.array(mean), (-upper, upper), method="bvls").x
-    least = problem.cost(Point(NAMES, best))
+    least = problem.cost(ParameterVector(NAMES, best))
     assert problem.cost(found.point) == pytest.approx(least, abs=0.02 * (1.0 + least))
 
 
 @dataclass(frozen=True, eq=False)
-class Kinked(Problem):
+class Kinked(LikelihoodObjective):
     """Q = h·((x² + y² + z²)/2 + |x + 2y - 1| + |y - z - 1|), with the slopes of the side it is on:
     h is its `height`."""
 
@@ -50,20 +50,20 @@ class Kinked(Problem):
 
     _BENDS: ClassVar[FloatArray] = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, -1.0]])
 
-    def _sides(self, point: Point) -> FloatArray:
+    def _sides(self, point: ParameterVector) -> FloatArray:
         return self._BENDS @ point.values - 1.0
 
-    def cost(self, point: Point) -> float:
+    def cost(self, point: ParameterVector) -> float:
         """Q at a point."""
         smooth = 0.5 * point.values @ point.values
         return self.height * float(smooth + np.abs(self._sides(point)).sum())
 
-    def normal(self, point: Point) -> Normal:
+    def normal(self, point: ParameterVector) -> NormalEquations:
         """Half the gradient of the side that the point is on, and the smooth part's curvature."""
         signs = np.where(self._sides(point) >= 0.0, 1.0, -1.0)
         gradient = self.height * (0.5 * point.values + 0.5 * signs @ self._BENDS)
         curvature = self.height * 0.5 * np.eye(3)
-        return Normal(self.cost(point), gradient, curvature, curvature, (), ())
+        return NormalEquations(self.cost(point), gradient, curvature, curvature, (), ())
 
 
 @given(st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3), st.sampled_from([1.0, 300.0]))
@@ -71,11 +71,11 @@ def test_a_search_goes_along_kinks_to_their_crossing(start: list[float], height:
     """Also far off, where a step promises much more than `CLOSE`: there it crawls a while."""
     free = np.full(3, np.inf)
     problem = Kinked((), Prior(np.zeros(3), np.zeros((3, 3))), -free, free, height)
-    found = minimise(problem, Point(NAMES, np.array(start)))
+    found = minimise(problem, ParameterVector(NAMES, np.array(start)))
     assert found is not None
     assert found.converged
     # On both kinks: x = 1 - 2y, z = y - 1, of which x² + y² + z² is least at y = 1/2.
-    best = Point(NAMES, np.array([0.0, 0.5, -0.5]))
+    best = ParameterVector(NAMES, np.array([0.0, 0.5, -0.5]))
     # What the expansion can still promise where a search ends is what it can be away by.
     assert problem.cost(found.point) == pytest.approx(
         problem.cost(best), abs=GAUSS_NEWTON.kink_ftol
@@ -83,7 +83,7 @@ def test_a_search_goes_along_kinks_to_their_crossing(start: list[float], height:
 
 
 @dataclass(frozen=True, eq=False)
-class LedOn(Problem):
+class LedOn(LikelihoodObjective):
     """Q = 25·(a - formed - 1)²: formed anew at every point it leads on for ever. log|Σ| is least
     where it was formed at 2."""
 
@@ -94,26 +94,28 @@ class LedOn(Problem):
         """log|Σ|."""
         return 10.0 * (self.formed - 2.0) ** 2
 
-    def cost(self, point: Point) -> float:
+    def cost(self, point: ParameterVector) -> float:
         """Q at a point."""
         return float(25.0 * (point["a"] - self.formed - 1.0) ** 2)
 
-    def normal(self, point: Point) -> Normal:
+    def normal(self, point: ParameterVector) -> NormalEquations:
         """The expansion of Q."""
         curvature = np.array([[25.0]])
         gradient = curvature[0] * (point["a"] - self.formed - 1.0)
-        return Normal(self.cost(point), gradient, curvature, curvature, (), ())
+        return NormalEquations(self.cost(point), gradient, curvature, curvature, (), ())
 
 
 def test_a_weighting_that_leads_away_stays_as_it_was_where_that_was_likeliest() -> None:
     free = np.full(1, np.inf)
 
-    def formed_at(_: Problem, point: Point) -> Problem:
+    def formed_at(_: LikelihoodObjective, point: ParameterVector) -> LikelihoodObjective:
         return LedOn((), Prior(np.zeros(1), np.zeros((1, 1))), -free, free, formed=point["a"])
 
-    start = Point(("a",), np.zeros(1))
+    start = ParameterVector(("a",), np.zeros(1))
     found = minimise(
-        formed_at(Problem((), Prior.independent(1, {}), -free, free), start), start, formed_at
+        formed_at(LikelihoodObjective((), Prior.from_independent(1, {}), -free, free), start),
+        start,
+        formed_at,
     )
     assert found is not None
     assert found.converged

@@ -8,15 +8,15 @@ import pytest
 
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.paper.inertia import ETA_GRID
-from drivetwin.estimation.paper.pipeline import paper_shift
-from drivetwin.estimation.paper.wlse import Weighting, weighted_inertia, window_edges
+from drivetwin.estimation.paper.pipeline import identify_paper_shift
+from drivetwin.estimation.paper.wlse import Weighting, compute_window_edges, fit_weighted_inertia
 from tests.estimation.synthetic import Run, Truth
 
 RANGES = ((5.0, 40.0), (5000.0, 9000.0))
 
 
 def test_noise_free_log_returns_the_truth_on_the_grid(stepped: Run) -> None:
-    found = paper_shift(stepped.signals(), Truth().driveline(), *RANGES)
+    found = identify_paper_shift(stepped.signals(), Truth().driveline(), *RANGES)
     J_prime = Truth().J_e + Truth().J_out / Truth().i_a ** 2
     assert found.values["eta"] == 0.85
     assert found.values["Tv_over_if"] == 2300.0
@@ -28,7 +28,7 @@ def test_noise_free_log_returns_the_truth_on_the_grid(stepped: Run) -> None:
 
 
 def test_tables_have_the_papers_rows(stepped: Run) -> None:
-    found = paper_shift(stepped.signals(), Truth().driveline(), *RANGES)
+    found = identify_paper_shift(stepped.signals(), Truth().driveline(), *RANGES)
     assert tuple(row.value for row in found.inertia.rows) == ETA_GRID
     loads = [row.value for row in found.load.rows]
     assert loads[0] == 0.0
@@ -41,7 +41,7 @@ def test_tables_have_the_papers_rows(stepped: Run) -> None:
 
 
 def test_extremes_of_a_vibrating_torque_show_the_friction_law(stepped: Run) -> None:
-    found = paper_shift(stepped.signals(), Truth().driveline(), *RANGES)
+    found = identify_paper_shift(stepped.signals(), Truth().driveline(), *RANGES)
     assert found.friction is not None
     curve = found.friction.curve
     truth = np.array([Truth().mu(s) for s in curve.points_slip])
@@ -52,20 +52,22 @@ def test_extremes_of_a_vibrating_torque_show_the_friction_law(stepped: Run) -> N
 
 
 def test_constant_engine_torque_raises_doubt(constant: Run) -> None:
-    found = paper_shift(constant.noisy(np.random.default_rng(0)), Truth().driveline(), *RANGES)
+    found = identify_paper_shift(
+        constant.noisy(np.random.default_rng(0)), Truth().driveline(), *RANGES
+    )
     assert "cannot tell η from J′" in found.doubts["eta"]
     assert "J_prime_2" in found.doubts
 
 
 def test_samples_outside_the_plausible_range_weigh_a_hundredth() -> None:
     torque, acceleration = np.array([20.0, 100.0]), np.array([1.0, 1.0])
-    slope, weights = weighted_inertia(torque, acceleration, Weighting(5.0, 40.0))
+    slope, weights = fit_weighted_inertia(torque, acceleration, Weighting(5.0, 40.0))
     assert weights.tolist() == [1.0, 0.01]
     assert slope == pytest.approx((20.0 + 1.0) / 1.01)
 
 
 def test_constant_speed_and_short_gear_are_refused() -> None:
     with pytest.raises(IdentificationError, match="speed is constant"):
-        weighted_inertia(np.ones(5), np.zeros(5), Weighting(5.0, 40.0))
+        fit_weighted_inertia(np.ones(5), np.zeros(5), Weighting(5.0, 40.0))
     with pytest.raises(IdentificationError, match=r"0\.030 s of held gear"):
-        window_edges((1.0, 1.03))
+        compute_window_edges((1.0, 1.03))

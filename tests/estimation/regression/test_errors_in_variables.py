@@ -33,7 +33,7 @@ def line(x: FloatArray, y: FloatArray, sigma: float, prior: Prior | None = None)
             Term(x, sigma, unit, -theta[0] * ONE, {0: (-ONE, unit)}),
         ]
 
-    return solve(terms, np.array([1.0]), prior or Prior.independent(1, {}))
+    return solve(terms, np.array([1.0]), prior or Prior.from_independent(1, {}))
 
 
 @vary_draws(short=True)
@@ -62,7 +62,7 @@ def test_exact_data_give_the_exact_value() -> None:
 
 def test_prior_and_data_are_weighed_by_their_information() -> None:
     x = np.full(N, 1e-4)
-    fit = line(x, 3.0 * x, 0.1, Prior.independent(1, {0: (5.0, 0.2)}))
+    fit = line(x, 3.0 * x, 0.1, Prior.from_independent(1, {0: (5.0, 0.2)}))
     assert fit.theta[0] == pytest.approx(5.0, abs=0.01)
     assert fit.std[0] == pytest.approx(0.2, rel=0.05)
 
@@ -82,7 +82,7 @@ def test_where_no_part_of_a_step_helps_the_search_stays_where_it_is() -> None:
             Term(ONE, 0.0, unit, theta[0] ** 2 * ONE, {0: (2.0 * theta[0] * ONE, unit)}),
         ]
 
-    fit = solve(terms, np.array([1e-3]), Prior.independent(1, {}))
+    fit = solve(terms, np.array([1e-3]), Prior.from_independent(1, {}))
     assert fit.theta[0] == 1e-3
     assert fit.residual == pytest.approx(1.0 + fit.theta[0] ** 2)
     assert fit.q == pytest.approx(N * (1.0 + fit.theta[0] ** 2) ** 2)
@@ -92,7 +92,7 @@ def test_banded_factor_solves_as_the_dense_one() -> None:
     rng = np.random.default_rng(0)
     a = np.tril(np.triu(rng.standard_normal((30, 30)), -3))
     cov = a @ a.T + 30.0 * np.eye(30)
-    factor = BandedCholesky.of(cov)
+    factor = BandedCholesky.from_covariance(cov)
     x = rng.standard_normal(30)
     assert factor.solve(x) == pytest.approx(np.linalg.solve(cov, x))
     white = factor.whiten(x)

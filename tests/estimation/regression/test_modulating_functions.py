@@ -9,7 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.regression.modulating_functions import hann_kernels, join, windows_in
+from drivetwin.estimation.regression.modulating_functions import (
+    build_hann_kernels,
+    build_windows,
+    join_windows,
+)
 
 
 def uneven(seed: int) -> FloatArray:
@@ -20,8 +24,8 @@ def uneven(seed: int) -> FloatArray:
 @given(st.integers(0, 50), st.floats(-1e4, 1e4), st.floats(-1e3, 1e3))
 def test_slope_of_a_line_is_exact_on_an_uneven_base(seed: int, level: float, rate: float) -> None:
     time = uneven(seed)
-    windows = windows_in((0.1, 1.1), 0.4, 0.05)
-    kernels = hann_kernels(time, windows)
+    windows = build_windows((0.1, 1.1), 0.4, 0.05)
+    kernels = build_hann_kernels(time, windows)
     got = kernels.slope.matrix @ (level + rate * time)
     scale = abs(level) + abs(rate) + 1.0
     assert np.max(np.abs(got - rate * 0.5 * windows.width)) < 1e-9 * scale
@@ -30,8 +34,8 @@ def test_slope_of_a_line_is_exact_on_an_uneven_base(seed: int, level: float, rat
 
 def test_slope_equals_kernel_of_the_derivative() -> None:
     time = np.arange(0.0, 2.0, 1e-3)
-    windows = windows_in((0.1, 1.9), 0.4, 0.025)
-    kernels = hann_kernels(time, windows)
+    windows = build_windows((0.1, 1.9), 0.4, 0.025)
+    kernels = build_hann_kernels(time, windows)
     omega = 2 * np.pi * 3.0
     of_signal = kernels.slope.matrix @ np.sin(omega * time)
     of_derivative = kernels.psi.matrix @ (omega * np.cos(omega * time))
@@ -40,16 +44,16 @@ def test_slope_equals_kernel_of_the_derivative() -> None:
 
 def test_age_shifts_the_stamps() -> None:
     time = np.arange(0.0, 2.0, 1e-2)
-    windows = windows_in((0.3, 1.7), 0.4, 0.05)
-    late = hann_kernels(time, windows, 0.037).psi.matrix @ np.sin(5.0 * (time - 0.037))
-    prompt = hann_kernels(time, windows).psi.matrix @ np.sin(5.0 * time)
+    windows = build_windows((0.3, 1.7), 0.4, 0.05)
+    late = build_hann_kernels(time, windows, 0.037).psi.matrix @ np.sin(5.0 * (time - 0.037))
+    prompt = build_hann_kernels(time, windows).psi.matrix @ np.sin(5.0 * time)
     assert late == pytest.approx(prompt, abs=1e-4)
 
 
 def test_windows_fill_the_span_and_none_fits_a_shorter_one() -> None:
-    windows = windows_in((1.0, 2.0), 0.4, 0.07)
+    windows = build_windows((1.0, 2.0), 0.4, 0.07)
     assert windows.start[0] == 1.0
     assert windows.start[-1] + 0.4 == pytest.approx(2.0)
-    empty = windows_in((1.0, 1.3), 0.4, 0.07)
+    empty = build_windows((1.0, 1.3), 0.4, 0.07)
     assert empty.count == 0
-    assert join([windows, empty]).count == windows.count
+    assert join_windows([windows, empty]).count == windows.count

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.prior_conflict import (
     Contradiction,
-    contradictions,
-    held_against,
-    outside_ranges,
-    without_gain,
+    apply_contradictions,
+    check_design_ranges,
+    check_efficiency_limit,
+    find_contradictions,
 )
-from drivetwin.estimation.result.prior_update import CONTRADICTS, without_prior
-from drivetwin.estimation.result.verdict import ADDS_LITTLE, designed, judge
+from drivetwin.estimation.result.prior_update import CONTRADICTS, remove_prior
+from drivetwin.estimation.result.verdict import ADDS_LITTLE, assess, from_prior
 from drivetwin.vehicle.spec import PriorValue
 
 IDS = ("J_out", "J_prime_2", "Tv_over_if")
@@ -43,7 +43,7 @@ def _posterior(design: PriorValue) -> tuple[FloatArray, FloatArray]:
 
 def _found(design: PriorValue, sensors: float = 0.0) -> tuple[Contradiction, ...]:
     systematic = {"J_out": sensors}
-    return contradictions(IDS, *_posterior(design), {"J_out": design}, systematic)
+    return find_contradictions(IDS, *_posterior(design), {"J_out": design}, systematic)
 
 
 @pytest.mark.parametrize("std", [0.02, 0.1, 0.3])
@@ -60,7 +60,7 @@ def test_a_contradiction_is_the_distance_from_what_the_log_alone_tells(
         assert (one.log.value, one.log.std) == pytest.approx((LOG[0], STD), rel=1e-6)
         assert list(one.without) == list(IDS)
         assert list(one.without.values()) == pytest.approx(LOG, rel=1e-9)
-        assert f"says {in_units(design.value, 'kg*m^2', design.std)}" in one.text
+        assert f"says {format_with_unit(design.value, 'kg*m^2', design.std)}" in one.text
         assert "1.2" in one.text
 
 
@@ -73,11 +73,11 @@ def test_sensors_that_may_be_off_explain_as_much() -> None:
 def test_an_estimate_that_is_off_the_card_although_it_is_as_wide_is_told() -> None:
     design = PriorValue(1.35, 0.135)
     values, covariance = np.array([29.9]), np.array([[0.2**2]])
-    assert without_prior(values, covariance, 0, design) is None
-    (found,) = contradictions(("J_out",), values, covariance, {"J_out": design}, {})
+    assert remove_prior(values, covariance, 0, design) is None
+    (found,) = find_contradictions(("J_out",), values, covariance, {"J_out": design}, {})
     assert found.apart == pytest.approx((29.9 - 1.35) / 0.135)
-    estimates = {"J_out": designed("J_out", PriorValue(29.9, 0.2), ADDS_LITTLE)}
-    told = held_against(estimates, [found], "integral")["J_out"]
+    estimates = {"J_out": from_prior("J_out", PriorValue(29.9, 0.2), ADDS_LITTLE)}
+    told = apply_contradictions(estimates, [found], "integral")["J_out"]
     assert (told.verdict, told.value, told.method) == (Verdict.WEAK, 29.9, "integral")
     assert "contradicts" in told.reason
 
@@ -86,11 +86,11 @@ def test_what_rests_on_a_contradicted_value_is_not_identified() -> None:
     design = PriorValue(2.4, 0.1)
     values, covariance = _posterior(design)
     estimates = {
-        name: judge(name, value, std, "likelihood")
+        name: assess(name, value, std, "likelihood")
         for name, value, std in zip(IDS, values, np.sqrt(np.diag(covariance)), strict=True)
     }
     assert estimates["J_prime_2"].verdict is Verdict.IDENTIFIED
-    told = held_against(estimates, _found(design), "likelihood with design prior")
+    told = apply_contradictions(estimates, _found(design), "likelihood with design prior")
     assert told["J_out"].verdict is told["J_prime_2"].verdict is Verdict.WEAK
     assert "the log gives 14.300 kg·m²" in told["J_prime_2"].reason
     assert told["Tv_over_if"] == estimates["Tv_over_if"]
@@ -100,7 +100,7 @@ def test_an_exact_value_and_one_that_physics_excludes_are_judged_elsewhere() -> 
     nothing = np.array([[1e-4]])
     for value, std in ((1.2, 0.0), (-0.2, 0.1)):
         design = {"J_out": PriorValue(2.4, std)}
-        assert contradictions(("J_out",), np.array([value]), nothing, design, {}) == ()
+        assert find_contradictions(("J_out",), np.array([value]), nothing, design, {}) == ()
 
 
 @pytest.mark.parametrize(
@@ -113,21 +113,23 @@ def test_an_inertia_whose_interval_lies_outside_the_design_range_is_told(
     design = DesignData("paper", 5.0, (3.0, 9.0), (1000.0, 2000.0))
     estimate = Estimate("J_prime_2", value, std, Verdict.IDENTIFIED, "likelihood")
     ratio = replace(estimate, id="J_prime_2_over_eta")
-    texts = outside_ranges({"J_prime_2": estimate, "J_prime_2_over_eta": ratio}, design)
+    texts = check_design_ranges({"J_prime_2": estimate, "J_prime_2_over_eta": ratio}, design)
     assert len(texts) == int(told)
     for text in texts:
         assert f"J_prime_2 = {value:#.4g} kg·m²" in text
         assert "3 to 9 kg·m²" in text
     fixed = replace(estimate, verdict=Verdict.DESIGN)
     refused = Estimate("J_vehicle", None, None, Verdict.NOT_IDENTIFIABLE, "likelihood")
-    assert outside_ranges({"J_prime_2": fixed, "J_vehicle": refused}, design) == ()
+    assert check_design_ranges({"J_prime_2": fixed, "J_vehicle": refused}, design) == ()
 
 
 @pytest.mark.parametrize(("eta", "std", "told"), [(1.06, 2e-4, True), (1.01, 0.01, False)])
 def test_an_efficiency_above_one_is_not_identified(eta: float, std: float, told: bool) -> None:
     estimates = {"eta": Estimate("eta", eta, std, Verdict.IDENTIFIED, "likelihood")}
-    found, texts = without_gain(estimates, "dissipative")
+    found, texts = check_efficiency_limit(estimates, "dissipative")
     assert found["eta"].verdict is (Verdict.WEAK if told else Verdict.IDENTIFIED)
     assert [("1.06" in text, "overrun" in text) for text in texts] == [(True, False)] * told
-    assert ["overrun" in text for text in without_gain(estimates, "paper")[1]] == [True] * told
-    assert without_gain({}, "paper") == ({}, ())
+    assert ["overrun" in text for text in check_efficiency_limit(estimates, "paper")[1]] == [
+        True
+    ] * told
+    assert check_efficiency_limit({}, "paper") == ({}, ())

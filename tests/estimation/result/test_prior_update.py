@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.estimation.result.prior_update import with_known, without_prior
+from drivetwin.estimation.result.prior_update import add_priors, remove_prior
 from drivetwin.vehicle.spec import PriorValue
 
 IDS = ("eta", "k_o", "c_o")
@@ -18,7 +18,7 @@ COVARIANCE = _ROOT @ _ROOT.T
 
 
 def test_a_fixed_value_comes_back_and_the_others_follow_their_regression() -> None:
-    values, covariance, warnings = with_known(IDS, VALUES, COVARIANCE, {"k_o": PriorValue(1.503e5)})
+    values, covariance, warnings = add_priors(IDS, VALUES, COVARIANCE, {"k_o": PriorValue(1.503e5)})
     assert values[1] == pytest.approx(1.503e5, rel=1e-14)
     assert covariance[1] == pytest.approx(0.0, abs=1e-6)
     slope = COVARIANCE[0, 1] / COVARIANCE[1, 1]
@@ -29,7 +29,7 @@ def test_a_fixed_value_comes_back_and_the_others_follow_their_regression() -> No
 
 @given(value=st.floats(1e5, 2e5), std=st.floats(1.0, 1e4))
 def test_a_prior_weighs_by_its_precision(value: float, std: float) -> None:
-    values, covariance, _ = with_known(IDS, VALUES, COVARIANCE, {"k_o": PriorValue(value, std)})
+    values, covariance, _ = add_priors(IDS, VALUES, COVARIANCE, {"k_o": PriorValue(value, std)})
     weight = 1.0 / COVARIANCE[1, 1] + 1.0 / std**2
     mean = (VALUES[1] / COVARIANCE[1, 1] + value / std**2) / weight
     assert values[1] == pytest.approx(mean, rel=1e-9)
@@ -37,15 +37,15 @@ def test_a_prior_weighs_by_its_precision(value: float, std: float) -> None:
 
 
 def test_what_the_log_contradicts_is_told() -> None:
-    _, _, warnings = with_known(IDS, VALUES, COVARIANCE, {"eta": PriorValue(0.8)})
+    _, _, warnings = add_priors(IDS, VALUES, COVARIANCE, {"eta": PriorValue(0.8)})
     assert len(warnings) == 1
     assert "eta" in warnings[0]
-    _, _, warnings = with_known(IDS, VALUES, COVARIANCE, {"eta": PriorValue(0.9035)})
+    _, _, warnings = add_priors(IDS, VALUES, COVARIANCE, {"eta": PriorValue(0.9035)})
     assert len(warnings) == 1
 
 
 def test_a_value_of_something_else_changes_nothing() -> None:
-    values, covariance, _ = with_known(IDS, VALUES, COVARIANCE, {"J_out": PriorValue(1.0)})
+    values, covariance, _ = add_priors(IDS, VALUES, COVARIANCE, {"J_out": PriorValue(1.0)})
     assert np.array_equal(values, VALUES)
     assert np.array_equal(covariance, COVARIANCE)
 
@@ -66,7 +66,7 @@ def test_taking_a_prior_out_gives_back_what_the_log_alone_says(
     information[1, 1] += prior.std**-2
     pull[1] += prior.value * prior.std**-2
     posterior = np.linalg.inv(information)
-    freed = without_prior(posterior @ pull, posterior, 1, prior)
+    freed = remove_prior(posterior @ pull, posterior, 1, prior)
     assert freed is not None
     values, spread = freed
     assert values == pytest.approx(own, rel=1e-6)
@@ -81,4 +81,4 @@ def test_taking_a_prior_out_gives_back_what_the_log_alone_says(
 )
 def test_where_the_log_says_nothing_nothing_is_given_back(std: float, variance: float) -> None:
     covariance = np.array([[1e-6, 0.0], [0.0, variance]])
-    assert without_prior(np.array([0.1, 8e4]), covariance, 1, PriorValue(8e4, std)) is None
+    assert remove_prior(np.array([0.1, 8e4]), covariance, 1, PriorValue(8e4, std)) is None

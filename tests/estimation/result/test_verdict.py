@@ -8,15 +8,15 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.linear.multi_shift import systematic_std
+from drivetwin.estimation.linear.multi_shift import estimate_systematic_std
 from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.verdict import (
-    correlation,
-    judge,
-    judge_with_design,
+    assess,
+    assess_with_prior,
+    compute_correlation,
     propagate,
-    refused,
+    refuse_parameter,
 )
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.estimation.synthetic import Run, Truth
@@ -31,14 +31,14 @@ from tests.estimation.synthetic import Run, Truth
     ],
 )
 def test_verdict_follows_the_width(std: float, verdict: Verdict) -> None:
-    estimate = judge("J_prime_2", 17.5, std, "integral")
+    estimate = assess("J_prime_2", 17.5, std, "integral")
     assert estimate.verdict is verdict
     assert (estimate.value is None) == (verdict is Verdict.NOT_IDENTIFIABLE)
     assert (estimate.reason == "") == (verdict is Verdict.IDENTIFIED)
 
 
 def test_systematic_part_counts_in_the_verdict() -> None:
-    assert judge("eta", 0.85, 0.001, "integral", 0.3).verdict is Verdict.WEAK
+    assert assess("eta", 0.85, 0.001, "integral", 0.3).verdict is Verdict.WEAK
 
 
 @pytest.mark.parametrize(
@@ -47,22 +47,22 @@ def test_systematic_part_counts_in_the_verdict() -> None:
 def test_no_experiment_is_advised_where_the_sensors_decide(
     noise: float, systematic: float | None, sensors: bool
 ) -> None:
-    reason = judge("eta", 0.85, noise, "integral", systematic).reason
+    reason = assess("eta", 0.85, noise, "integral", systematic).reason
     assert ("step the pedal" not in reason) == sensors
     assert ("calibrate" in reason) == sensors
 
 
 def test_a_delay_of_zero_is_sound() -> None:
-    assert judge("te_delay", 0.0, 0.0005, "integral").verdict is Verdict.IDENTIFIED
-    assert judge("te_delay", 0.0, 0.05, "integral").verdict is Verdict.NOT_IDENTIFIABLE
+    assert assess("te_delay", 0.0, 0.0005, "integral").verdict is Verdict.IDENTIFIED
+    assert assess("te_delay", 0.0, 0.05, "integral").verdict is Verdict.NOT_IDENTIFIABLE
 
 
 def test_a_value_outside_its_bounds_is_never_given() -> None:
-    assert judge("J_vehicle", -400.0, 1.0, "integral").value is None
+    assert assess("J_vehicle", -400.0, 1.0, "integral").value is None
 
 
 def test_refusal_names_the_experiment() -> None:
-    assert "pedal" in refused("te_delay", "integral", "no motion").reason
+    assert "pedal" in refuse_parameter("te_delay", "integral", "no motion").reason
 
 
 DRUM = PriorValue(0.05, 0.03)
@@ -80,13 +80,13 @@ DRUM = PriorValue(0.05, 0.03)
 def test_what_the_card_states_keeps_a_number_the_better_known_the_more_its_own(
     value: float, std: float, verdict: Verdict
 ) -> None:
-    one = judge_with_design(("drum.B3", value, std), DRUM, "likelihood with design prior")
+    one = assess_with_prior(("drum.B3", value, std), DRUM, "likelihood with design prior")
     assert (one.value, one.std_noise, one.verdict) == (value, std, verdict)
     assert ("card" in one.reason) == (verdict is not Verdict.IDENTIFIED)
 
 
 def test_what_is_impossible_is_withheld_although_the_card_states_it() -> None:
-    one = judge_with_design(("drum.B3", -0.2, 0.002), DRUM, "likelihood with design prior")
+    one = assess_with_prior(("drum.B3", -0.2, 0.002), DRUM, "likelihood with design prior")
     assert one.verdict is Verdict.NOT_IDENTIFIABLE
 
 
@@ -99,7 +99,7 @@ def test_propagation_is_exact_for_a_linear_map() -> None:
 
 
 def test_correlation_of_a_known_parameter_is_zero() -> None:
-    matrix = correlation(np.array([[4.0, 0.0], [0.0, 0.0]]))
+    matrix = compute_correlation(np.array([[4.0, 0.0], [0.0, 0.0]]))
     assert matrix.tolist() == [[1.0, 0.0], [0.0, 1.0]]
 
 
@@ -112,7 +112,7 @@ def test_engine_torque_gain_error_shows_in_eta_alone(stepped: Run) -> None:
         return np.array([told["eta"], told["J_prime_2"], told["Tv_over_if"]])
 
     tolerance = {"engine_torque": SensorTolerance(gain=0.03)}
-    std = systematic_std(values, stepped.signals(), tolerance)
+    std = estimate_systematic_std(values, stepped.signals(), tolerance)
     assert std[0] == pytest.approx(0.85 * (1 - 1 / 1.03), rel=0.01)
     assert std[1] < 1e-3 * 17.5
     assert std[2] == 0.0

@@ -16,9 +16,9 @@ from scipy.integrate import solve_ivp
 from drivetwin.errors import InputError
 from drivetwin.export.c.layout import Precision
 from drivetwin.export.c.loaded import STATUS, CModel, CObserver, CRun
-from drivetwin.export.entries import entries_of, locked_index, start_entries
-from drivetwin.export.fixed_step import InputKind, stepped_run
-from drivetwin.export.subject import steady_start
+from drivetwin.export.entries import get_lock_index, list_entries, start_entries
+from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.subject import compute_steady_start
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
@@ -73,7 +73,7 @@ def test_double_agrees_with_the_core(loaded: CModel, name: str, kind: InputKind)
     subject = case.subject
     set_model(loaded, subject.model, subject.start)
     run = loaded.run(case.time, case.inputs, hold=kind is InputKind.HOLD)
-    core = stepped_run(subject.model, subject.start, case.time, case.inputs, kind)
+    core = run_fixed_step(subject.model, subject.start, case.time, case.inputs, kind)
     compare(run, core, 1e-9)
     if kind is InputKind.LINEAR:
         assert case.deviation(run.columns["output_torque"]) < 1e-3
@@ -104,7 +104,7 @@ def test_a_step_of_ten_milliseconds_meets_the_same_points(loaded: CModel) -> Non
 
 def set_model(loaded: CModel, model: DualClutch, start: State) -> None:
     """Put other parameters into a loaded model."""
-    for entry in entries_of(model):
+    for entry in list_entries(model):
         target, path = loaded.params, entry.field.replace("]", "").replace("[", ".").split(".")
         for part in path[:-1]:
             target = target[int(part)] if part.isdigit() else getattr(target, part)
@@ -118,7 +118,7 @@ def set_model(loaded: CModel, model: DualClutch, start: State) -> None:
     loaded.params.loss_law = _LOSS_LAWS.index(model.loss_law)
     for entry in start_entries(start):
         setattr(loaded.start, entry.field, entry.value)
-    loaded.start.locked = locked_index(model, start)
+    loaded.start.locked = get_lock_index(model, start)
 
 
 def random_case(seed: int) -> tuple[DualClutch, State, FloatArray, FloatArray]:
@@ -150,7 +150,7 @@ def random_case(seed: int) -> tuple[DualClutch, State, FloatArray, FloatArray]:
     model = replace(paper_model(), elements=elements, load=load, J2e=some(0.0, 1.5))
     model = replace(model, loss_law="dissipative" if rng.random() < 0.5 else "paper")
     if rng.random() < 0.7:
-        start = steady_start(model, "B2", float(rng.uniform(60.0, 220.0)))
+        start = compute_steady_start(model, "B2", float(rng.uniform(60.0, 220.0)))
     else:
         low, high = (5.0, -20.0, -2.0, -0.01), (200.0, 100.0, 18.0, 0.02)
         start = State(*rng.uniform(low, high).tolist())
@@ -179,7 +179,7 @@ def cut(core: Trajectory, rows: NDArray[np.bool_]) -> Trajectory:
 @settings(max_examples=60)
 def test_any_driveline_agrees_with_the_core(loaded: CModel, seed: int) -> None:
     model, start, time, inputs = random_case(seed)
-    core = stepped_run(model, start, time, inputs, InputKind.LINEAR)
+    core = run_fixed_step(model, start, time, inputs, InputKind.LINEAR)
     set_model(loaded, model, start)
     run = loaded.run(time, inputs)
     if run.status == "engine stalled":
@@ -273,7 +273,7 @@ def test_a_start_locks_as_a_clutch_that_is_strong_beyond_measure_does(
     output_speed = 140.0 / (b2.i_c * b2.i_out)
     start = State(engine_speed, output_speed, output_speed / model.i_f, 0.0)
     time, inputs = np.linspace(0.0, 5e-8, 51), np.tile((0.0, 1e6, 0.0), (51, 1))
-    slipping = stepped_run(model, start, time, inputs, InputKind.HOLD)
+    slipping = run_fixed_step(model, start, time, inputs, InputKind.HOLD)
     assert slipping.slip["B2"][-1] == pytest.approx(0.0, abs=1e-12)
     set_model(loaded, model, replace(start, locked=("B2",)))
     locked = loaded.run(time, inputs).columns
@@ -289,7 +289,7 @@ class Steps:
         set_model(loaded, model, start)
         self.loaded = loaded
         self.state, self.outputs = loaded.layout.state(), loaded.layout.outputs()
-        self.inputs = loaded.inputs(row)
+        self.inputs = loaded.to_c_inputs(row)
         memory = (self.state, loaded.params, loaded.start, self.inputs, self.outputs)
         assert loaded.library.dt_begin(*map(ctypes.byref, memory)) == 0
 
@@ -342,7 +342,7 @@ def assert_goes_on_as_the_core(run: Steps, other: DualClutch, row: FloatArray) -
     set_model(run.loaded, other, at_change)
     told = [(run.step(), run.row()) for _ in range(40)]
     time = np.linspace(0.0, 0.04, 41)
-    core = stepped_run(other, at_change, time, np.tile(row, (41, 1)), InputKind.HOLD)
+    core = run_fixed_step(other, at_change, time, np.tile(row, (41, 1)), InputKind.HOLD)
     signals = (core.engine_speed, core.output_speed, core.wheel_speed, core.twist)
     torques = (core.shaft_torque, *core.clutch_torque.values())
     expected = np.column_stack((*signals, *torques))[1:]
@@ -381,7 +381,7 @@ def mixed(model: DualClutch, other: DualClutch, rng: np.random.Generator) -> Dua
 def pressed_for(loaded: CModel, locked: tuple[str, ...] = ()) -> Steps:
     """The paper's driveline in motion with one element pressed: B2 if it is locked, else B3."""
     model = paper_model()
-    start = replace(steady_start(model, "B2", 178.0), locked=locked)
+    start = replace(compute_steady_start(model, "B2", 178.0), locked=locked)
     row = np.array([1500.0, 6e5, 0.0] if locked else [1500.0, 0.0, 3e5])
     run = Steps(loaded, model, start, row)
     for _ in range(3):
@@ -434,7 +434,7 @@ def test_parameters_out_of_range_are_refused_between_steps_too(loaded: CModel) -
 
 def test_what_is_out_of_range_is_refused_by_name(loaded: CModel) -> None:
     model = paper_model()
-    set_model(loaded, model, steady_start(model, "B2", 178.0))
+    set_model(loaded, model, compute_steady_start(model, "B2", 178.0))
     time, inputs = np.array([0.0, 1e-3]), np.zeros((2, 3))
     loaded.params.k_o = -1.0
     assert loaded.run(time, inputs).status == "bad parameter"
@@ -458,7 +458,7 @@ def test_observer_tells_torque_friction_and_load_that_no_sensor_shows(
     heavy = RoadLoad(1.1 * believed.model.load.constant)
     elements = (off, replace(on, friction=weak))
     truth = replace(believed.model, load=heavy, elements=elements)
-    core = stepped_run(truth, believed.start, case.time, case.inputs, InputKind.LINEAR)
+    core = run_fixed_step(truth, believed.start, case.time, case.inputs, InputKind.LINEAR)
     rng = np.random.default_rng(1)
     noise = rng.standard_normal((2, case.time.size))
     engine = core.engine_speed + 0.1 * noise[0]
@@ -467,7 +467,7 @@ def test_observer_tells_torque_friction_and_load_that_no_sensor_shows(
     set_model(twin, believed.model, believed.start)
     observer = CObserver(twin, case.inputs[0], (engine[0], output[0]))
     told = [
-        observer.observe(case.inputs[i], (engine[i], output[i]), 1e-3)
+        observer.update_estimates(case.inputs[i], (engine[i], output[i]), 1e-3)
         for i in range(1, case.time.size)
     ]
     torque = np.array([one.output_torque for one in told])
@@ -482,9 +482,9 @@ def test_observer_tells_torque_friction_and_load_that_no_sensor_shows(
 def test_observer_refuses_what_is_not_finite(loaded: CModel) -> None:
     observer = CObserver(loaded, (1000.0, 1e6, 0.0), (150.0, 80.0))
     with pytest.raises(InputError, match="bad state or input"):
-        observer.observe((np.nan, 1e6, 0.0), (150.0, 80.0), 1e-2)
+        observer.update_estimates((np.nan, 1e6, 0.0), (150.0, 80.0), 1e-2)
     with pytest.raises(InputError, match="bad state or input"):
-        observer.observe((1000.0, 1e6, 0.0), (150.0, 80.0), 1.0)
+        observer.update_estimates((1000.0, 1e6, 0.0), (150.0, 80.0), 1.0)
 
 
 def test_an_observer_begun_at_no_speed_says_so_until_it_is_begun_anew(loaded: CModel) -> None:
@@ -493,6 +493,6 @@ def test_an_observer_begun_at_no_speed_says_so_until_it_is_begun_anew(loaded: CM
     observer = CObserver(loaded, inputs, (np.nan, 80.0))
     for _ in range(2):
         with pytest.raises(InputError, match="bad state or input"):
-            observer.observe(inputs, (150.0, 80.0), 1e-2)
-    observer.resume(inputs, (150.0, 80.0))
-    assert np.isfinite(observer.observe(inputs, (150.0, 80.0), 1e-2).output_torque)
+            observer.update_estimates(inputs, (150.0, 80.0), 1e-2)
+    observer.restart_observer(inputs, (150.0, 80.0))
+    assert np.isfinite(observer.update_estimates(inputs, (150.0, 80.0), 1e-2).output_torque)

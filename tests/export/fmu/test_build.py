@@ -19,10 +19,10 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from drivetwin.errors import InputError
-from drivetwin.export.compiler import compile_library, native_platform
-from drivetwin.export.entries import entries_of, start_entries
-from drivetwin.export.fixed_step import InputKind, stepped_run
-from drivetwin.export.fmu.build import BuildOptions, build_fmu, identifier
+from drivetwin.export.compiler import compile_library, detect_platform
+from drivetwin.export.entries import list_entries, start_entries
+from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.fmu.build import BuildOptions, build_fmu, make_identifier
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.fmu.variables import INPUTS as FIRST_INPUT
 from drivetwin.export.fmu.variables import LOCKED, MODES, OUTPUTS, PARAMETERS, START
@@ -33,7 +33,7 @@ from drivetwin.simulation.dual_clutch import FloatArray
 from tests.export.cases import CASES, STEP, Case, paper_subject
 
 pytestmark = pytest.mark.skipif(
-    native_platform() is None, reason="FMI names no platform like this one"
+    detect_platform() is None, reason="FMI names no platform like this one"
 )
 INPUTS = [FIRST_INPUT, FIRST_INPUT + 1, FIRST_INPUT + 2]
 SPEED, TORQUE, ONCOMING_TORQUE = OUTPUTS, OUTPUTS + 4, OUTPUTS + 6
@@ -120,7 +120,7 @@ class Instance:
 
     def set_model(self, case: Case) -> None:
         """Parameters and start of a case in place of the FMU's own."""
-        entries = entries_of(case.subject.model)
+        entries = list_entries(case.subject.model)
         starts = start_entries(case.subject.start)
         numbers = [PARAMETERS + i for i in range(len(entries))]
         numbers += [START + i for i in range(len(starts))]
@@ -172,7 +172,7 @@ def test_every_reference_problem_as_the_core_has_it(built: Built, name: str) -> 
     """By `simulate_fmu`, which holds inputs; the problem's parameters come as start values."""
     case = CASES[name]()
     subject = case.subject
-    numbers = (*entries_of(subject.model), *start_entries(subject.start))
+    numbers = (*list_entries(subject.model), *start_entries(subject.start))
     columns = [("time", float), *((n, float) for n in ("engine_torque", "B2.pressure"))]
     dtype = np.dtype([*columns, ("B3.pressure", float)])
     signals = np.array([(t, *row) for t, row in zip(case.time, case.inputs, strict=True)], dtype)
@@ -186,7 +186,7 @@ def test_every_reference_problem_as_the_core_has_it(built: Built, name: str) -> 
         output=["engine_speed", "output_torque"],
         fmi_type="CoSimulation",
     )
-    core = stepped_run(subject.model, subject.start, case.time, case.inputs, InputKind.HOLD)
+    core = run_fixed_step(subject.model, subject.start, case.time, case.inputs, InputKind.HOLD)
     for column, expected in (
         ("engine_speed", core.engine_speed),
         ("output_torque", core.shaft_torque),
@@ -203,7 +203,7 @@ def test_inputs_with_their_rates_meet_the_tight_reference(instance: Instance, na
     instance.initialize(case.inputs[0])
     told = instance.run(case, 0, case.time.size - 1)
     kind = InputKind.LINEAR if instance.is_fmi2 else InputKind.HOLD
-    core = stepped_run(subject.model, subject.start, case.time, case.inputs, kind)
+    core = run_fixed_step(subject.model, subject.start, case.time, case.inputs, kind)
     for column, expected in zip(told.T, (core.engine_speed, core.shaft_torque), strict=True):
         assert np.abs(column - expected[1:]).max() < 1e-9 * np.abs(expected).max()
     if instance.is_fmi2:
@@ -257,7 +257,7 @@ def test_parameters_are_tuned_while_it_runs(built: Built, instance: Instance) ->
 def test_a_clutch_opens_where_its_touch_point_is_tuned_above_its_pressure(
     built: Built, instance: Instance
 ) -> None:
-    names = [one.name for one in entries_of(built.case.subject.model)]
+    names = [one.name for one in list_entries(built.case.subject.model)]
     touch_point = PARAMETERS + names.index("B3.P0")
     instance.initialize(np.array([1500.0, 0.0, 3e5]))
     instance.fmu.doStep(0.0, 0.01)
@@ -439,4 +439,4 @@ def test_a_twin_with_a_name_of_any_length_is_built(tmp_path: Path) -> None:
     ],
 )
 def test_identifier_is_one_of_c(name: str, expected: str) -> None:
-    assert identifier(name) == expected
+    assert make_identifier(name) == expected

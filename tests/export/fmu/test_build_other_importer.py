@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.export.compiler import native_platform
-from drivetwin.export.fixed_step import InputKind, stepped_run
+from drivetwin.export.compiler import detect_platform
+from drivetwin.export.fixed_step import InputKind, run_fixed_step
 from drivetwin.export.fmu.build import build_fmu
 from tests.export.cases import CASES, STEP
 
 pytestmark = pytest.mark.skipif(
-    native_platform() is None, reason="FMI names no platform like this one"
+    detect_platform() is None, reason="FMI names no platform like this one"
 )
 INPUTS, OUTPUTS = [1, 2, 3], [10, 14]
 COARSE = 10
@@ -48,7 +48,7 @@ def test_libcosim_runs_it_as_the_core_does(tmp_path: Path) -> None:
         assert execution.step()
         rows.append(observer.last_real_values(twin, OUTPUTS))
     subject = case.subject
-    core = stepped_run(subject.model, subject.start, time, given, InputKind.HOLD)
+    core = run_fixed_step(subject.model, subject.start, time, given, InputKind.HOLD)
     for told, expected in zip(
         np.array(rows).T, (core.engine_speed, core.shaft_torque), strict=True
     ):

@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.export.fmu.experiment import Experiment
-from drivetwin.export.modelica.dual_clutch import modelica_text, write_modelica
+from drivetwin.export.modelica.dual_clutch import format_modelica, write_modelica
 from drivetwin.export.subject import Subject
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
@@ -40,7 +40,7 @@ VARIABLES = ("J1.w", "J_out.w", "J_v.w", "output_shaft.tau")
 
 
 def _model(loss_law: LossLaw = "paper") -> DualClutch:
-    model = twin().dual_clutch(SHIFT)
+    model = twin().build_dual_clutch(SHIFT)
     elements = tuple(replace(one, friction=TABLE, peak=1.2) for one in model.elements)
     return replace(model, loss_law=loss_law, elements=elements, J2e=1.5, i_in=1.1)
 
@@ -51,7 +51,7 @@ def _deviation(model: DualClutch, start: State, end: float, folder: Path) -> dic
     pressures = {name: INPUTS[name] for name in ("B2", "B3")}
     ours = simulate(model, INPUTS[ENGINE_TORQUE], pressures, start, time)
     assert ours.status == "completed"
-    text = modelica_text(Subject("truck 2-3", model, start), INPUTS, (0.0, end))
+    text = format_modelica(Subject("truck 2-3", model, start), INPUTS, (0.0, end))
     theirs = run(text, time, VARIABLES, folder)
     expected = (ours.engine_speed, ours.output_speed, ours.wheel_speed, -ours.shaft_torque)
     return {
@@ -75,7 +75,7 @@ def test_an_element_named_as_another_part_is_refused(name: str) -> None:
     off, on = (replace(one, drum_inertia=0.1) for one in model.elements)
     renamed = replace(model, elements=(off, replace(on, name=name)))
     with pytest.raises(InputError, match="would stand for two parts of the Modelica model"):
-        modelica_text(Subject("truck 2-3", renamed, SLIPPING))
+        format_modelica(Subject("truck 2-3", renamed, SLIPPING))
 
 
 def test_loads_of_the_road_agree(tmp_path: Path) -> None:
@@ -95,7 +95,7 @@ def test_a_start_with_a_locked_element_is_without_slip(tmp_path: Path) -> None:
     ratio = model.i_in * model.elements[0].i_c * model.elements[0].i_out
     start = State(150.0, 150.0 / ratio, 150.0 / ratio / 5.38, 0.013, ("B2",))
     inputs = {**INPUTS, "B2": Signal(SAMPLES, np.full(4, 1.4e6))}
-    text = modelica_text(Subject("truck", model, start), inputs, (0.0, 0.02))
+    text = format_modelica(Subject("truck", model, start), inputs, (0.0, 0.02))
     found = run(text, np.linspace(0.0, 0.02, 21), ("B2.w_rel", "J1.w", "J_out.w"), tmp_path)
     assert found["B2.w_rel"][0] == pytest.approx(0.0, abs=1e-9)
     assert found["J1.w"][0] == pytest.approx(ratio * found["J_out.w"][0])
@@ -104,7 +104,7 @@ def test_a_start_with_a_locked_element_is_without_slip(tmp_path: Path) -> None:
 
 
 def test_without_inputs_there_is_the_driveline_alone() -> None:
-    text = modelica_text(Subject("truck", _model(), SLIPPING))
+    text = format_modelica(Subject("truck", _model(), SLIPPING))
     assert "model Driveline" in text
     assert "model Shift" not in text
 
@@ -115,6 +115,6 @@ def test_an_experiment_becomes_the_run(tmp_path: Path) -> None:
     experiment = Experiment("shift 2-3", SAMPLES, np.column_stack(columns), 0.05)
     write_modelica(subject, experiment, tmp_path / "shift.mo")
     text = (tmp_path / "shift.mo").read_text("utf-8")
-    assert text == modelica_text(subject, INPUTS, (0.0, 0.2))
+    assert text == format_modelica(subject, INPUTS, (0.0, 0.2))
     write_modelica(subject, None, tmp_path / "driveline.mo")
-    assert (tmp_path / "driveline.mo").read_text("utf-8") == modelica_text(subject)
+    assert (tmp_path / "driveline.mo").read_text("utf-8") == format_modelica(subject)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.export.modelica.model import package_text
+from drivetwin.export.modelica.model import format_package
 from drivetwin.simulation.network import Element
 
 _TABLE = {"speed_ratio": [0.0, 1.0], "capacity": [0.03, 0.0], "torque_ratio": [1.9, 1.0]}
@@ -18,7 +18,7 @@ _CLUTCH = {"friction": {"slip": [0.0], "mu": [0.12]}, "gain": 0.02, "p0": 5e4, "
 
 def _text(kind: str, **fields: Any) -> str:
     element: Element = {"type": kind, "name": "x", **fields}
-    return package_text("one", [element])
+    return format_package("one", [element])
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.export.modelica.model import Run, package_text
-from drivetwin.export.modelica.text import identifier
-from drivetwin.gearbox import load_gearbox, network_elements
+from drivetwin.export.modelica.model import Run, format_package
+from drivetwin.export.modelica.text import make_identifier
+from drivetwin.gearbox import build_network_elements, load_gearbox
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Element, Start, simulate
 from tests.export.modelica.compiled import run
@@ -22,7 +22,7 @@ def _gearbox() -> tuple[list[Element], dict[str, Signal], str, str]:
     """A built-in planetary gearbox between an engine and a vehicle, two brakes under pressure."""
     gearbox = load_gearbox("three-set-3000")
     elements: list[Element] = [
-        *network_elements(gearbox),
+        *build_network_elements(gearbox),
         {"type": "inertia", "name": "engine", "node": gearbox.input, "inertia": 3.0},
         {"type": "torque", "name": "engine torque", "node": gearbox.input, "input": "T_e"},
         {"type": "inertia", "name": "vehicle", "node": gearbox.output, "inertia": 60.0},
@@ -46,9 +46,9 @@ def test_a_planetary_gearbox_moves_as_in_the_core(tmp_path: Path) -> None:
     ours = simulate(elements, inputs, given, TIME, [("speed", node) for node in nodes])
     assert ours.status == "completed"
     start = Start({node: float(ours.columns["speed", node][0]) for node in nodes})
-    text = package_text("three-set", elements, Run(inputs, start, (0.0, 0.05)))
+    text = format_package("three-set", elements, Run(inputs, start, (0.0, 0.05)))
     names = {
-        str(one["node"]): identifier(str(one["name"]))
+        str(one["node"]): make_identifier(str(one["name"]))
         for one in elements
         if one["type"] == "inertia"
     }
@@ -62,7 +62,7 @@ def test_a_planetary_gearbox_moves_as_in_the_core(tmp_path: Path) -> None:
 
 def test_brakes_are_brakes_and_planets_are_inertias() -> None:
     elements, _, _, _ = _gearbox()
-    text = package_text("three-set", elements)
+    text = format_package("three-set", elements)
     brakes = [one for one in elements if one["type"] == "clutch" and one["b"] == "ground"]
     clutches = [one for one in elements if one["type"] == "clutch" and one["b"] != "ground"]
     assert text.count("Components.Brake ") == len(brakes) > 0
@@ -71,8 +71,8 @@ def test_brakes_are_brakes_and_planets_are_inertias() -> None:
         **{"type": "planetary", "name": "P", "sun": "s", "ring": "r", "carrier": "c"},
         **{"z": 2.0, "planet_inertia": 0.1},
     }
-    assert "IdealPlanetary P_pinions(ratio=0.5);" in package_text("one", [planet])
-    assert "Inertia P_planets(J=0.1);" in package_text("one", [planet])
+    assert "IdealPlanetary P_pinions(ratio=0.5);" in format_package("one", [planet])
+    assert "Inertia P_planets(J=0.1);" in format_package("one", [planet])
 
 
 def test_inputs_are_sampled_at_every_moment_that_any_of_them_has() -> None:
@@ -85,7 +85,7 @@ def test_inputs_are_sampled_at_every_moment_that_any_of_them_has() -> None:
         "a": Signal(np.array([0.0, 1.0]), np.array([0.0, 10.0])),
         "b": Signal(np.array([0.0, 0.25, 2.0]), np.array([1.0, 2.0, 2.0]), delay=0.25),
     }
-    text = package_text("two", elements, Run(inputs, Start({"n": 3.0}), (0.25, 1.0)))
+    text = format_package("two", elements, Run(inputs, Start({"n": 3.0}), (0.25, 1.0)))
     assert "table=[0.25, 2.5, 1.0;\n      0.5, 5.0, 2.0;\n      1.0, 10.0, 2.0]" in text
     assert "driveline.u_b = inputs.y[2];" in text
     assert "StartTime=0.25, StopTime=1.0" in text
@@ -97,5 +97,5 @@ def test_an_input_that_jumps_jumps_in_the_table() -> None:
         {"type": "torque", "name": "T", "node": "n", "input": "a"},
     ]
     steps = Signal(np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0]), np.array([7, 0, 0, 5, 5, 9.0]))
-    text = package_text("jump", elements, Run({"a": steps}, Start({"n": 0.0}), (0.0, 2.0)))
+    text = format_package("jump", elements, Run({"a": steps}, Start({"n": 0.0}), (0.0, 2.0)))
     assert "table=[0.0, 0.0;\n      1.0, 0.0;\n      1.0, 5.0;\n      2.0, 5.0]" in text

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.export.modelica.start import initial_equations
+from drivetwin.export.modelica.start import build_initial_equations
 from drivetwin.simulation.network import Element, Start
 
 ELEMENTS: list[Element] = [
@@ -18,7 +18,7 @@ TWISTS = {"s": "s.phi_rel"}
 
 
 def _equations(start: Start) -> list[str]:
-    return initial_equations(ELEMENTS, start, ANGLES, RESTS, TWISTS)
+    return build_initial_equations(ELEMENTS, start, ANGLES, RESTS, TWISTS)
 
 
 def test_speeds_that_follow_from_others_are_not_stated_again() -> None:

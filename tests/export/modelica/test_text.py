@@ -9,7 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.export.modelica.text import identifier, identifiers, matrix, string
+from drivetwin.export.modelica.text import (
+    format_matrix,
+    format_string,
+    make_identifier,
+    make_identifiers,
+)
 
 
 @pytest.mark.parametrize(
@@ -24,17 +29,17 @@ from drivetwin.export.modelica.text import identifier, identifiers, matrix, stri
     ],
 )
 def test_identifiers_are_plain(name: str, word: str) -> None:
-    assert identifier(name) == word
+    assert make_identifier(name) == word
 
 
 @given(st.lists(st.text(max_size=8), unique=True, max_size=8))
 def test_identifiers_are_legal_and_differ(names: list[str]) -> None:
-    found = identifiers(names)
+    found = make_identifiers(names)
     assert list(found) == names
     assert len(set(found.values())) == len(names)
     assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]*", word) for word in found.values())
 
 
 def test_literals() -> None:
-    assert matrix([(0.0, 1e-5), (2.0, -3.0)]) == "[0.0, 1.0e-05;\n      2.0, -3.0]"
-    assert string('a "b" \\c\n') == "\"a 'b' /c\""
+    assert format_matrix([(0.0, 1e-5), (2.0, -3.0)]) == "[0.0, 1.0e-05;\n      2.0, -3.0]"
+    assert format_string('a "b" \\c\n') == "\"a 'b' /c\""

@@ -7,10 +7,10 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from drivetwin.export.parameters.cdfx import cdfx_text, parse_cdfx
+from drivetwin.export.parameters.cdfx import format_cdfx, parse_cdfx
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.names import Names
-from drivetwin.export.parameters.of_twin import parameters_of
+from drivetwin.export.parameters.of_twin import collect_parameters
 from tests.export.parameters.sample import twin
 
 CONTENT = ParameterSet(
@@ -114,7 +114,7 @@ _REPEATED = ("SW-INSTANCE", "V")
 
 
 def test_the_text_is_that_of_the_example() -> None:
-    assert cdfx_text(CONTENT) == EXPECTED
+    assert format_cdfx(CONTENT) == EXPECTED
     assert parse_cdfx(EXPECTED, "truck.cdfx") == CONTENT
 
 
@@ -128,7 +128,7 @@ def test_variants_are_read_and_other_objects_are_named() -> None:
 
 @pytest.mark.parametrize("names", Names)
 def test_cdfx_children_stand_in_the_prescribed_order(names: Names) -> None:
-    root = ET.fromstring(cdfx_text(parameters_of(twin(), names)).encode("utf-8"))
+    root = ET.fromstring(format_cdfx(collect_parameters(twin(), names)).encode("utf-8"))
     for element in root.iter():
         allowed = _CDF_CHILDREN.get(element.tag, [])
         found = [child.tag for child in element]

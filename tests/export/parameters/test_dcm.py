@@ -12,9 +12,9 @@ from hypothesis import assume, given, settings
 
 from drivetwin.errors import FileFormatError, InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.dcm import dcm_text, parse_dcm
+from drivetwin.export.parameters.dcm import format_dcm, parse_dcm
 from drivetwin.export.parameters.names import Names
-from drivetwin.export.parameters.of_twin import parameters_of
+from drivetwin.export.parameters.of_twin import collect_parameters
 from tests.export.parameters.sample import SETS, twin
 
 CONTENT = ParameterSet(
@@ -94,14 +94,14 @@ _LINES = re.compile(
 
 
 def test_the_text_is_that_of_the_example() -> None:
-    assert dcm_text(CONTENT) == EXPECTED
+    assert format_dcm(CONTENT) == EXPECTED
 
 
 @given(SETS)
 @settings(max_examples=25)
 def test_every_line_follows_the_grammar(content: ParameterSet) -> None:
     try:
-        text = dcm_text(content)
+        text = format_dcm(content)
     except InputError:
         assume(False)
     assert text.isascii()
@@ -130,9 +130,9 @@ def test_an_object_without_end_is_refused_by_name() -> None:
 
 @pytest.mark.parametrize("names", Names)
 def test_another_reader_finds_the_same_in_the_dcm(names: Names, tmp_path: Path) -> None:
-    content = parameters_of(twin(), names)
+    content = collect_parameters(twin(), names)
     path = tmp_path / "twin.dcm"
-    path.write_text(dcm_text(content), "ascii")
+    path.write_text(format_dcm(content), "ascii")
     reader = DcmReader()
     reader.read(str(path))
     numbers = {one.name: (one.value, one.unit) for one in reader.get_parameters()}

@@ -19,10 +19,10 @@ from drivetwin.export.parameters.files import (
     write_parameters,
 )
 from drivetwin.export.parameters.names import Names
-from drivetwin.export.parameters.of_twin import parameters_of
+from drivetwin.export.parameters.of_twin import collect_parameters
 from tests.export.parameters.sample import SETS, twin
 
-TEXTS = {kind: codec.text(parameters_of(twin())) for kind, codec in CODECS.items()}
+TEXTS = {kind: codec.text(collect_parameters(twin())) for kind, codec in CODECS.items()}
 EVERY_FORMAT = pytest.mark.parametrize("kind", ParameterFormat)
 
 
@@ -55,7 +55,7 @@ def test_round_trip(kind: ParameterFormat, content: ParameterSet) -> None:
 def test_parameters_of_a_twin_survive_the_file(
     kind: ParameterFormat, names: Names, tmp_path: Path
 ) -> None:
-    content = parameters_of(twin(), names)
+    content = collect_parameters(twin(), names)
     path = tmp_path / f"twin.{kind}"
     write_parameters(content, path, kind)
     back = read_parameters(path)
@@ -69,7 +69,7 @@ def test_parameters_of_a_twin_survive_the_file(
 
 @EVERY_FORMAT
 def test_names_that_become_one_are_refused(kind: ParameterFormat) -> None:
-    content = parameters_of(twin())
+    content = collect_parameters(twin())
     doubled = ParameterSet("twice", content.scalars[:1] * 2)
     with pytest.raises(InputError, match="both written as"):
         CODECS[kind].text(doubled)
@@ -98,7 +98,7 @@ def test_what_is_no_parameter_file_is_refused(kind: ParameterFormat, text: str) 
 @EVERY_FORMAT
 @pytest.mark.parametrize("wrong", ["nan", "inf", "0,85"])
 def test_a_value_that_is_no_finite_number_is_refused(kind: ParameterFormat, wrong: str) -> None:
-    text = CODECS[kind].text(parameters_of(twin()))
+    text = CODECS[kind].text(collect_parameters(twin()))
     assert text.count("176000.0") == 1
     with pytest.raises(FileFormatError):
         CODECS[kind].parse(text.replace("176000.0", wrong), "file")
@@ -106,7 +106,7 @@ def test_a_value_that_is_no_finite_number_is_refused(kind: ParameterFormat, wron
 
 @EVERY_FORMAT
 def test_a_curve_that_lost_a_point_is_refused(kind: ParameterFormat) -> None:
-    content = parameters_of(twin())
+    content = collect_parameters(twin())
     text = CODECS[kind].text(content)
     last = repr(content.curves[0].axis.points[-1])
     repeated = repr(content.curves[0].axis.points[-2])

@@ -7,7 +7,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.matlab import m_text, parse_m
+from drivetwin.export.parameters.matlab import format_m, parse_m
 
 CONTENT = ParameterSet(
     "truck",
@@ -28,7 +28,7 @@ mu_B3 = [0.13 1.0e-22]; % [1] friction (mu.B3)
 
 
 def test_the_text_is_that_of_the_example() -> None:
-    assert m_text(CONTENT) == EXPECTED
+    assert format_m(CONTENT) == EXPECTED
 
 
 def test_lines_by_hand_are_read_and_the_rest_is_named() -> None:
@@ -42,4 +42,4 @@ def test_a_name_too_long_for_its_breakpoints_is_refused() -> None:
     """Cut to 63 characters the breakpoints would have the name of the curve and be overwritten."""
     curve = Curve("mu." + 60 * "x", Axis("slip", (0.0, 20.0)), (0.13, 0.12))
     with pytest.raises(InputError, match="both written as"):
-        m_text(ParameterSet("t", (), (curve,)))
+        format_m(ParameterSet("t", (), (curve,)))

@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.export.parameters.content import Curve, Scalar
-from drivetwin.export.parameters.of_twin import converter_curves, parameters_of
+from drivetwin.export.parameters.of_twin import build_converter_curves, collect_parameters
 from drivetwin.parameters import OVER_ETA
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import Stribeck
@@ -19,13 +19,13 @@ from tests.report.sample import STRIBECK
 
 
 def test_every_value_has_its_unit_meaning_and_interval() -> None:
-    k_o = parameters_of(twin())["k_o"]
+    k_o = collect_parameters(twin())["k_o"]
     assert isinstance(k_o, Scalar)
     assert (k_o.value, k_o.unit) == (1.76e5, "N*m/rad")
     assert (
         k_o.text == "output shaft stiffness (eq. 8, 14); identified, 95 %: 1.725e+05 .. 1.795e+05"
     )
-    weak = parameters_of(twin())["c_o"]
+    weak = collect_parameters(twin())["c_o"]
     assert "; weak, 95 %" in weak.text
 
 
@@ -33,19 +33,21 @@ def test_a_value_of_the_card_states_no_interval() -> None:
     """Its deviation is zero, and an interval without width would tell it as known exactly."""
     known = Estimate("P0.B3", 8e4, 0.0, Verdict.DESIGN, "card")
     given = twin()
-    told = parameters_of(replace(given, parameters={**given.parameters, "P0.B3": known}))["P0.B3"]
+    told = collect_parameters(replace(given, parameters={**given.parameters, "P0.B3": known}))[
+        "P0.B3"
+    ]
     assert told.text == "pressure at which the clutch fill ends; design value"
 
 
 def test_what_the_log_could_not_tell_has_no_entry_but_a_reason() -> None:
-    content = parameters_of(twin())
+    content = collect_parameters(twin())
     with pytest.raises(KeyError):
         content["te_delay"]
     assert any(note.startswith("no value of te_delay: the engine torque") for note in content.notes)
 
 
 def test_an_identified_value_goes_before_the_design_value() -> None:
-    content = parameters_of(twin())
+    content = collect_parameters(twin())
     assert [one.value for one in content.scalars if one.name == "P0.B3"] == [8.2e4]
     design = content["P0.B2"]
     assert isinstance(design, Scalar)
@@ -56,9 +58,12 @@ def test_an_identified_value_goes_before_the_design_value() -> None:
 @pytest.mark.parametrize(("ending", "value"), [("", 0.07), (OVER_ETA, 0.08)])
 def test_an_identified_drum_stands_once(ending: str, value: float) -> None:
     name, given = f"drum.B3{ending}", twin()
-    assert [one.value for one in parameters_of(given).scalars if "drum" in one.name] == [0.0, 0.05]
+    assert [one.value for one in collect_parameters(given).scalars if "drum" in one.name] == [
+        0.0,
+        0.05,
+    ]
     told = Estimate(name, value, 0.01, Verdict.IDENTIFIED, "likelihood")
-    content = parameters_of(replace(given, parameters={**given.parameters, name: told}))
+    content = collect_parameters(replace(given, parameters={**given.parameters, name: told}))
     drums = {one.name: one for one in content.scalars if "drum" in one.name}
     assert set(drums) == {"drum.B2", name}
     assert drums[name].value == value
@@ -67,12 +72,12 @@ def test_an_identified_drum_stands_once(ending: str, value: float) -> None:
 
 
 def test_the_curve_gives_the_law_of_the_simulation() -> None:
-    curve = parameters_of(twin())["mu.B3"]
+    curve = collect_parameters(twin())["mu.B3"]
     assert isinstance(curve, Curve)
     assert curve.axis.unit == "rad/s"
     assert curve.axis.points[0] == 0.0
     slip = np.linspace(0.0, 95.0, 2000)
-    law = STRIBECK.at(slip)
+    law = STRIBECK.evaluate(slip)
     assert np.interp(slip, curve.axis.points, curve.values) == pytest.approx(law, rel=1e-3)
 
 
@@ -81,18 +86,18 @@ def test_the_curve_gives_the_law_of_the_simulation() -> None:
 def test_the_curve_keeps_to_a_law_that_bends_near_zero_slip(v_s: float, mu_s: float) -> None:
     given, law = twin(), Stribeck(0.11, mu_s, v_s, 1e-4)
     seen = replace(given.friction["B3"], slip=np.linspace(0.0, 300.0, 60), stribeck=law)
-    curve = parameters_of(replace(given, friction={**given.friction, "B3": seen}))["mu.B3"]
+    curve = collect_parameters(replace(given, friction={**given.friction, "B3": seen}))["mu.B3"]
     assert isinstance(curve, Curve)
     assert (curve.axis.points[-1], len(curve.axis.points)) == (300.0, 33)
     slip = np.linspace(0.0, 300.0, 20001)
     told = np.interp(slip, curve.axis.points, curve.values)
-    assert told == pytest.approx(law.at(slip), rel=1e-3)
+    assert told == pytest.approx(law.evaluate(slip), rel=1e-3)
 
 
 def test_a_table_keeps_its_own_points() -> None:
     given = twin()
     table = replace(given.friction["B3"], stribeck=None)
-    curve = parameters_of(replace(given, friction={"B3": table}))["mu.B3"]
+    curve = collect_parameters(replace(given, friction={"B3": table}))["mu.B3"]
     assert isinstance(curve, Curve)
     assert curve.axis.points == (0.0, *table.slip.tolist())
     assert curve.values == (table.mu[0], *table.mu.tolist())
@@ -100,6 +105,6 @@ def test_a_table_keeps_its_own_points() -> None:
 
 def test_a_converter_brings_two_curves_over_the_speed_ratio() -> None:
     converter = Converter((0.0, 0.8, 1.0), (0.03, 0.02, 0.0), (1.9, 1.1, 1.0))
-    ratio, capacity = converter_curves(converter)
+    ratio, capacity = build_converter_curves(converter)
     assert ratio.axis.points == capacity.axis.points == converter.speed_ratio
     assert (ratio.values, capacity.values) == (converter.torque_ratio, converter.capacity)

@@ -8,7 +8,7 @@ import pytest
 
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.names import Names
-from drivetwin.export.parameters.of_twin import parameters_of
+from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.simulation.converter_map import Converter
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
@@ -18,7 +18,7 @@ CONVERTER = Converter((0.0, 0.5, 0.8, 1.0, 1.3), (0.036, 0.03, 0.02, 0.0, -0.012
 
 @pytest.fixture
 def named() -> ParameterSet:
-    return parameters_of(twin(), Names.SIMSCAPE, CONVERTER)
+    return collect_parameters(twin(), Names.SIMSCAPE, CONVERTER)
 
 
 def _value(content: ParameterSet, name: str) -> float:
@@ -34,16 +34,16 @@ def _curve(content: ParameterSet, name: str) -> Curve:
 
 
 def test_clutch_torque_of_the_block_is_that_of_the_twin(named: ParameterSet) -> None:
-    element = twin().dual_clutch(SHIFT).elements[1]
+    element = twin().build_dual_clutch(SHIFT).elements[1]
     pressure, slip = 5e5, np.array([0.0, 3.0, 40.0, 95.0])
     area = _value(named, "Ndisc.B3") * _value(named, "Aeff.B3") * _value(named, "Reff.B3")
     mu = _curve(named, "mu_k.B3")
     kinetic = area * (pressure - _value(named, "P_eng.B3"))
     torque = kinetic * np.interp(slip, mu.axis.points, mu.values)
-    expected = element.gain * (pressure - element.P0) * element.friction.at(slip)
+    expected = element.gain * (pressure - element.P0) * element.friction.evaluate(slip)
     assert torque == pytest.approx(expected, rel=1e-3)
     static = _value(named, "mu_s.B3")
-    assert static == pytest.approx(element.peak * float(element.friction.at(np.zeros(1))[0]))
+    assert static == pytest.approx(element.peak * float(element.friction.evaluate(np.zeros(1))[0]))
 
 
 def test_an_element_without_a_curve_has_its_geometry_only(named: ParameterSet) -> None:
@@ -58,7 +58,7 @@ def test_capacity_factor_gives_the_pump_torque_in_drive(named: ParameterSet) -> 
     pump = 200.0
     torque = (pump / np.array(factor.values)) ** 2
     turbine = pump * np.array(factor.axis.points)
-    assert torque == pytest.approx(CONVERTER.pump_torque(np.full(3, pump), turbine))
+    assert torque == pytest.approx(CONVERTER.compute_pump_torque(np.full(3, pump), turbine))
 
 
 def test_the_rest_keeps_its_value_under_the_name_of_the_blocks(named: ParameterSet) -> None:

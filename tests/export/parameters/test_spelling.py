@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.export.parameters.spelling import ascii_line
+from drivetwin.export.parameters.spelling import to_ascii_line
 
 
 @pytest.mark.parametrize(
@@ -18,8 +18,8 @@ from drivetwin.export.parameters.spelling import ascii_line
     ],
 )
 def test_what_has_a_counterpart_in_7_bits_gets_it(text: str, plain: str) -> None:
-    assert ascii_line(text) == plain
+    assert to_ascii_line(text) == plain
 
 
 def test_what_has_none_is_a_question_mark() -> None:
-    assert ascii_line("前 B3") == "? B3"
+    assert to_ascii_line("前 B3") == "? B3"

@@ -12,8 +12,8 @@ from lxml import etree
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.names import Names
-from drivetwin.export.parameters.of_twin import parameters_of
-from drivetwin.export.parameters.ssv import parse_ssv, ssv_text
+from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.export.parameters.ssv import format_ssv, parse_ssv
 from tests.export.parameters.sample import twin
 
 CURVE = Curve("mu.B3", Axis("slip", (0.0, 20.0), "rad/s"), (0.13, 0.12), text="friction")
@@ -27,12 +27,12 @@ NAMESPACES = {
 def test_ssv_is_valid(names: Names) -> None:
     folder = Path(fmpy.__path__[0]) / "ssp" / "schema"
     schema = etree.XMLSchema(etree.parse(folder / "SystemStructureParameterValues.xsd"))
-    document = etree.fromstring(ssv_text(parameters_of(twin(), names)).encode("utf-8"))
+    document = etree.fromstring(format_ssv(collect_parameters(twin(), names)).encode("utf-8"))
     assert schema.validate(document), schema.error_log
 
 
 def test_curves_are_indexed_scalars_with_their_axis() -> None:
-    root = ET.fromstring(ssv_text(ParameterSet("t", curves=(CURVE,))).encode("utf-8"))
+    root = ET.fromstring(format_ssv(ParameterSet("t", curves=(CURVE,))).encode("utf-8"))
     found = {
         one.get("name"): float(one[0].get("value", ""))
         for one in root.iterfind("ssv:Parameters/ssv:Parameter", NAMESPACES)
@@ -47,7 +47,7 @@ def test_curves_are_indexed_scalars_with_their_axis() -> None:
 
 def test_units_are_declared_once() -> None:
     content = ParameterSet("t", (Scalar("c_o", 280.0, "N*m*s/rad"),), (CURVE,))
-    root = ET.fromstring(ssv_text(content).encode("utf-8"))
+    root = ET.fromstring(format_ssv(content).encode("utf-8"))
     declared = {
         unit.get("name"): unit.find("ssc:BaseUnit", NAMESPACES)
         for unit in root.iterfind("ssv:Units/ssc:Unit", NAMESPACES)
@@ -76,7 +76,7 @@ def test_a_curve_is_read_by_its_indices_whatever_their_order_in_the_file() -> No
     """A tool that sorts by name puts [10] before [2]."""
     points = tuple(float(k) for k in range(12))
     content = ParameterSet("t", (), (Curve("mu", Axis("slip", points), points[::-1]),))
-    head, *parameters = ssv_text(content).split("    <ssv:Parameter ")
+    head, *parameters = format_ssv(content).split("    <ssv:Parameter ")
     *parameters, last = parameters
     last, tail = last.split("  </ssv:Parameters>")
     shuffled = "".join(f"    <ssv:Parameter {one}" for one in sorted([*parameters, last]))

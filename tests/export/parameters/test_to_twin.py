@@ -12,8 +12,8 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
-from drivetwin.export.parameters.of_twin import parameters_of
-from drivetwin.export.parameters.to_twin import updated
+from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.export.parameters.to_twin import update_twin
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
@@ -22,7 +22,7 @@ from tests.report.sample import SHIFT
 def _edited(**values: float) -> ParameterSet:
     """The exported set with other values, names with `__` for the dot."""
     new = {name.replace("__", "."): value for name, value in values.items()}
-    content = parameters_of(twin())
+    content = collect_parameters(twin())
     return replace(
         content,
         scalars=tuple(replace(one, value=new.get(one.name, one.value)) for one in content.scalars),
@@ -32,7 +32,7 @@ def _edited(**values: float) -> ParameterSet:
 @pytest.mark.parametrize("kind", ParameterFormat)
 def test_a_file_as_it_was_exported_changes_nothing(kind: ParameterFormat) -> None:
     codec, given = CODECS[kind], twin()
-    update = updated(given, codec.parse(codec.text(parameters_of(given)), "file"))
+    update = update_twin(given, codec.parse(codec.text(collect_parameters(given)), "file"))
     assert update.changed == update.idle == update.unknown == ()
     assert update.twin == given
 
@@ -41,16 +41,19 @@ def test_a_file_as_it_was_exported_changes_nothing(kind: ParameterFormat) -> Non
 def test_edited_values_reach_the_simulation(kind: ParameterFormat) -> None:
     edited = _edited(k_o=2e5, gain__B3=0.03, P0__B3=9e4, i_f=5.0, ratio_3=1.5, mu_c__B3=0.1)
     codec = CODECS[kind]
-    update = updated(twin(), codec.parse(codec.text(edited), "file"))
+    update = update_twin(twin(), codec.parse(codec.text(edited), "file"))
     assert set(update.changed) == {"k_o", "gain.B3", "P0.B3", "i_f", "ratio_3", "mu_c.B3"}
-    model, element = update.twin.dual_clutch(SHIFT), update.twin.dual_clutch(SHIFT).elements[1]
+    model, element = (
+        update.twin.build_dual_clutch(SHIFT),
+        update.twin.build_dual_clutch(SHIFT).elements[1],
+    )
     assert (model.k_o, model.i_f, element.gain, element.P0) == (2e5, 5.0, 0.03, 9e4)
     assert isinstance(element.friction, Stribeck)
     assert element.friction.mu_c == 0.1
-    assert update.twin.gear("3").ratio == 1.5
+    assert update.twin.get_gear("3").ratio == 1.5
     assert update.twin.parameters["k_o"].verdict is Verdict.DESIGN
     assert update.twin.covariance is not None
-    assert updated(twin(), _edited(eta=0.9)).twin.covariance is None
+    assert update_twin(twin(), _edited(eta=0.9)).twin.covariance is None
 
 
 @pytest.mark.parametrize("told", [False, True])
@@ -60,11 +63,11 @@ def test_every_name_that_is_told_as_changed_acts(told: bool) -> None:
         drum = Estimate("drum.B3", 0.07, 0.01, Verdict.IDENTIFIED, "likelihood")
         given = replace(given, parameters={**given.parameters, "drum.B3": drum})
     changed: list[str] = []
-    for one in parameters_of(given).scalars:
+    for one in collect_parameters(given).scalars:
         file = ParameterSet("t", (replace(one, value=1.5 * one.value + 0.1),))
-        update = updated(given, file)
+        update = update_twin(given, file)
         changed += update.changed
-        acts = update.twin.dual_clutch(SHIFT) != given.dual_clutch(SHIFT)
+        acts = update.twin.build_dual_clutch(SHIFT) != given.build_dual_clutch(SHIFT)
         # The gears' ratios find the shifts of a log as well.
         assert acts == bool(update.changed) or one.name == "ratio_3", one.name
         assert update.twin == given if update.idle else update.changed == (one.name,)
@@ -73,11 +76,11 @@ def test_every_name_that_is_told_as_changed_acts(told: bool) -> None:
 
 
 def test_an_edited_curve_becomes_the_law() -> None:
-    content = parameters_of(twin())
+    content = collect_parameters(twin())
     (curve,) = content.curves
     raised = tuple(1.1 * mu for mu in curve.values)
-    update = updated(twin(), replace(content, curves=(replace(curve, values=raised),)))
-    law = update.twin.dual_clutch(SHIFT).elements[1].friction
+    update = update_twin(twin(), replace(content, curves=(replace(curve, values=raised),)))
+    law = update.twin.build_dual_clutch(SHIFT).elements[1].friction
     assert isinstance(law, FrictionTable)
     assert (law.slip, law.mu) == (curve.axis.points, raised)
 
@@ -86,7 +89,7 @@ def test_friction_over_eta_is_written_and_changed_as_such() -> None:
     given = twin()
     curve = given.friction["B3"]
     given = replace(given, friction={"B3": replace(curve, over_eta=True)})
-    content = parameters_of(given)
+    content = collect_parameters(given)
     numbers = {one.name: one for one in content.scalars}
     mu_c, (curve_then,) = numbers["mu_c.B3"], content.curves
     assert mu_c.text.endswith("over η")
@@ -95,7 +98,7 @@ def test_friction_over_eta_is_written_and_changed_as_such() -> None:
     law = ParameterSet("t", (replace(mu_c, value=0.1),))
     curve_only = ParameterSet("t", (), (raised,))
     for file in (law, curve_only):
-        assert updated(given, file).twin.friction["B3"].over_eta
+        assert update_twin(given, file).twin.friction["B3"].over_eta
 
 
 def test_a_curve_and_its_law_cannot_both_change() -> None:
@@ -104,63 +107,63 @@ def test_a_curve_and_its_law_cannot_both_change() -> None:
     assert isinstance(curve, Curve)
     both = replace(edited, curves=(replace(curve, values=tuple(np.array(curve.values) * 1.1)),))
     with pytest.raises(InputError, match="both the friction curve of B3 and mu_s"):
-        updated(twin(), both)
+        update_twin(twin(), both)
 
 
 def test_a_value_in_another_unit_is_refused() -> None:
     """0.8 bar is not 0.8 Pa, and a slip in rpm not one in rad/s."""
-    content = parameters_of(twin())
+    content = collect_parameters(twin())
     in_bar = Scalar("P0.B3", 0.8, "bar")
     with pytest.raises(InputError, match=r"gives P0\.B3 in bar, not in Pa"):
-        updated(twin(), ParameterSet("t", (in_bar,)))
+        update_twin(twin(), ParameterSet("t", (in_bar,)))
     (curve,) = content.curves
     in_rpm = replace(curve, axis=replace(curve.axis, unit="rpm"))
     with pytest.raises(InputError, match=r"gives mu\.B3 in rpm, not in rad/s"):
-        updated(twin(), ParameterSet("t", (), (in_rpm,)))
+        update_twin(twin(), ParameterSet("t", (), (in_rpm,)))
     with pytest.raises(InputError, match="gives te_delay in ms, not in s"):
-        updated(twin(), ParameterSet("t", (Scalar("te_delay", 10.0, "ms"),)))
+        update_twin(twin(), ParameterSet("t", (Scalar("te_delay", 10.0, "ms"),)))
 
 
 def test_a_unit_that_a_tool_spells_otherwise_or_drops_is_the_same() -> None:
     for unit in ("N/m^2", "1"):
         given = ParameterSet("t", (Scalar("P0.B3", 9e4, unit),))
-        assert updated(twin(), given).twin.value("P0.B3", 0.0) == 9e4
+        assert update_twin(twin(), given).twin.get_value("P0.B3", 0.0) == 9e4
 
 
 def test_a_name_that_is_given_twice_is_refused() -> None:
     """Also where a format spells it otherwise."""
     twice = ParameterSet("t", (Scalar("P0.B3", 9e4, "Pa"), Scalar("P0_B3", 8e4, "Pa")))
     with pytest.raises(InputError, match=r"gives P0\.B3 twice"):
-        updated(twin(), twice)
+        update_twin(twin(), twice)
 
 
 @pytest.mark.parametrize("name", ["k_o", "i_in", "i_f", "i_c.B3", "i_out.B3", "ratio_3"])
 def test_zero_is_refused_where_a_run_divides_by_it(name: str) -> None:
     with pytest.raises(InputError, match=f"{name} = 0 is impossible"):
-        updated(twin(), ParameterSet("t", (Scalar(name, 0.0),)))
+        update_twin(twin(), ParameterSet("t", (Scalar(name, 0.0),)))
 
 
 def test_a_number_that_became_a_curve_is_refused() -> None:
-    (curve,) = parameters_of(twin()).curves
+    (curve,) = collect_parameters(twin()).curves
     with pytest.raises(InputError, match="gives k_o as a curve, not as a number"):
-        updated(twin(), ParameterSet("t", (), (replace(curve, name="k_o"),)))
+        update_twin(twin(), ParameterSet("t", (), (replace(curve, name="k_o"),)))
 
 
 def test_what_the_log_could_not_tell_may_be_given_and_other_names_are_told() -> None:
     given = ParameterSet("t", (Scalar("te_delay", 0.01, "s"), Scalar("wheel_colour", 3.0)))
-    update = updated(twin(), given)
+    update = update_twin(twin(), given)
     assert update.changed == ("te_delay",)
     assert (update.idle, update.unknown) == ((), ("wheel_colour",))
-    assert update.twin.value("te_delay", 0.0) == 0.01
+    assert update.twin.get_value("te_delay", 0.0) == 0.01
 
 
 def test_a_load_that_grows_with_speed_is_written_and_read() -> None:
     given = replace(twin(), load_law=LoadLaw(aero=7.0, std=0.5, mean_speed=14.0))
-    content = parameters_of(given)
+    content = collect_parameters(given)
     assert content["load.aero"].unit == "N*m*s^2/rad^2"
     edited = tuple(
         replace(one, value=9.0) if one.name == "load.aero" else one for one in content.scalars
     )
-    update = updated(given, replace(content, scalars=edited))
+    update = update_twin(given, replace(content, scalars=edited))
     assert update.changed == ("load.aero",)
     assert update.twin.load_law == LoadLaw(aero=9.0, std=0.5, mean_speed=14.0)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.export.parameters.units import base_units
+from drivetwin.export.parameters.units import parse_base_units
 from drivetwin.parameters import SPECS
 
 
@@ -23,14 +23,14 @@ from drivetwin.parameters import SPECS
     ],
 )
 def test_powers(unit: str, powers: dict[str, int] | None) -> None:
-    assert base_units(unit) == powers
+    assert parse_base_units(unit) == powers
 
 
 @pytest.mark.parametrize("unit", ["bar", "N m", "", "kg^", "m/", "rpm"])
 def test_other_units_are_refused(unit: str) -> None:
     with pytest.raises(InputError, match="is not made of"):
-        base_units(unit)
+        parse_base_units(unit)
 
 
 def test_every_declared_parameter_has_base_units() -> None:
-    assert all(base_units(spec.unit) is not None for spec in SPECS.values())
+    assert all(parse_base_units(spec.unit) is not None for spec in SPECS.values())

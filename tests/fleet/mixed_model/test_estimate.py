@@ -14,8 +14,8 @@ from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.fleet import parts
 from drivetwin.fleet.index import FileRow
-from drivetwin.fleet.mixed_model.estimate import estimate, joint_estimates
-from drivetwin.fleet.mixed_model.observations import facts, observed
+from drivetwin.fleet.mixed_model.estimate import estimate_fleet, estimate_parameter
+from drivetwin.fleet.mixed_model.observations import collect_facts, collect_observations
 from drivetwin.fleet.mixed_model.result import JointEstimate
 from drivetwin.fleet.rows import Row, RowKind
 from drivetwin.fleet.store import Store
@@ -59,11 +59,11 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
             mu += 0.02 if log == STRAY else 0.0
             fields = {"odometer": reading}
             file = FileRow(f"/l/{log}.csv", log, "c", 1, 1, "trucks", f"T{unit}", fields)
-            opened.index.put_file(file)
-            opened.index.put_waiting(log, "c", "s", "v")
+            opened.index.set_file(file)
+            opened.index.add_waiting_log(log, "c", "s", "v")
             outcome = Outcome(State.DONE)
-            parts.write_part(opened.part(log), log, outcome, _rows(mu, log, draws))
-            opened.index.put_outcome(log, outcome, 1.0)
+            parts.write_part(opened.get_part_path(log), log, outcome, _rows(mu, log, draws))
+            opened.index.set_outcome(log, outcome, 1.0)
         opened.compact()
         yield opened
 
@@ -71,7 +71,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
 @pytest.fixture(scope="module")
 def found(store: Store) -> dict[str, JointEstimate]:
     """All joint estimates, by parameter."""
-    return {one.parameter: one for one in joint_estimates(store)}
+    return {one.parameter: one for one in estimate_fleet(store)}
 
 
 def test_only_what_logs_tell_is_estimated(found: dict[str, JointEstimate]) -> None:
@@ -134,24 +134,24 @@ def test_a_stray_log_is_named_with_the_reason(found: dict[str, JointEstimate]) -
 
 
 def test_one_parameter_may_be_asked_for(store: Store) -> None:
-    assert [one.parameter for one in joint_estimates(store, ["eta"])] == ["eta"]
+    assert [one.parameter for one in estimate_fleet(store, ["eta"])] == ["eta"]
 
 
 def test_an_estimate_is_a_document(found: dict[str, JointEstimate]) -> None:
-    document = found["mu.B3"].document()
+    document = found["mu.B3"].to_document()
     assert document["changes"][0]["unit"] == "T7"
     assert "points" not in document
 
 
 def test_settings_that_differ_are_told(store: Store) -> None:
-    known = facts(store)
-    (seen,) = [one for one in observed(store, known) if one.parameter == "eta"]
+    known = collect_facts(store)
+    (seen,) = [one for one in collect_observations(store, known) if one.parameter == "eta"]
     plain = {log: fact for log, (_, fact) in known.items()}
-    one = estimate(seen, plain)
+    one = estimate_parameter(seen, plain)
     assert one is not None
     assert not one.notes
     older = {seen.logs[0]: replace(plain[seen.logs[0]], settings="older")}
-    mixed = estimate(seen, {**plain, **older})
+    mixed = estimate_parameter(seen, {**plain, **older})
     assert mixed is not None
     assert mixed.notes[0].startswith("logs identified with 2 different settings")
 
@@ -159,10 +159,10 @@ def test_settings_that_differ_are_told(store: Store) -> None:
 def test_too_few_logs_give_no_estimate(tmp_path: Path) -> None:
     with Store(tmp_path, write=True) as opened:
         for log in ("00", "01"):
-            opened.index.put_file(FileRow(log, log, "c", 1, 1, "r", "u", {}))
-            opened.index.put_waiting(log, "c", "s", "v")
+            opened.index.set_file(FileRow(log, log, "c", 1, 1, "r", "u", {}))
+            opened.index.add_waiting_log(log, "c", "s", "v")
             parts.write_part(
-                opened.part(log), log, Outcome(State.DONE), [_value_row("eta", 0.8, 0.1)]
+                opened.get_part_path(log), log, Outcome(State.DONE), [_value_row("eta", 0.8, 0.1)]
             )
-            opened.index.put_outcome(log, Outcome(State.DONE), 1.0)
-        assert joint_estimates(opened) == []
+            opened.index.set_outcome(log, Outcome(State.DONE), 1.0)
+        assert estimate_fleet(opened) == []

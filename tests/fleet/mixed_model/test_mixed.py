@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.fleet.mixed_model.mixed import FloatArray, MixedFit, Observations, fit
+from drivetwin.fleet.mixed_model.mixed import FloatArray, MixedFit, Observations, fit_mixed_model
 from tests.support.coverage import COARSE, assert_covers, vary_draws
 from tests.support.shared_results import shared
 
@@ -37,7 +37,7 @@ def made(seed: int, logs: int = 200, units: int = 25, factor: float = 1.0) -> Ob
 @shared
 def fits(draws: int) -> list[MixedFit]:
     """Fits of many fleets."""
-    return [fit(made(seed)) for seed in range(draws)]
+    return [fit_mixed_model(made(seed)) for seed in range(draws)]
 
 
 @vary_draws()
@@ -69,7 +69,7 @@ def test_units_are_within_their_errors(draws: int) -> None:
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
 def test_the_scatter_of_logs_is_found(factor: float) -> None:
-    found = fit(made(5, 1000, 40, factor), intervals=False)
+    found = fit_mixed_model(made(5, 1000, 40, factor), intervals=False)
     assert np.isnan(found.sigma_ci).all()
     assert found.excess == pytest.approx(factor, rel=0.1)
 
@@ -78,7 +78,7 @@ def test_without_units_it_is_weighted_least_squares() -> None:
     base = made(1)
     noise = 0.5 * base.std * np.random.default_rng(0).standard_normal(200)
     seen = replace(base, y=LEVEL + noise, unit=np.zeros(200, dtype=int), z=base.z[:, :0])
-    found = fit(seen)
+    found = fit_mixed_model(seen)
     root = 1.0 / seen.std
     exact, *_ = np.linalg.lstsq(seen.x * root[:, None], seen.y * root, rcond=None)
     assert found.beta == pytest.approx(exact, rel=1e-9)
@@ -88,7 +88,7 @@ def test_without_units_it_is_weighted_least_squares() -> None:
 def test_equal_units_have_no_spread() -> None:
     seen = made(2, 300, 30)
     draws = np.random.default_rng(0)
-    found = fit(replace(seen, y=LEVEL + seen.std * draws.standard_normal(300)))
+    found = fit_mixed_model(replace(seen, y=LEVEL + seen.std * draws.standard_normal(300)))
     assert found.sigma[0] < 3e-4
     assert found.sigma_ci[0, 0] == 0.0
 
@@ -96,8 +96,8 @@ def test_equal_units_have_no_spread() -> None:
 @settings(max_examples=10)
 @given(st.floats(1e-6, 1e8), st.floats(-10.0, 10.0))
 def test_another_unit_of_measure_changes_nothing(scale: float, shift: float) -> None:
-    seen, base = made(4, 120, 12), fit(made(4, 120, 12), intervals=False)
+    seen, base = made(4, 120, 12), fit_mixed_model(made(4, 120, 12), intervals=False)
     moved = replace(seen, y=scale * (seen.y + shift), std=scale * seen.std)
-    found = fit(moved, intervals=False)
+    found = fit_mixed_model(moved, intervals=False)
     assert found.beta[0] / scale - shift == pytest.approx(base.beta[0], abs=1e-5)
     assert found.sigma / scale == pytest.approx(base.sigma, rel=2e-2, abs=1e-5)

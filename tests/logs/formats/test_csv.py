@@ -27,7 +27,7 @@ def read(text: str | bytes, time: TimeColumn | None = None) -> RawLog:
 
 
 def values(log: RawLog, name: str) -> list[float]:
-    (channel,) = log.named(name)
+    (channel,) = log.get_channels(name)
     return [float(value) for value in channel.values]
 
 
@@ -82,7 +82,7 @@ def test_utf16_and_latin1_text() -> None:
 
 def test_an_empty_cell_is_no_sample_of_its_column_alone() -> None:
     log = read("time,slow,fast\ns,Nm,bar\n0,1,10\n1,,11\n2,3,12\n3, ,13\n")
-    (slow,), (fast,) = log.named("slow"), log.named("fast")
+    (slow,), (fast,) = log.get_channels("slow"), log.get_channels("fast")
     assert slow.time.tolist() == [0.0, 2.0]
     assert slow.values.tolist() == [1.0, 3.0]
     assert fast.values.tolist() == [10.0, 11.0, 12.0, 13.0]

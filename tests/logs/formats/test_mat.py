@@ -234,7 +234,7 @@ def test_a_recorded_log_without_torque_sensor() -> None:
     log = read_log(TRUCK_C, card)
     assert "output_torque" not in log
     assert log["engine_torque"].step == pytest.approx(0.02)
-    assert log.pressure("B3").values.max() == pytest.approx(12.23e5, rel=1e-3)
+    assert log.get_pressure("B3").values.max() == pytest.approx(12.23e5, rel=1e-3)
     assert log["input_speed"].values[0] == pytest.approx(1432.657 * np.pi / 30.0, rel=1e-6)
     assert log.warnings == ()
 

@@ -66,7 +66,7 @@ def test_equal_names_are_told_apart_by_group(tmp_path: Path) -> None:
         ("100ms", [signal("n", SLOW, SLOW, "rpm")]),
     ]
     raw = read_raw(save(tmp_path / "log.mf4", groups, "4.10"))
-    assert [(one.group, one.time.size) for one in raw.named("n")] == [
+    assert [(one.group, one.time.size) for one in raw.get_channels("n")] == [
         ("10ms task", FAST.size),
         ("100ms", SLOW.size),
     ]

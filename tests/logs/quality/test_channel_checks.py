@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.channels.roles import quantity_of
+from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError
 from drivetwin.logs.quality.channel_checks import check_channel
@@ -18,7 +18,7 @@ RPM = np.pi / 30.0
 
 
 def channel(role: str, values: FloatArray, unit: str = "", time: FloatArray = TIME) -> Channel:
-    return Channel(role, quantity_of(role), time, values, "X", unit)
+    return Channel(role, get_quantity(role), time, values, "X", unit)
 
 
 def ramp(low: float, high: float) -> FloatArray:

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.roles import quantity_of
+from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import PlausibilityError, TimeError
 from drivetwin.logs.quality.consistency_checks import (
     check_common_span,
+    check_coverage,
+    check_final_drive,
     check_gearing,
+    check_torque_balance,
     check_torque_signs,
-    final_drive_held,
-    partly_recorded,
-    torque_balance,
 )
 from drivetwin.logs.read import read_log
 from tests.logs.fixtures import CARD, card, write
@@ -29,7 +29,7 @@ TIME = np.linspace(0.0, 0.5, 50)
 
 def speeds(**levels: float) -> dict[str, Channel]:
     return {
-        role: Channel(role, quantity_of(role), TIME, np.full(50, level), f"n_{role}", "rad/s")
+        role: Channel(role, get_quantity(role), TIME, np.full(50, level), f"n_{role}", "rad/s")
         for role, level in levels.items()
     }
 
@@ -59,11 +59,11 @@ def test_standstill_and_absent_speeds_show_no_gearing(tmp_path: Path) -> None:
 
 def test_channels_that_start_late_or_end_early_are_told() -> None:
     channels = speeds(input_speed=180.0, output_speed=100.0, wheel_speed=20.0)
-    assert partly_recorded(channels) == []
+    assert check_coverage(channels) == []
     late = channels["output_speed"]
     channels["output_speed"] = replace(late, time=late.time[10:], values=late.values[10:])
     channels["wheel_speed"] = replace(late, time=late.time[:40], values=late.values[:40])
-    assert partly_recorded(channels) == [
+    assert check_coverage(channels) == [
         f"channel 'n_output_speed': no samples from 0.000 s to {TIME[10]:.3f} s",
         f"channel 'n_output_speed': no samples from {TIME[39]:.3f} s to 0.500 s",
     ]
@@ -84,7 +84,7 @@ def powered(ratio: float, share: float) -> dict[str, Channel]:
     """A gear of `ratio`, whose output torque is `share` of ratio times engine torque."""
     made = speeds(input_speed=100.0 * ratio, output_speed=100.0)
     for role, level in (("engine_torque", 800.0), ("output_torque", 800.0 * ratio * share)):
-        made[role] = Channel(role, quantity_of(role), TIME, np.full(50, level), role, "Nm")
+        made[role] = Channel(role, get_quantity(role), TIME, np.full(50, level), role, "Nm")
     return made
 
 
@@ -106,7 +106,7 @@ def test_torques_that_act_against_each_other_for_a_while_are_no_wrong_sign() -> 
     ("share", "told"), [(0.9, False), (0.65, False), (0.45, True), (1.8, True)]
 )
 def test_a_torque_of_the_wrong_scale_is_told(tmp_path: Path, share: float, told: bool) -> None:
-    texts = torque_balance(powered(1.8, share), card(tmp_path))
+    texts = check_torque_balance(powered(1.8, share), card(tmp_path))
     assert bool(texts) == told
     if told:
         assert f"in gear 2 the output torque is {share:.2f} of ratio times" in texts[0]
@@ -119,18 +119,18 @@ def test_overrun_and_little_torque_do_not_count_in_the_balance(tmp_path: Path) -
     engine[40:], output[40:] = -60.0, -2000.0
     for role, values in (("engine_torque", engine), ("output_torque", output)):
         made[role] = replace(made[role], values=values)
-    assert torque_balance(made, card(tmp_path)) == []
+    assert check_torque_balance(made, card(tmp_path)) == []
 
 
 def test_a_speed_next_to_zero_is_no_gear(tmp_path: Path) -> None:
     made = powered(1.8, 0.3)
     still = replace(made["output_speed"], values=np.full_like(made["output_speed"].values, 5e-324))
-    assert torque_balance(made | {"output_speed": still}, card(tmp_path)) == []
+    assert check_torque_balance(made | {"output_speed": still}, card(tmp_path)) == []
 
 
 def test_without_a_gear_there_is_no_balance(tmp_path: Path) -> None:
-    assert torque_balance(powered(2.5, 0.3), card(tmp_path)) == []
-    assert torque_balance(speeds(input_speed=180.0, output_speed=100.0), card(tmp_path)) == []
+    assert check_torque_balance(powered(2.5, 0.3), card(tmp_path)) == []
+    assert check_torque_balance(speeds(input_speed=180.0, output_speed=100.0), card(tmp_path)) == []
 
 
 def driven(wheel_over: float, noise: float = 0.02) -> dict[str, Channel]:
@@ -141,7 +141,7 @@ def driven(wheel_over: float, noise: float = 0.02) -> dict[str, Channel]:
     values = {"output_speed": output, "wheel_speed": output / wheel_over}
     return {
         role: Channel(
-            role, quantity_of(role), time, v + rng.normal(0.0, noise, time.size), role, ""
+            role, get_quantity(role), time, v + rng.normal(0.0, noise, time.size), role, ""
         )
         for role, v in values.items()
     }
@@ -149,14 +149,14 @@ def driven(wheel_over: float, noise: float = 0.02) -> dict[str, Channel]:
 
 def test_a_final_drive_that_is_not_the_cards_is_told(tmp_path: Path) -> None:
     vehicle = card(tmp_path)
-    (text,) = final_drive_held(driven(4.99), vehicle)
+    (text,) = check_final_drive(driven(4.99), vehicle)
     found = re.match(r"'output_speed' over 'wheel_speed' is ([\d.]+), .* final_drive = 5:", text)
     assert found is not None
     assert float(found[1]) == pytest.approx(4.99, abs=0.001)
-    assert final_drive_held(driven(5.0), vehicle) == []
-    assert final_drive_held(driven(4.998), vehicle) == []
-    assert final_drive_held(driven(4.99, noise=3.0), vehicle) == []
-    assert final_drive_held({"output_speed": driven(5.2)["output_speed"]}, vehicle) == []
+    assert check_final_drive(driven(5.0), vehicle) == []
+    assert check_final_drive(driven(4.998), vehicle) == []
+    assert check_final_drive(driven(4.99, noise=3.0), vehicle) == []
+    assert check_final_drive({"output_speed": driven(5.2)["output_speed"]}, vehicle) == []
 
 
 def test_reading_a_log_tells_the_final_drive(tmp_path: Path) -> None:

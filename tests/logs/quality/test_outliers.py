@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import FloatArray, Quantity
 from drivetwin.logs.quality.outliers import (
-    beyond,
-    clipped,
-    dropouts,
-    longest_rest,
-    missing,
-    pulses,
-    runs,
-    spikes,
-    staircase,
-    stale,
-    stuck,
+    detect_quantization,
+    find_clipping,
+    find_dropouts,
+    find_glitches,
+    find_longest_rest,
+    find_missing,
+    find_outliers,
+    find_spikes,
+    find_stale,
+    find_stuck,
+    find_true_runs,
 )
 
 TIME = np.arange(0.0, 4.0, 0.002)
@@ -46,12 +46,12 @@ def torque() -> FloatArray:
 @pytest.mark.parametrize("step", [1, 5, 10])
 def test_sound_signals_have_no_spikes(quantity: Quantity, step: int) -> None:
     for values in (speed(), torque(), np.round(speed()), np.round(torque(), -1)):
-        assert spikes(TIME[::step], values[::step], quantity) is None
+        assert find_spikes(TIME[::step], values[::step], quantity) is None
 
 
 def test_a_held_signal_has_no_spikes() -> None:
     held = np.repeat(np.round(torque()[::10], -1), 10)
-    assert spikes(TIME, held, Quantity.TORQUE) is None
+    assert find_spikes(TIME, held, Quantity.TORQUE) is None
 
 
 @pytest.mark.parametrize("width", [1, 2])
@@ -60,9 +60,9 @@ def test_spikes_are_found_to_the_sample(width: int, height: float) -> None:
     values = speed()
     for start in (300, 1030, 1700):
         values[start : start + width] += height
-    found = spikes(TIME, values, Quantity.SPEED)
+    found = find_spikes(TIME, values, Quantity.SPEED)
     assert found is not None
-    assert runs(found.mask) == [(start, start + width) for start in (300, 1030, 1700)]
+    assert find_true_runs(found.mask) == [(start, start + width) for start in (300, 1030, 1700)]
     assert found.text.startswith("3 spikes left out, ")
 
 
@@ -70,7 +70,7 @@ def test_torque_may_move_for_longer_than_a_spike() -> None:
     time = TIME * 10.0  # 20 ms: one sample of torque reduction is no spike
     values = torque()
     values[300] -= 2000.0
-    assert spikes(time, values, Quantity.TORQUE) is None
+    assert find_spikes(time, values, Quantity.TORQUE) is None
 
 
 @pytest.mark.parametrize("height", [3000.0, -700.0])
@@ -79,9 +79,9 @@ def test_a_torque_that_jumps_and_jumps_back_is_found(height: float, width: int) 
     values = torque()
     for start in (300, 700, 1600):
         values[start : start + width] += height
-    found = pulses(TIME, values)
+    found = find_glitches(TIME, values)
     assert found is not None
-    assert runs(found.mask) == [(start, start + width) for start in (300, 700, 1600)]
+    assert find_true_runs(found.mask) == [(start, start + width) for start in (300, 700, 1600)]
 
 
 def test_a_torque_that_knocks_steps_or_stays_away_is_no_pulse() -> None:
@@ -95,49 +95,49 @@ def test_a_torque_that_knocks_steps_or_stays_away_is_no_pulse() -> None:
     step = np.where(TIME > 1.0, 2000.0, 0.0)
     codes = 50.0 * np.round((torque() + 30.0 * np.sin(40.0 * TIME)) / 50.0)
     for values in (torque(), torque() + knock, torque() + long, torque() + step, codes):
-        assert pulses(TIME, values) is None
+        assert find_glitches(TIME, values) is None
 
 
 def test_a_stuck_signal_is_found_until_it_jumps() -> None:
     values = np.round(speed() * 8.0) / 8.0
     values[400:700] = values[400]
-    found = stuck(TIME, values, Quantity.SPEED)
+    found = find_stuck(TIME, values, Quantity.SPEED)
     assert found is not None
-    assert runs(found.mask) == [(401, 700)]
+    assert find_true_runs(found.mask) == [(401, 700)]
     assert "from 0.802 s to 1.398 s" in found.text
 
 
 def test_a_fine_signal_that_stays_to_the_end_is_stuck() -> None:
     values = speed()
     values[1500:] = values[1500]
-    found = stuck(TIME, values, Quantity.SPEED)
+    found = find_stuck(TIME, values, Quantity.SPEED)
     assert found is not None
-    assert runs(found.mask) == [(1501, TIME.size)]
+    assert find_true_runs(found.mask) == [(1501, TIME.size)]
 
 
 def test_a_noisy_torque_that_rests_shortly_is_stuck() -> None:
     values = torque()
     values[600:650] = values[600]
-    found = stuck(TIME, values, Quantity.TORQUE)
+    found = find_stuck(TIME, values, Quantity.TORQUE)
     assert found is not None
-    assert runs(found.mask) == [(601, 650)]
+    assert find_true_runs(found.mask) == [(601, 650)]
 
 
 def test_a_pressure_without_noise_may_rest_and_fall_at_once() -> None:
     values = np.where(TIME < 2.0, 14e5, 0.0)
-    assert stuck(TIME, values + TIME, Quantity.PRESSURE) is None
-    assert stuck(TIME, values, Quantity.PRESSURE) is None
+    assert find_stuck(TIME, values + TIME, Quantity.PRESSURE) is None
+    assert find_stuck(TIME, values, Quantity.PRESSURE) is None
 
 
 def test_dropouts_to_zero_are_found() -> None:
     values = speed()
     values[400:407] = 0.0
     values[900] = 0.0
-    found = dropouts(TIME, values)
+    found = find_dropouts(TIME, values)
     assert found is not None
-    assert runs(found.mask) == [(400, 407), (900, 901)]
-    assert dropouts(TIME, np.where(TIME < 1.0, 0.0, 40.0 * (TIME - 1.0))) is None
-    assert dropouts(TIME, speed()) is None
+    assert find_true_runs(found.mask) == [(400, 407), (900, 901)]
+    assert find_dropouts(TIME, np.where(TIME < 1.0, 0.0, 40.0 * (TIME - 1.0))) is None
+    assert find_dropouts(TIME, speed()) is None
 
 
 def test_a_short_dropout_out_of_a_calm_torque_is_found() -> None:
@@ -146,10 +146,10 @@ def test_a_short_dropout_out_of_a_calm_torque_is_found() -> None:
     values = driven + np.where(np.arange(TIME.size) % 7 == 0, 11.0, 0.0)
     sound = values.copy()
     values[980:996] = 0.0
-    found = dropouts(TIME, values)
+    found = find_dropouts(TIME, values)
     assert found is not None
-    assert runs(found.mask) == [(980, 996)]
-    assert dropouts(TIME, sound) is None
+    assert find_true_runs(found.mask) == [(980, 996)]
+    assert find_dropouts(TIME, sound) is None
 
 
 def test_a_torque_that_truly_rests_at_zero_is_no_dropout() -> None:
@@ -159,7 +159,7 @@ def test_a_torque_that_truly_rests_at_zero_is_no_dropout() -> None:
     lasting = np.where((TIME > 1.0) & (TIME < 2.0), 0.0, 400.0)
     lasting[-300:] = 1500.0
     for values in (overrun, 400.0 - overrun, around_zero, lasting):
-        assert dropouts(TIME, values) is None
+        assert find_dropouts(TIME, values) is None
 
 
 @pytest.mark.parametrize(("value", "width"), [(-9999.0, 5), (32767.0, 1), (8191.0, 40)])
@@ -169,9 +169,9 @@ def test_numbers_far_beyond_all_others_are_found(value: float, width: int, every
     width = max(1, width // every)
     for start in (20, 120):
         values[start : start + width] = value
-    found = beyond(time, values)
+    found = find_outliers(time, values)
     assert found is not None
-    assert runs(found.mask) == [(start, start + width) for start in (20, 120)]
+    assert find_true_runs(found.mask) == [(start, start + width) for start in (20, 120)]
     assert "far beyond all other numbers" in found.text
 
 
@@ -180,11 +180,11 @@ def test_numbers_far_beyond_all_others_are_found_at_the_ends(value: float) -> No
     """At the start nothing has been received yet."""
     values = np.round(torque() / 5.0)
     values[:100] = values[-70:] = value
-    found = beyond(TIME, values)
+    found = find_outliers(TIME, values)
     assert found is not None
-    assert runs(found.mask) == [(0, 100), (TIME.size - 70, TIME.size)]
+    assert find_true_runs(found.mask) == [(0, 100), (TIME.size - 70, TIME.size)]
     released = np.where(TIME < 0.3, 14.0, np.round(5.0 * np.sin(TIME), 1))
-    assert beyond(TIME, released) is None
+    assert find_outliers(TIME, released) is None
 
 
 @pytest.mark.parametrize("every", [1, 10])
@@ -195,13 +195,13 @@ def test_a_fill_pulse_is_a_pressure(every: int, noise: float) -> None:
     course = np.interp(time, [1.4, 2.0], [0.9, 2.5]) * (time >= 1.12)
     course += np.random.default_rng(5).normal(0.0, noise, time.size)
     filled = np.where((time >= 1.0) & (time < 1.12), 6.0, course)
-    assert beyond(time, filled, possible=100.0) is None
+    assert find_outliers(time, filled, possible=100.0) is None
     released = np.where(time < 0.2, 14.0, course)
-    assert beyond(time, released, possible=100.0) is None
+    assert find_outliers(time, released, possible=100.0) is None
     # No value was there at rest, on the way up, or no such pressure exists.
     for moment, number in ((0.5, 65.5), (1.6, 65.5), (1.0, 655.0), (0.5, -9.0)):
         lost = (time >= moment) & (time < moment + 0.12)
-        found = beyond(time, np.where(lost, number, course), possible=100.0)
+        found = find_outliers(time, np.where(lost, number, course), possible=100.0)
         assert found is not None
         assert found.mask.tolist() == lost.tolist()
 
@@ -210,27 +210,29 @@ def test_a_large_torque_that_was_measured_is_not_beyond() -> None:
     """What moves, passes through the numbers between, lasts or is sampled slowly may be true."""
     coast = np.random.default_rng(4).normal(-40.0, 3.0, TIME.size)
     blip = (TIME > 2.0) & (TIME < 2.2)
-    assert beyond(TIME, torque()) is None
-    assert beyond(TIME, np.where(blip, coast + 400.0, coast)) is None
-    assert beyond(TIME, coast + np.clip(400.0 - 8e3 * np.abs(TIME - 2.0), 0.0, 300.0)) is None
-    assert beyond(TIME, np.where(np.abs(TIME - 2.0) < 0.3, 400.0, coast)) is None
-    assert beyond(TIME[::50], np.where(blip, 400.0, coast)[::50]) is None
-    assert beyond(TIME, np.where(blip, 400.0, 100.0)) is None
+    assert find_outliers(TIME, torque()) is None
+    assert find_outliers(TIME, np.where(blip, coast + 400.0, coast)) is None
+    assert (
+        find_outliers(TIME, coast + np.clip(400.0 - 8e3 * np.abs(TIME - 2.0), 0.0, 300.0)) is None
+    )
+    assert find_outliers(TIME, np.where(np.abs(TIME - 2.0) < 0.3, 400.0, coast)) is None
+    assert find_outliers(TIME[::50], np.where(blip, 400.0, coast)[::50]) is None
+    assert find_outliers(TIME, np.where(blip, 400.0, 100.0)) is None
 
 
 @pytest.mark.parametrize("start", [0, 600])
 def test_a_number_that_the_signal_jumped_to_is_stuck_from_its_first_sample(start: int) -> None:
     values = torque()
     values[start : start + 50] = -9999.0
-    found = stuck(TIME, values, Quantity.TORQUE)
+    found = find_stuck(TIME, values, Quantity.TORQUE)
     assert found is not None
-    assert runs(found.mask) == [(start, start + 50)]
+    assert find_true_runs(found.mask) == [(start, start + 50)]
 
 
 def test_a_coarse_signal_in_steady_driving_is_not_stuck() -> None:
     values = np.round(120.0 + 0.4 * TIME)
-    assert stuck(TIME, values, Quantity.SPEED) is None
-    assert stuck(TIME, np.zeros(TIME.size), Quantity.SPEED) is None
+    assert find_stuck(TIME, values, Quantity.SPEED) is None
+    assert find_stuck(TIME, np.zeros(TIME.size), Quantity.SPEED) is None
 
 
 def test_a_signal_without_noise_may_rest() -> None:
@@ -238,28 +240,28 @@ def test_a_signal_without_noise_may_rest() -> None:
     rest = 100.0 + np.where(TIME >= 2.5, 40.0 * np.sin(3.0), rest)
     settling = 100.0 + np.round(50.0 * np.exp(-8.0 * TIME), 6)
     for values in (rest, settling):
-        assert stuck(TIME, values, Quantity.SPEED) is None
+        assert find_stuck(TIME, values, Quantity.SPEED) is None
 
 
 def test_standstill_is_not_stuck() -> None:
     values = np.where(TIME < 1.0, 0.0, speed())
-    assert stuck(TIME, values, Quantity.SPEED) is None
+    assert find_stuck(TIME, values, Quantity.SPEED) is None
 
 
 def test_saturation_is_found() -> None:
     values = np.minimum(torque(), 2900.0)
-    found = clipped(TIME, values)
+    found = find_clipping(TIME, values)
     assert found is not None
     assert np.array_equal(found.mask, _rests(values == 2900.0))
     assert "saturated at one number" in found.text
-    assert clipped(TIME, torque()) is None
-    assert clipped(TIME, np.round(torque(), -1)) is None
+    assert find_clipping(TIME, torque()) is None
+    assert find_clipping(TIME, np.round(torque(), -1)) is None
 
 
 def _rests(mask: np.typing.NDArray[np.bool_]) -> np.typing.NDArray[np.bool_]:
     """Only stretches of three or more."""
     kept = np.zeros(mask.size, np.bool_)
-    for start, end in runs(mask):
+    for start, end in find_true_runs(mask):
         kept[start:end] = end - start >= 3
     return kept
 
@@ -267,7 +269,7 @@ def _rests(mask: np.typing.NDArray[np.bool_]) -> np.typing.NDArray[np.bool_]:
 def test_missing_numbers_are_told_by_span() -> None:
     values = speed()
     values[100:200] = np.nan
-    found = missing(TIME, values)
+    found = find_missing(TIME, values)
     assert found is not None
     assert found.text == "no number from 0.200 s to 0.398 s"
 
@@ -275,7 +277,7 @@ def test_missing_numbers_are_told_by_span() -> None:
 def test_late_times_are_told_to_the_millisecond() -> None:
     values = speed()
     values[100:200] = np.nan
-    found = missing(TIME + 123456.0, values)
+    found = find_missing(TIME + 123456.0, values)
     assert found is not None
     assert found.text == "no number from 123456.200 s to 123456.398 s"
 
@@ -284,7 +286,7 @@ def test_late_times_are_told_to_the_millisecond() -> None:
 def test_runs_cover_exactly_what_is_true(flags: list[bool]) -> None:
     mask = np.array(flags, np.bool_)
     rebuilt = np.zeros(mask.size, np.bool_)
-    for start, end in runs(mask):
+    for start, end in find_true_runs(mask):
         assert start < end
         rebuilt[start:end] = True
     assert np.array_equal(rebuilt, mask)
@@ -295,9 +297,9 @@ def test_a_coarse_torque_that_rests_too_long_is_noticed(noise: float) -> None:
     rng = np.random.default_rng(5)
     time = np.linspace(0.0, 7.99, 800)
     values = 11.0 * np.round(72.2 + noise * rng.normal(size=800))
-    assert longest_rest(time, values) is None
+    assert find_longest_rest(time, values) is None
     values[200:320] = values[200]
-    span = longest_rest(time, values)
+    span = find_longest_rest(time, values)
     assert span is not None
     assert abs(span[0] - 2.0) < 0.06
     assert abs(span[1] - 3.2) < 0.06
@@ -309,21 +311,21 @@ def test_rounding_alone_makes_no_stuck_torque(noise: float, seed: int, levels: i
     rng = np.random.default_rng(seed)
     level = np.repeat(rng.uniform(50.0, 150.0, levels), 1000 // levels)
     values = np.asarray(12.5 * np.round(level + noise * rng.normal(size=level.size)), np.float64)
-    assert longest_rest(np.linspace(0.0, 9.99, level.size), values) is None
+    assert find_longest_rest(np.linspace(0.0, 9.99, level.size), values) is None
 
 
 def test_a_calculated_torque_without_jitter_may_rest() -> None:
     time = np.linspace(0.0, 4.99, 500)
     steps = np.repeat([200.0, 900.0, 500.0, 700.0, 300.0], 100)
-    assert longest_rest(time, steps) is None
+    assert find_longest_rest(time, steps) is None
 
 
 def test_a_signal_in_stairs_has_less_noise_than_its_rounding() -> None:
     rough, calm = speed(noise=0.8), speed(noise=0.1)
-    assert staircase(np.round(calm)) == 1.0
-    assert staircase(np.round(rough)) == 0.0
-    assert staircase(calm) == 0.0
-    assert staircase(speed(noise=0.0)) == 0.0
+    assert detect_quantization(np.round(calm)) == 1.0
+    assert detect_quantization(np.round(rough)) == 0.0
+    assert detect_quantization(calm) == 0.0
+    assert detect_quantization(speed(noise=0.0)) == 0.0
 
 
 def shown_on(values: FloatArray, lost: list[int]) -> FloatArray:
@@ -340,7 +342,7 @@ def test_a_value_shown_on_while_the_signal_moves_is_left_out(noise: float, round
     moving = 120.0 + 41.3 * np.abs(time - 1.21) + np.random.default_rng(2).normal(0.0, noise, 300)
     moving[200:] = moving[199]  # at rest nothing tells
     values = np.asarray(np.round(moving / rounding) * rounding if rounding else moving, np.float64)
-    found = stale(time, shown_on(values, [40, 90, 91, 250]))
+    found = find_stale(time, shown_on(values, [40, 90, 91, 250]))
     if rounding == 1.0:  # steps of 0.83 rounded to 1: repeats are true
         assert found is None
     else:
@@ -352,7 +354,7 @@ def test_a_value_shown_on_while_the_signal_moves_is_left_out(noise: float, round
 @pytest.mark.parametrize("seed", range(5))
 def test_sound_signals_show_no_value_on(seed: int) -> None:
     for values in (speed(seed), speed(seed, 0.0), torque(), np.round(speed(seed)), np.round(TIME)):
-        assert stale(TIME, values) is None
+        assert find_stale(TIME, values) is None
 
 
 def test_a_torque_that_sets_off_may_repeat_a_number_just_before() -> None:
@@ -360,7 +362,7 @@ def test_a_torque_that_sets_off_may_repeat_a_number_just_before() -> None:
     noise = np.random.default_rng(3).normal(0.0, 2.0, 200)
     values = np.round(250.0 + noise + 35.0 * np.clip(np.arange(200) - 100, 0, 20), 1)
     values[98:102] = [251.5, 262.5, 262.5, 302.5]
-    assert stale(np.linspace(0.0, 1.99, 200), np.asarray(values, np.float64)) is None
+    assert find_stale(np.linspace(0.0, 1.99, 200), np.asarray(values, np.float64)) is None
 
 
 def test_a_repeat_by_chance_amid_noise_is_none() -> None:
@@ -368,4 +370,4 @@ def test_a_repeat_by_chance_amid_noise_is_none() -> None:
     noise = np.random.default_rng(4).normal(0.0, 0.0057, 400)
     values = np.round(160.0 + 0.0145 * np.arange(400) + noise, 6)
     values[198:202] = values[199] + np.array([-0.026, 0.0, 0.0, 0.028])
-    assert stale(np.linspace(0.0, 0.399, 400), np.asarray(values, np.float64)) is None
+    assert find_stale(np.linspace(0.0, 0.399, 400), np.asarray(values, np.float64)) is None

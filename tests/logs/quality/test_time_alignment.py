@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.logs.quality.time_alignment import clock_warnings, speed_delay, speed_ratio
+from drivetwin.logs.quality.time_alignment import (
+    check_speed_clocks,
+    estimate_speed_delay,
+    estimate_speed_ratio,
+)
 from tests.logs.fixtures import card
 
 RATIOS = [1.8, 1.4]
@@ -40,7 +44,7 @@ def pair(delay: float, drift: float = 0.0, off: float = 1.0) -> tuple[Channel, C
 @pytest.mark.parametrize("delay", [0.0, 0.03, -0.02])
 @pytest.mark.parametrize("off", [1.0, 1.003])
 def test_the_delay_is_found_whether_or_not_the_ratio_is_exact(delay: float, off: float) -> None:
-    found = speed_delay(*pair(delay, off=off), RATIOS)
+    found = estimate_speed_delay(*pair(delay, off=off), RATIOS)
     assert found is not None
     assert found.value == pytest.approx(delay, abs=max(4.0 * found.sigma, 1e-3))
     assert found.sigma < 2e-3
@@ -48,7 +52,7 @@ def test_the_delay_is_found_whether_or_not_the_ratio_is_exact(delay: float, off:
 
 
 def test_drift_is_found() -> None:
-    found = speed_delay(*pair(0.0, drift=0.004), RATIOS)
+    found = estimate_speed_delay(*pair(0.0, drift=0.004), RATIOS)
     assert found is not None
     assert found.drift == pytest.approx(0.004, abs=max(4.0 * found.drift_sigma, 4e-4))
 
@@ -56,32 +60,32 @@ def test_drift_is_found() -> None:
 def test_a_delay_is_told_with_the_mapping_that_cures_it(tmp_path: Path) -> None:
     faster, slower = pair(0.03)
     channels = {one.role: one for one in (faster, slower)}
-    (text,) = clock_warnings(channels, card(tmp_path))
+    (text,) = check_speed_clocks(channels, card(tmp_path))
     assert "'output_speed' is 29.8 ms late against 'input_speed'" in text
     assert "channels.output_speed.time_shift_s = -0.0298" in text
     faster, slower = pair(0.0)
-    assert clock_warnings({one.role: one for one in (faster, slower)}, card(tmp_path)) == []
+    assert check_speed_clocks({one.role: one for one in (faster, slower)}, card(tmp_path)) == []
 
 
 def test_an_early_engine_speed_is_brought_to_the_gearbox_speeds(tmp_path: Path) -> None:
     time = np.arange(0.0, 8.0, 0.01)
     engine = channel("engine_speed", time - 0.03, output(time))
     inlet = channel("input_speed", time, output(time))
-    (text,) = clock_warnings({"engine_speed": engine, "input_speed": inlet}, card(tmp_path))
+    (text,) = check_speed_clocks({"engine_speed": engine, "input_speed": inlet}, card(tmp_path))
     assert "'engine_speed' is 29.9 ms early against 'input_speed'" in text
     assert "channels.engine_speed.time_shift_s = 0.0299" in text
 
 
 def test_clocks_that_drift_apart_are_told(tmp_path: Path) -> None:
     faster, slower = pair(0.0, drift=0.004)
-    texts = clock_warnings({one.role: one for one in (faster, slower)}, card(tmp_path))
+    texts = check_speed_clocks({one.role: one for one in (faster, slower)}, card(tmp_path))
     assert any("drift apart by" in text for text in texts)
 
 
 def test_steady_driving_tells_no_delay() -> None:
     time = np.arange(0.0, 8.0, 0.01)
     steady = channel("output_speed", time + 0.05, np.full(time.size, 80.0) + time)
-    found = speed_delay(channel("input_speed", time, 1.8 * (80.0 + time)), steady, RATIOS)
+    found = estimate_speed_delay(channel("input_speed", time, 1.8 * (80.0 + time)), steady, RATIOS)
     assert found is None or abs(found.value) < 5.0 * found.sigma
 
 
@@ -90,7 +94,7 @@ def test_steady_driving_tells_no_delay() -> None:
 def test_the_ratio_is_found_whether_or_not_one_speed_is_late(ratio: float, late: float) -> None:
     time = np.arange(0.0, 8.0, 0.01)
     faster = channel("output_speed", time, output(time))
-    found = speed_ratio(faster, channel("wheel_speed", time + late, output(time) / ratio))
+    found = estimate_speed_ratio(faster, channel("wheel_speed", time + late, output(time) / ratio))
     assert found is not None
     value, sigma = found
     # The sensors' noise of 0.05 in 16 rad/s over 80 independent means of 10 samples.
@@ -103,7 +107,7 @@ def test_a_gap_costs_what_it_touches_only() -> None:
     slower = channel("output_speed", time + 0.03, output(time))
     keep = (slower.time < 0.4) | (slower.time > 0.7)
     slower = replace(slower, time=slower.time[keep], values=slower.values[keep])
-    found = speed_delay(channel("input_speed", time, 1.8 * output(time)), slower, RATIOS)
+    found = estimate_speed_delay(channel("input_speed", time, 1.8 * output(time)), slower, RATIOS)
     assert found is not None
     assert found.value == pytest.approx(0.03, abs=4.0 * found.sigma)
     assert found.span > 6.0
@@ -117,13 +121,13 @@ def test_a_speed_of_repeated_means_is_not_late(tmp_path: Path) -> None:
     slower = replace(channel("output_speed", fine, output(middle)), held=True)
     slower = replace(slower, values=slower.values[np.searchsorted(fine, start - 1e-6)])
     inlet = channel("input_speed", fine, 1.8 * output(fine))
-    assert clock_warnings({"input_speed": inlet, "output_speed": slower}, card(tmp_path)) == []
+    assert check_speed_clocks({"input_speed": inlet, "output_speed": slower}, card(tmp_path)) == []
     late = replace(slower, time=slower.time + 0.03)
-    (text,) = clock_warnings({"input_speed": inlet, "output_speed": late}, card(tmp_path))
+    (text,) = check_speed_clocks({"input_speed": inlet, "output_speed": late}, card(tmp_path))
     assert "'output_speed' is 40." in text or "'output_speed' is 39." in text
 
 
 def test_no_gear_held_tells_nothing() -> None:
     time = np.arange(0.0, 8.0, 0.01)
     faster = channel("input_speed", time, 2.5 * output(time))
-    assert speed_delay(faster, channel("output_speed", time, output(time)), RATIOS) is None
+    assert estimate_speed_delay(faster, channel("output_speed", time, output(time)), RATIOS) is None

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.logs.quality.torque_delay import torque_delay, torque_warnings
+from drivetwin.logs.quality.torque_delay import check_torque_delays, estimate_torque_delay
 
 J_V, I_F, K_O = 6000.0, 5.0, 1.7e5
 STEP = 1e-3
@@ -56,7 +56,7 @@ def recorded(grade: float = 0.0, **delays: float) -> dict[str, Channel]:
 def test_the_delay_of_the_wheel_speed_is_found(late: float, grade: float, start: float) -> None:
     channels = recorded(grade, wheel_speed=late)
     moved = {role: replace(one, time=one.time + start) for role, one in channels.items()}
-    found = torque_delay(moved["output_torque"], moved["wheel_speed"])
+    found = estimate_torque_delay(moved["output_torque"], moved["wheel_speed"])
     assert found is not None
     assert found.value == pytest.approx(late, abs=4.0 * found.sigma + 0.05 * abs(late))
     assert found.sigma < 2e-3
@@ -64,14 +64,14 @@ def test_the_delay_of_the_wheel_speed_is_found(late: float, grade: float, start:
 
 def test_a_shaft_between_torque_and_speed_is_no_delay() -> None:
     channels = recorded()
-    found = torque_delay(channels["output_torque"], channels["output_speed"])
+    found = estimate_torque_delay(channels["output_torque"], channels["output_speed"])
     assert found is not None
     assert abs(found.value) < 2e-3
-    assert torque_warnings(channels) == []
+    assert check_torque_delays(channels) == []
 
 
 def test_a_late_torque_is_told_against_all_speeds() -> None:
-    (text,) = torque_warnings(recorded(output_torque=0.02))
+    (text,) = check_torque_delays(recorded(output_torque=0.02))
     assert "'output_torque' is about" in text
     assert "late against 'wheel_speed' and 'output_speed'" in text
     assert "tyre slip looks the same" in text
@@ -79,14 +79,14 @@ def test_a_late_torque_is_told_against_all_speeds() -> None:
 
 
 def test_a_late_wheel_speed_is_told_against_the_torque() -> None:
-    (text,) = torque_warnings(recorded(wheel_speed=0.03))
+    (text,) = check_torque_delays(recorded(wheel_speed=0.03))
     assert re.search(r"'wheel_speed' is about (29|30|31) ms late against 'output_torque'", text)
     assert "tyre slip" not in text
     assert re.search(r"channels\.wheel_speed\.time_shift_s = -0\.0(29|30|31)", text)
 
 
 def test_two_late_channels_are_told() -> None:
-    late = torque_warnings(recorded(output_torque=0.012, wheel_speed=0.012))
+    late = check_torque_delays(recorded(output_torque=0.012, wheel_speed=0.012))
     assert len(late) == 1
     assert "'output_speed' is about" in late[0]
     assert "early against 'output_torque'" in late[0]
@@ -103,13 +103,13 @@ def bus(channel: Channel, period: float) -> Channel:
 def test_speeds_that_are_means_and_held_do_not_make_the_torque_early() -> None:
     channels = recorded()
     held = channels | {role: bus(channels[role], 0.01) for role in ("output_speed", "wheel_speed")}
-    found = torque_delay(held["output_torque"], held["wheel_speed"])
+    found = estimate_torque_delay(held["output_torque"], held["wheel_speed"])
     assert found is not None
     assert found.value == pytest.approx(0.01, abs=2e-3)
-    assert torque_warnings(held) == []
+    assert check_torque_delays(held) == []
     late = recorded(output_torque=0.03)
     held = late | {role: bus(late[role], 0.01) for role in ("output_speed", "wheel_speed")}
-    (text,) = torque_warnings(held)
+    (text,) = check_torque_delays(held)
     assert re.search(r"'output_torque' is about 2[3-7] ms late", text)
 
 
@@ -118,7 +118,7 @@ def test_a_gap_is_not_bridged() -> None:
     wheel = channels["wheel_speed"]
     keep = (wheel.time < 4.5) | (wheel.time > 5.5)
     cut = replace(wheel, time=wheel.time[keep], values=wheel.values[keep])
-    found = torque_delay(channels["output_torque"], cut)
+    found = estimate_torque_delay(channels["output_torque"], cut)
     assert found is not None
     assert found.value == pytest.approx(0.03, abs=4.0 * found.sigma)
 
@@ -137,5 +137,5 @@ def test_nothing_is_told_where_the_torque_does_not_show(case: str) -> None:
             wheel = replace(wheel, values=20.0 + 3.0 * np.sin(5.0 * TIME) + 1e-3 * noise)
         case _:
             wheel = replace(wheel, time=wheel.time + 100.0)
-    assert torque_delay(drive, wheel) is None
-    assert torque_warnings({"wheel_speed": wheel}) == []
+    assert estimate_torque_delay(drive, wheel) is None
+    assert check_torque_delays({"wheel_speed": wheel}) == []

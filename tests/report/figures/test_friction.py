@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.report.figures.comparison import friction_overlay
-from drivetwin.report.figures.friction import friction_figure
+from drivetwin.report.figures.comparison import plot_friction_overlay
+from drivetwin.report.figures.friction import plot_friction
 from tests.report.sample import friction
 
 
 def test_band_encloses_the_curve() -> None:
-    figure = friction_figure("B3", friction())
+    figure = plot_friction("B3", friction())
     traces = {trace.name: trace for trace in figure.data}
     band, curve = traces["95 % band, sensors included"], traces["curve of B3"]
     half = len(band.y) // 2
@@ -26,7 +26,7 @@ def test_band_encloses_the_curve() -> None:
 def test_curve_without_interval_or_law_is_still_drawn() -> None:
     nothing = np.full(60, np.nan)
     bare = replace(friction(), mu_lo=nothing, mu_hi=nothing, stribeck=None)
-    figure = friction_figure("B3", bare)
+    figure = plot_friction("B3", bare)
     assert [trace.name for trace in figure.data] == ["points from the log", "curve of B3"]
     low, high = figure.layout.yaxis.range
     assert low < bare.mu.min() < bare.mu.max() < high
@@ -35,7 +35,7 @@ def test_curve_without_interval_or_law_is_still_drawn() -> None:
 def test_a_curve_over_eta_says_so_on_its_axis() -> None:
     told = friction()
     ratio = replace(told, over_eta=True)
-    titles = [friction_figure("B3", one).layout.yaxis.title.text for one in (told, ratio)]
+    titles = [plot_friction("B3", one).layout.yaxis.title.text for one in (told, ratio)]
     assert titles == ["friction coefficient μ [–]", "friction coefficient μ/η [–]"]
-    overlay = friction_overlay("B3", {"a": told, "b": ratio}, ["a", "b"])
+    overlay = plot_friction_overlay("B3", {"a": told, "b": ratio}, ["a", "b"])
     assert [one.name for one in overlay.data if one.name] == ["a", "b (μ/η)"]

@@ -8,14 +8,16 @@ import numpy as np
 from drivetwin._util.display_units import NM
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.observer.result import Band
-from drivetwin.report.figures.observer import _curves
-from drivetwin.report.figures.stack import Panel, over_time
+from drivetwin.report.figures.observer import _build_band_curves
+from drivetwin.report.figures.stack import Panel, plot_over_time_axis
 
 
 def test_the_band_is_filled_between_its_bounds_and_named_once() -> None:
     time = np.linspace(0.0, 1.0, 50)
     band = Band(np.sin(time), np.full(50, 0.1))
-    figure = over_time([Panel("torque", NM, _curves(time, band))], (0.0, 1.0), 300)
+    figure = plot_over_time_axis(
+        [Panel("torque", NM, _build_band_curves(time, band))], (0.0, 1.0), 300
+    )
     low, high, curve = figure.data
     assert (low.fill, high.fill, curve.fill) == (None, "tonexty", None)
     assert np.allclose(np.subtract(high.y, low.y), 2.0 * Z95 * 0.1, rtol=1e-3)

@@ -11,8 +11,8 @@ import pytest
 
 from drivetwin.estimation.linear.ringdown import RingDown
 from drivetwin.report.embedded_data import Store
-from drivetwin.report.figures.ringdown import ringdown_figure, ringdown_panels
-from drivetwin.report.html import figure_json
+from drivetwin.report.figures.ringdown import build_ringdown_panels, plot_ringdown
+from drivetwin.report.html import encode_figure
 from drivetwin.report.sections.blocks import FigureBlock
 
 
@@ -24,7 +24,7 @@ def _ring() -> RingDown:
 
 
 def test_residual_stands_under_the_fit() -> None:
-    figure = ringdown_figure(_ring())
+    figure = plot_ringdown(_ring())
     measured, fitted, residual = figure.data
     assert (measured.name, fitted.name) == ("measured", "fitted")
     assert residual.y == pytest.approx(np.full(500, 3.0))
@@ -33,7 +33,7 @@ def test_residual_stands_under_the_fit() -> None:
 
 def test_extremes_are_marked() -> None:
     read = replace(_ring(), extremes_time=np.array([0.04]), extremes_torque=np.array([1650.0]))
-    figure = ringdown_figure(read)
+    figure = plot_ringdown(read)
     assert [trace.mode for trace in figure.data] == ["lines", "markers"]
     assert [trace.showlegend for trace in figure.data] == [True, True]
     assert figure.data[1].y == pytest.approx([1650.0])
@@ -43,8 +43,8 @@ def test_the_page_packs_the_samples_and_keeps_the_extremes() -> None:
     """The samples are most of a report of many shifts; the marks stand behind them in the data."""
     read = replace(_ring(), extremes_time=np.array([0.04]), extremes_torque=np.array([1650.0]))
     store = Store()
-    block = FigureBlock(ringdown_figure(read), "", ringdown_panels(read))
-    measured, extremes = json.loads(figure_json(block, store))["data"]
+    block = FigureBlock(plot_ringdown(read), "", build_ringdown_panels(read))
+    measured, extremes = json.loads(encode_figure(block, store))["data"]
     assert "x" not in measured
     assert "y" not in measured
     assert len(store.index) == 2

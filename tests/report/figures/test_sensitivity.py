@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import Sensitivity
-from drivetwin.report.figures.sensitivity import sensitivity_figure
+from drivetwin.report.figures.sensitivity import plot_sensitivity
 
 
 def test_a_time_is_told_in_ms_and_a_value_of_zero_in_no_per_cent() -> None:
@@ -19,7 +19,7 @@ def test_a_time_is_told_in_ms_and_a_value_of_zero_in_no_per_cent() -> None:
         change=np.array([[0.002, 0.0], [0.0, 0.0], [5.0, 0.0], [0.008, 0.0]]),
         slips={},
     )
-    gain = sensitivity_figure(found).data[0]
+    gain = plot_sensitivity(found).data[0]
     labels = ("τ_e (2) [ms]", "P0 (B2) [%]", "T_v/i_f [%]", "η [%]")
     assert gain.y == labels
     assert [row[0] for row in gain.text] == ["+2.0", "·", "–", "+1.0"]
@@ -37,6 +37,6 @@ def test_names_that_are_wider_than_their_column_are_turned(element: str, angle: 
         change=np.full((1, 6), 0.001),
         slips={},
     )
-    layout = sensitivity_figure(found).layout
+    layout = plot_sensitivity(found).layout
     axes = (layout.xaxis, layout.xaxis2, layout.xaxis3)
     assert [one.tickangle for one in axes] == [angle] * 3

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.paper.wlse import GridFit, GridRow
-from drivetwin.report.figures.wlse import wlse_figure
-from drivetwin.report.sections.stage_results import INERTIA_LABELS, grid_table
+from drivetwin.report.figures.wlse import plot_wlse
+from drivetwin.report.sections.stage_results import INERTIA_LABELS, build_grid_table
 
 
 def _fit() -> GridFit:
@@ -20,20 +20,20 @@ def _fit() -> GridFit:
 
 
 def test_line_has_the_inertia_as_its_slope() -> None:
-    figure = wlse_figure(_fit(), INERTIA_LABELS)
+    figure = plot_wlse(_fit(), INERTIA_LABELS)
     line = next(trace for trace in figure.data if trace.mode == "lines")
     assert np.ptp(line.y) / np.ptp(line.x) == pytest.approx(17.5)
     assert "J′ = 17.5" in line.name
 
 
 def test_every_sample_is_drawn_once_at_the_best_value() -> None:
-    figure = wlse_figure(_fit(), INERTIA_LABELS)
+    figure = plot_wlse(_fit(), INERTIA_LABELS)
     start, outside, inside = figure.data[:3]
     assert len(outside.x) + len(inside.x) == len(start.x) == 50
 
 
 def test_table_marks_the_row_of_least_error() -> None:
-    table = grid_table(_fit(), INERTIA_LABELS)
+    table = build_grid_table(_fit(), INERTIA_LABELS)
     marked = [row[0].text for row in table.rows if row[3].text]
     assert marked == ["0.85"]
     assert [cell.text for cell in table.head[:2]] == ["η [–]", "J′ [kg·m²]"]

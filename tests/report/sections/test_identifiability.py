@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.suggestion import Experiment, Prospect, Suggestion
+from drivetwin.estimation.result.suggestion import ExpectedPrecision, Experiment, ExperimentRanking
 from drivetwin.report.sections.blocks import NotesBlock, TableBlock
-from drivetwin.report.sections.identifiability import limits_section
+from drivetwin.report.sections.identifiability import build_limits_section
 from tests.report.sample import identification
 
 
 def tables() -> list[TableBlock]:
-    blocks = limits_section(identification()).blocks
+    blocks = build_limits_section(identification()).blocks
     return [block for block in blocks if isinstance(block, TableBlock)]
 
 
@@ -43,7 +43,7 @@ def test_what_the_sensors_decide_is_not_said_to_be_narrowed_by_an_experiment() -
 def test_sensors_without_a_tolerance_have_no_share() -> None:
     found = identification()
     bare = {name: replace(one, std_systematic=None) for name, one in found.estimates.items()}
-    blocks = limits_section(replace(found, estimates=bare)).blocks
+    blocks = build_limits_section(replace(found, estimates=bare)).blocks
     table = [block for block in blocks if isinstance(block, TableBlock)][1]
     assert {row[2].text for row in table.rows} == {"not stated"}
 
@@ -54,19 +54,19 @@ def test_close_pairs_are_named() -> None:
         correlation_ids=("eta", "J_prime_2", "c_o"),
         correlation=np.array([[1.0, -0.95, 0.1], [-0.95, 1.0, 0.2], [0.1, 0.2, 1.0]]),
     )
-    notes = [block for block in limits_section(found).blocks if isinstance(block, NotesBlock)]
+    notes = [block for block in build_limits_section(found).blocks if isinstance(block, NotesBlock)]
     assert notes[-1].items == ["η and J′ (2) go against each other (−0.95)."]
 
 
 def test_simulated_experiments_take_the_place_of_the_general_advice() -> None:
-    best = Prospect(Experiment.THROTTLE_STEPS, 2, 0.25e-3, Verdict.IDENTIFIED)
+    best = ExpectedPrecision(Experiment.THROTTLE_STEPS, 2, 0.25e-3, Verdict.IDENTIFIED)
     told = (
-        Suggestion("te_delay", Verdict.NOT_IDENTIFIABLE, float("inf"), (best,)),
-        Suggestion("eta", Verdict.IDENTIFIED, 0.02, (), "the gain of the torque sensor"),
+        ExperimentRanking("te_delay", Verdict.NOT_IDENTIFIABLE, float("inf"), (best,)),
+        ExperimentRanking("eta", Verdict.IDENTIFIED, 0.02, (), "the gain of the torque sensor"),
     )
     found = identification()
-    found = replace(found, evidence=Evidence(suggestions=told))
-    tables = [one for one in limits_section(found).blocks if isinstance(one, TableBlock)]
+    found = replace(found, evidence=StageResults(suggestions=told))
+    tables = [one for one in build_limits_section(found).blocks if isinstance(one, TableBlock)]
     rows = [[cell.text for cell in row] for row in tables[1].rows]
     assert rows == [
         ["τ_e", "not identifiable", "open", f"{Experiment.THROTTLE_STEPS}, 2 times", "± 0.25 ms"],

@@ -7,13 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.uncertainty.friction_bands import curves_of
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
 from drivetwin.report.html import render_report
 from drivetwin.report.sections.blocks import FigureBlock, TableBlock, TilesBlock, Tone
-from drivetwin.report.sections.likelihood import likelihood_sections
-from drivetwin.report.sections.parameters import residual_score, trust_section
+from drivetwin.report.sections.likelihood import build_likelihood_sections
+from drivetwin.report.sections.parameters import (
+    build_parameters_section,
+    count_consistent_residuals,
+)
 from tests.estimation.likelihood.fixtures import bench, fitted
 from tests.report.sample import identification, log
 from tests.support.shared_results import shared
@@ -25,17 +28,17 @@ def found() -> Identification:
     return replace(
         identification(),
         shifts=(signals.shift,),
-        friction=curves_of(fit, {}, np.zeros_like(fit.covariance)),
-        evidence=Evidence(likelihood=fit, signals=(signals,)),
+        friction=build_friction_curves(fit, {}, np.zeros_like(fit.covariance)),
+        evidence=StageResults(likelihood=fit, signals=(signals,)),
     )
 
 
 def test_other_methods_have_no_such_sections() -> None:
-    assert likelihood_sections(identification()) == []
+    assert build_likelihood_sections(identification()) == []
 
 
 def test_what_is_left_of_a_right_model_is_judged_good() -> None:
-    fit, _ = likelihood_sections(found())
+    fit, _ = build_likelihood_sections(found())
     table = fit.blocks[0]
     assert isinstance(table, TableBlock)
     assert {row[0].text for row in table.rows} == {"2→3"}
@@ -44,7 +47,7 @@ def test_what_is_left_of_a_right_model_is_judged_good() -> None:
 
 
 def test_residuals_of_a_right_model_lie_in_the_band() -> None:
-    block = likelihood_sections(found())[0].blocks[1]
+    block = build_likelihood_sections(found())[0].blocks[1]
     assert isinstance(block, FigureBlock)
     means = [np.asarray(trace.y) for trace in block.figure.data if trace.name == "mean"]
     assert len(means) == len(block.panels)
@@ -53,7 +56,7 @@ def test_residuals_of_a_right_model_lie_in_the_band() -> None:
 
 
 def test_every_sensor_stands_over_the_columns() -> None:
-    block = likelihood_sections(found())[1].blocks[0]
+    block = build_likelihood_sections(found())[1].blocks[0]
     assert isinstance(block, FigureBlock)
     gain, offset, age = block.figure.data
     assert {"T_e", "T_o", "n_in", "P B3"} <= set(gain.x)
@@ -70,8 +73,8 @@ def test_the_page_holds_them() -> None:
 
 
 def test_the_first_page_counts_the_tests() -> None:
-    passed, total = residual_score(found())
+    passed, total = count_consistent_residuals(found())
     assert passed == total == 4 * 4
-    tiles = trust_section(found()).blocks[0]
+    tiles = build_parameters_section(found()).blocks[0]
     assert isinstance(tiles, TilesBlock)
     assert ("residual tests passed", "16 of 16") in [(one.label, one.value) for one in tiles.tiles]

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from drivetwin.report.sections.blocks import NotesBlock, TableBlock
-from drivetwin.report.sections.provenance import provenance_section
+from drivetwin.report.sections.provenance import build_provenance_section
 from tests.report.sample import identification
 
 
@@ -18,7 +18,9 @@ def _rows(blocks: object, caption: str) -> dict[str, str]:
 
 def test_settings_are_flat_and_short() -> None:
     nested = {"momentum": {"width": 0.4, "grid": (0.005000000000000001, 1)}, "card": "a"}
-    rows = _rows(provenance_section(replace(identification(), settings=nested)).blocks, "Settings")
+    rows = _rows(
+        build_provenance_section(replace(identification(), settings=nested)).blocks, "Settings"
+    )
     assert rows["momentum.width"] == "0.4"
     assert rows["momentum.grid"] == "0.005, 1"
     assert rows["card"] == "a"
@@ -26,14 +28,14 @@ def test_settings_are_flat_and_short() -> None:
 
 
 def test_inputs_and_range_of_validity_are_stated() -> None:
-    blocks = provenance_section(identification()).blocks
+    blocks = build_provenance_section(identification()).blocks
     assert _rows(blocks, "Inputs") == {"sample <1>.csv": "ab" * 32}
     assert _rows(blocks, "Range")["pressure"] == "bar"
 
 
 def test_friction_that_the_simulation_borrows_is_among_what_is_assumed() -> None:
     (assumed,) = (
-        block for block in provenance_section(identification()).blocks
+        block for block in build_provenance_section(identification()).blocks
         if isinstance(block, NotesBlock)
     )  # fmt: skip
     assert "friction of B2 is taken to be that of B3" in assumed.items

@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.artifacts import Evidence
+from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.report.html import render_report
 from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, TableBlock, Tone
-from drivetwin.report.sections.stage_results import evidence_sections
-from drivetwin.shifts.detect import find_shifts
+from drivetwin.report.sections.stage_results import build_stage_sections
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import validated
+from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import load_card
 from tests.report.sample import identification
 
@@ -32,12 +32,12 @@ def given() -> tuple[Identification, ShiftLog]:
         pytest.skip("the given logs are not beside the repository")
     card = load_card(ROOT / "examples" / "vehicles" / "paper_like.toml")
     log = read_log(LOG, card)
-    found = identify(log, card, find_shifts(log, card))
-    return validated(found, build_twin(found, card), log), log
+    found = identify(log, card, detect_shifts(log, card))
+    return attach_validation(found, build_twin(found, card), log), log
 
 
 def test_each_question_shows_both_methods(given: tuple[Identification, ShiftLog]) -> None:
-    sections = {section.anchor: section.blocks for section in evidence_sections(given[0])}
+    sections = {section.anchor: section.blocks for section in build_stage_sections(given[0])}
     figures = {
         anchor: sum(isinstance(block, FigureBlock) for block in blocks)
         for anchor, blocks in sections.items()
@@ -46,7 +46,7 @@ def test_each_question_shows_both_methods(given: tuple[Identification, ShiftLog]
 
 
 def test_tables_are_those_of_the_paper(given: tuple[Identification, ShiftLog]) -> None:
-    inertia, load, _ = evidence_sections(given[0])
+    inertia, load, _ = build_stage_sections(given[0])
     tables = [block for block in (*inertia.blocks, *load.blocks) if isinstance(block, TableBlock)]
     assert [row[0].text for row in tables[0].rows][::3] == ["1", "0.85", "0.7"]
     assert {"0", "500", "4000"} <= {row[0].text for row in tables[1].rows}
@@ -54,7 +54,7 @@ def test_tables_are_those_of_the_paper(given: tuple[Identification, ShiftLog]) -
 
 
 def test_a_doubtful_grid_is_not_marked_as_good(given: tuple[Identification, ShiftLog]) -> None:
-    load = evidence_sections(given[0])[1]
+    load = build_stage_sections(given[0])[1]
     (table,) = (block for block in load.blocks if isinstance(block, TableBlock))
     (doubt,) = (block for block in load.blocks if isinstance(block, NotesBlock))
     marks = [row[3] for row in table.rows if row[3].text]
@@ -66,7 +66,7 @@ def test_a_refused_stage_says_why(given: tuple[Identification, ShiftLog]) -> Non
     found = given[0]
     (one,) = found.evidence.integral
     refused = replace(one, ring=None, refusals={"shaft": "no oscillation"})
-    shaft = evidence_sections(replace(found, evidence=Evidence(integral=(refused,))))[2]
+    shaft = build_stage_sections(replace(found, evidence=StageResults(integral=(refused,))))[2]
     assert [block.items for block in shaft.blocks if isinstance(block, NotesBlock)] == [
         ["Integral method: no oscillation"]
     ]
@@ -77,4 +77,4 @@ def test_report_of_a_whole_log_stays_small(given: tuple[Identification, ShiftLog
 
 
 def test_without_evidence_nothing_is_drawn() -> None:
-    assert not any(section.blocks for section in evidence_sections(identification()))
+    assert not any(section.blocks for section in build_stage_sections(identification()))

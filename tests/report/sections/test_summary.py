@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.report.sections.blocks import FigureBlock
-from drivetwin.report.sections.summary import friction_section, phase_key
+from drivetwin.report.sections.summary import build_friction_section, describe_phases
 from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.report.sample import identification
 
@@ -17,7 +17,7 @@ def test_friction_without_an_output_torque_is_told_as_what_it_is() -> None:
     found = identification()
     curve = found.friction["B3"]
     ratio = replace(found, friction={"B3": replace(curve, over_eta=True)})
-    with_torque, without = friction_section(found), friction_section(ratio)
+    with_torque, without = build_friction_section(found), build_friction_section(ratio)
     assert "follows from the output torque" in with_torque.intro
     assert "no output torque" in without.intro
     assert "output torque (eq. 16" not in without.intro
@@ -29,7 +29,7 @@ def test_friction_without_an_output_torque_is_told_as_what_it_is() -> None:
 
 @pytest.mark.parametrize("kind", ShiftKind)
 def test_the_key_of_the_phases_is_that_of_the_kind_of_shift(kind: ShiftKind) -> None:
-    text = phase_key(kind)
+    text = describe_phases(kind)
     assert ("the input speed falls" in text) == kind.value.endswith("upshift")
     assert ("the input speed rises" in text) == kind.value.endswith("downshift")
     assert ("output torque dips" in text) == (kind is ShiftKind.POWER_ON_UP)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from drivetwin.export.modelica.dual_clutch import SHAFT, network_of, network_start
+from drivetwin.export.modelica.dual_clutch import SHAFT, build_network, build_network_start
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
@@ -102,9 +102,9 @@ def build_signals(given: Inputs) -> dict[str, Signal]:
 def build_scenario(of: Problem, given: Inputs) -> Scenario:
     """Return the shift as a run of the network."""
     return Scenario(
-        network_of(build_model(of)),
+        build_network(build_model(of)),
         build_signals(given),
-        network_start(build_state(of, given)),
+        build_network_start(build_state(of, given)),
         given.time,
         OUTPUTS,
     )

@@ -25,19 +25,19 @@ def test_faults_of_a_callback_become_a_message(
     fault: Exception, says: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     messages: list[str] = []
-    monkeypatch.setattr(widgets, "tell", lambda text, **_: messages.append(text))
+    monkeypatch.setattr(widgets, "notify", lambda text, **_: messages.append(text))
 
     def failing() -> None:
         raise fault
 
-    assert widgets.told(failing)() is no_update
-    widgets.told(failing, None)()
+    assert widgets.shows_message(failing)() is no_update
+    widgets.shows_message(failing, None)()
     assert len(messages) == 2
     assert all(says in text for text in messages)
 
 
 def test_what_works_is_handed_on() -> None:
-    assert widgets.told(lambda: 3)() == 3
+    assert widgets.shows_message(lambda: 3)() == 3
 
 
 @pytest.mark.parametrize(
@@ -53,6 +53,6 @@ def test_a_log_without_a_shift_is_no_success(
     fault: str, shifts: int, says: str, bad: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[tuple[str, bool]] = []
-    monkeypatch.setattr(widgets, "tell", lambda text, fault=False: told.append((text, fault)))
-    widgets.tell_read("a.csv is open", fault, shifts)
+    monkeypatch.setattr(widgets, "notify", lambda text, fault=False: told.append((text, fault)))
+    widgets.notify_opened_log("a.csv is open", fault, shifts)
     assert told == [(says, bad)]

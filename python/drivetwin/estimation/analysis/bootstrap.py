@@ -14,21 +14,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import part as piece
+from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError, InputError
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_pressure
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Record
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import Part, Problem
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import Signal
 
-FEWEST = 10
+MIN_FITS = 10
 """Fits from which a standard deviation is told."""
 
 
@@ -68,20 +68,20 @@ def bootstrap(found: Identification, count: int, seed: int) -> Bootstrap:
     Raises InputError for fewer than `FEWEST`, IdentificationError where the identification is by
     another method or most refits fail.
     """
-    if count < FEWEST:
+    if count < MIN_FITS:
         raise InputError(
-            f"a bootstrap of {count} fits tells no spread", f"ask for {FEWEST} or more"
+            f"a bootstrap of {count} fits tells no spread", f"ask for {MIN_FITS} or more"
         )
-    base, signals = likelihood_of(found)
-    estimate = parameters(base.problem, base.point, signals)
+    base, signals = get_likelihood_fit(found)
+    estimate = compute_parameters(base.problem, base.point, signals)
     rows = []
     for number, generator in enumerate(np.random.SeedSequence(seed).spawn(count)):
-        with piece(number / count, (number + 1) / count, "bootstrap"):
-            problem = _made(base, np.random.default_rng(generator))
-            again = nearest(problem, base.point)
+        with scale_progress(number / count, (number + 1) / count, "bootstrap"):
+            problem = _draw_problem(base, np.random.default_rng(generator))
+            again = fit_local(problem, base.point)
             if again is None:
                 continue
-            rows.append(list(parameters(again.problem, again.point, signals).values()))
+            rows.append(list(compute_parameters(again.problem, again.point, signals).values()))
     if len(rows) < count / 2:
         raise IdentificationError(
             f"{count - len(rows)} of {count} logs made from the fit could not be fitted",
@@ -96,26 +96,28 @@ def bootstrap(found: Identification, count: int, seed: int) -> Bootstrap:
     )
 
 
-def _made(base: LikelihoodFit, rng: np.random.Generator) -> Problem:
+def _draw_problem(base: LikelihoodFit, rng: np.random.Generator) -> LikelihoodObjective:
     """Draw the problem of a synthetic log, with new noise and new priors."""
-    parts = tuple(_made_part(part, base, rng) for part in base.problem.parts)
+    parts = tuple(_draw_part(part, base, rng) for part in base.problem.parts)
     problem = base.problem
-    prior = _drawn(problem.prior, base.point.values, rng)
+    prior = _draw_prior(problem.prior, base.point.values, rng)
     return replace(problem, parts=parts, prior=prior)
 
 
-def _made_part(part: Part, base: LikelihoodFit, rng: np.random.Generator) -> Part:
+def _draw_part(part: ShiftTerm, base: LikelihoodFit, rng: np.random.Generator) -> ShiftTerm:
     """Draw one synthetic shift: exact outputs of the expected inputs, then noise on all."""
-    run = part.run(base.point)
+    run = part.simulate(base.point)
     assert run is not None
     record = part.record
     noise = record.sigma * rng.standard_normal(record.size)
-    return Part.unweighted(part.structure, _noisy(record, record.stacked(run), noise, rng))
+    return ShiftTerm.from_sensor_noise(
+        part.structure, _add_noise(record, record.sample_run(run), noise, rng)
+    )
 
 
-def _noisy(
-    record: Record, exact: FloatArray, noise: FloatArray, rng: np.random.Generator
-) -> Record:
+def _add_noise(
+    record: ShiftRecord, exact: FloatArray, noise: FloatArray, rng: np.random.Generator
+) -> ShiftRecord:
     """Add `noise` (n,) to the outputs `exact` (n,), and the sensors' noise to the inputs."""
     ends = np.cumsum([out.values.size for out in record.outputs])[:-1]
     outputs = tuple(
@@ -124,16 +126,16 @@ def _noisy(
     )
     torque = record.engine_torque
     jitter = record.torque_sigma * rng.standard_normal(torque.values.size)
-    jitter += record.torque_noise(noise)
+    jitter += record.map_torque_noise(noise)
     if TORQUE in record.rounding:
-        jitter += record.rounding[TORQUE].drawn(rng)
+        jitter += record.rounding[TORQUE].draw(rng)
     pressures, held_back = {}, {}
     for name, signal in record.pressures.items():
         sigma = record.input_sigma[name]
         read = signal.values + sigma * rng.standard_normal(signal.values.size)
         if name in record.rounding:
-            read = read + record.rounding[name].drawn(rng)
-        driving = smooth_pressure(Sampled(signal.time, read, sigma), record.fills.get(name))
+            read = read + record.rounding[name].draw(rng)
+        driving = smooth_pressure(MeasuredSignal(signal.time, read, sigma), record.fills.get(name))
         pressures[name] = Signal(signal.time, driving)
         held_back[name] = read - driving
     return replace(
@@ -145,7 +147,7 @@ def _noisy(
     )
 
 
-def _drawn(prior: Prior, truth: FloatArray, rng: np.random.Generator) -> Prior:
+def _draw_prior(prior: Prior, truth: FloatArray, rng: np.random.Generator) -> Prior:
     """Draw the means of the prior about the `truth` (p,)."""
     scale = np.sqrt(np.diag(prior.precision))
     known = np.flatnonzero(scale > 0.0)

@@ -18,25 +18,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import part, tell
-from drivetwin.estimation.analysis.experiments import Base, Planned, planned
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
+from drivetwin._util.progress import notify_progress, scale_progress
+from drivetwin.estimation.analysis.experiments import BaseShift, ExperimentPlan, plan_experiment
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.segments import MomentumSettings
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.diagnostics.identifiability import reduced
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of, noise_power
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
-    of_log,
-    parameters,
-    slopes,
+from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
+from drivetwin.estimation.likelihood.fit import (
+    LikelihoodFit,
+    compute_variance_inflation,
+    invert_information,
 )
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
+    compute_jacobian,
+    compute_parameters,
+    make_log_id,
+)
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.suggestion import Experiment, Prospect, Suggestion
-from drivetwin.estimation.result.verdict import CALIBRATE, DELAY_IDENTIFIED, judge, sensors_decide
-from drivetwin.parameters import spec_of
+from drivetwin.estimation.result.suggestion import ExpectedPrecision, Experiment, ExperimentRanking
+from drivetwin.estimation.result.verdict import (
+    CALIBRATE,
+    DELAY_IDENTIFIED,
+    assess,
+    is_sensor_limited,
+)
+from drivetwin.parameters import get_parameter_spec
 
 AGE = "te_delay"
 REPEATS = (1, 2, 4)
@@ -46,30 +55,32 @@ LEAST_KNOWN = 3
 NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"
 
 
-def suggest(found: Identification) -> tuple[Suggestion, ...]:
+def compute_rankings(found: Identification) -> tuple[ExperimentRanking, ...]:
     """Rank the experiments for every weak or not identifiable parameter of a likelihood fit.
 
     After these come the `LEAST_KNOWN` others of widest relative interval.
     Raises IdentificationError where the identification is not by the likelihood method.
     """
-    fit, signals = likelihood_of(found)
+    fit, signals = get_likelihood_fit(found)
     open_ = [one for one in found.estimates.values() if one.verdict in _OPEN]
     known = [one for one in found.estimates.values() if one.verdict is Verdict.IDENTIFIED]
-    least = sorted(known, key=_relative_width, reverse=True)[:LEAST_KNOWN]
+    least = sorted(known, key=_compute_relative_width, reverse=True)[:LEAST_KNOWN]
     asked = (*open_, *least)
-    places = {one.id: _places(one.id, fit) for one in asked}
+    places = {one.id: _find_shifts(one.id, fit) for one in asked}
     wanted = list(dict.fromkeys(k for every in places.values() for k in every))
     gains = {}
     for number, k in enumerate(wanted):
-        with part(0.9 * number / len(wanted), 0.9 * (number + 1) / len(wanted), "experiments"):
-            gains[k] = _gains(fit, signals, k)
+        with scale_progress(
+            0.9 * number / len(wanted), 0.9 * (number + 1) / len(wanted), "experiments"
+        ):
+            gains[k] = _compute_gains(fit, signals, k)
     return tuple(
-        _suggestion(one, fit, signals, [gain for k in places[one.id] for gain in gains[k]])
+        _rank_for_parameter(one, fit, signals, [gain for k in places[one.id] for gain in gains[k]])
         for one in asked
     )
 
 
-def _places(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
+def _find_shifts(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
     """Find the shifts whose experiments inform a parameter: the last one and, for an element's
     parameter, the last ones of the same log in which the element engages and disengages."""
     parts = fit.problem.parts
@@ -84,7 +95,7 @@ def _places(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
     return tuple(dict.fromkeys((last, *with_it.values())))
 
 
-def examined(found: Identification) -> Identification:
+def rank_experiments(found: Identification) -> Identification:
     """Attach the experiments that would identify what the log leaves open.
 
     `evidence.suggestions` holds them, as `suggest` gives them; unchanged where nothing is open,
@@ -93,15 +104,15 @@ def examined(found: Identification) -> Identification:
     is_open = any(one.verdict in _OPEN for one in found.estimates.values())
     if found.method is not Method.LIKELIHOOD or not is_open:
         return found
-    return replace(found, evidence=replace(found.evidence, suggestions=suggest(found)))
+    return replace(found, evidence=replace(found.evidence, suggestions=compute_rankings(found)))
 
 
-def _relative_width(one: Estimate) -> float:
+def _compute_relative_width(one: Estimate) -> float:
     """Compute the standard deviation over the value; for a delay, over what counts as
     identified."""
     if one.value is None or one.std_total is None:
         return 0.0
-    whole = DELAY_IDENTIFIED if spec_of(one.id).stem == AGE else abs(one.value)
+    whole = DELAY_IDENTIFIED if get_parameter_spec(one.id).stem == AGE else abs(one.value)
     return one.std_total / max(whole, 1e-300)
 
 
@@ -109,7 +120,7 @@ _OPEN = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
 
 
 @dataclass(frozen=True, eq=False)
-class _Gain:
+class _InformationGain:
     """Information (r, r) that an experiment on a `shift` adds, over `names` (r,)."""
 
     experiment: Experiment
@@ -118,48 +129,50 @@ class _Gain:
     information: FloatArray
 
 
-def _gains(fit: LikelihoodFit, signals: Sequence[ShiftSignals], k: int) -> list[_Gain]:
+def _compute_gains(
+    fit: LikelihoodFit, signals: Sequence[ShiftSignals], k: int
+) -> list[_InformationGain]:
     """Compute the information of each experiment on shift k; failed simulations are left out."""
-    point = _with_age(fit)
-    base = Base(fit.problem.parts[k], point, signals[k].shift.lockup_time)
+    point = _add_delay(fit)
+    base = BaseShift(fit.problem.parts[k], point, signals[k].shift.lockup_time)
     names = [f"{one.shift.start_gear}→{one.shift.end_gear}" for one in signals]
     label = names[k] if len(set(names)) > 1 else ""
     found = []
     for number, experiment in enumerate(Experiment):
-        tell(number / len(Experiment))
-        gain = _gain(planned(experiment, base), label)
+        notify_progress(number / len(Experiment))
+        gain = _compute_gain(plan_experiment(experiment, base), label)
         if gain is not None:
             found.append(gain)
     return found
 
 
-def _age_of(fit: LikelihoodFit) -> str:
+def _get_delay_name(fit: LikelihoodFit) -> str:
     """Return the name of the torque-delay unknown of the last log, whose sensors experiments
     share."""
-    return fit.problem.parts[-1].structure.unknown(AGE)
+    return fit.problem.parts[-1].structure.get_unknown(AGE)
 
 
-def _with_age(fit: LikelihoodFit) -> Point:
+def _add_delay(fit: LikelihoodFit) -> ParameterVector:
     """Extend the minimum by the torque delay, even if the log does not show it."""
-    point, name = fit.point, _age_of(fit)
+    point, name = fit.point, _get_delay_name(fit)
     if name in point.names:
         return point
-    age = fit.problem.parts[-1].structure.value(point, AGE)
-    return Point((*point.names, name), np.append(point.values, age))
+    age = fit.problem.parts[-1].structure.get_value(point, AGE)
+    return ParameterVector((*point.names, name), np.append(point.values, age))
 
 
-def _gain(plan: Planned, shift: str) -> _Gain | None:
-    weighted = plan.part.weighted_by(plan.point)
-    found = weighted.linearised(plan.point)
+def _compute_gain(plan: ExperimentPlan, shift: str) -> _InformationGain | None:
+    weighted = plan.part.update_weighting(plan.point)
+    found = weighted.linearise(plan.point)
     if found is None:
         return None
     _, columns = found
-    information = columns.T @ weighted.weighting.weighted(columns)
-    return _Gain(plan.experiment, shift, plan.point.names, information)
+    information = columns.T @ weighted.weighting.apply_inverse(columns)
+    return _InformationGain(plan.experiment, shift, plan.point.names, information)
 
 
-def _covariance(
-    fit: LikelihoodFit, names: tuple[str, ...], gain: _Gain | None, repeats: int
+def _compute_covariance(
+    fit: LikelihoodFit, names: tuple[str, ...], gain: _InformationGain | None, repeats: int
 ) -> FloatArray:
     """Compute the covariance over `names` after `repeats` experiments, each with its own start,
     for noise at the level of the sensors."""
@@ -167,44 +180,44 @@ def _covariance(
     information = np.zeros((size, size))
     own = len(fit.point.names)
     information[:own, :own] = fit.normal.information
-    if _age_of(fit) not in fit.point.names:
-        k = names.index(_age_of(fit))
+    if _get_delay_name(fit) not in fit.point.names:
+        k = names.index(_get_delay_name(fit))
         information[k, k] += MomentumSettings().delay_prior.std ** -2
     if gain is not None:
-        information += repeats * _without_start(gain, size)
-    return covariance_of(information)
+        information += repeats * _eliminate_start(gain, size)
+    return invert_information(information)
 
 
-def _without_start(gain: _Gain, size: int) -> FloatArray:
+def _eliminate_start(gain: _InformationGain, size: int) -> FloatArray:
     """Compute the information (size, size) of an experiment whose start is unknown."""
     own, start = list(range(size)), list(range(size, len(gain.information)))
-    return reduced(gain.information, own, start)
+    return reduce_information(gain.information, own, start)
 
 
-def _suggestion(
+def _rank_for_parameter(
     one: Estimate,
     fit: LikelihoodFit,
     signals: Sequence[ShiftSignals],
-    gains: Sequence[_Gain],
-) -> Suggestion:
+    gains: Sequence[_InformationGain],
+) -> ExperimentRanking:
     half = np.inf if one.std_total is None else Z95 * one.std_total
-    told = parameters(fit.problem, fit.point, signals)
+    told = compute_parameters(fit.problem, fit.point, signals)
     if one.id not in told:
-        return Suggestion(one.id, one.verdict, half, (), NO_SCALE)
+        return ExperimentRanking(one.id, one.verdict, half, (), NO_SCALE)
     systematic = one.std_systematic or 0.0
-    if one.std_noise is not None and sensors_decide(one.std_noise, systematic):
-        return Suggestion(one.id, one.verdict, half, (), CALIBRATE)
-    names = _with_age(fit).names
-    row = _row(one.id, fit, signals, names)
+    if one.std_noise is not None and is_sensor_limited(one.std_noise, systematic):
+        return ExperimentRanking(one.id, one.verdict, half, (), CALIBRATE)
+    names = _add_delay(fit).names
+    row = _compute_row(one.id, fit, signals, names)
     if not row.any():  # specific to another log
-        return Suggestion(one.id, one.verdict, half, ())
-    loud = np.sqrt(_noise_power(fit, row))
-    best: dict[Experiment, Prospect] = {}
+        return ExperimentRanking(one.id, one.verdict, half, ())
+    loud = np.sqrt(_compute_noise_power(fit, row))
+    best: dict[Experiment, ExpectedPrecision] = {}
     for gain in gains:
         for repeats in REPEATS:
-            std = loud * float(np.sqrt(row @ _covariance(fit, names, gain, repeats) @ row))
-            verdict = judge(one.id, told[one.id], std, "", systematic).verdict
-            prospect = Prospect(
+            std = loud * float(np.sqrt(row @ _compute_covariance(fit, names, gain, repeats) @ row))
+            verdict = assess(one.id, told[one.id], std, "", systematic).verdict
+            prospect = ExpectedPrecision(
                 gain.experiment,
                 repeats,
                 Z95 * float(np.hypot(std, systematic)),
@@ -214,35 +227,35 @@ def _suggestion(
             if verdict is Verdict.IDENTIFIED or one.verdict is Verdict.IDENTIFIED:
                 break
         other = best.get(gain.experiment, prospect)
-        best[gain.experiment] = min(other, prospect, key=_worth)
-    order = sorted(best.values(), key=_worth)
-    return Suggestion(one.id, one.verdict, half, tuple(order))
+        best[gain.experiment] = min(other, prospect, key=_get_sort_key)
+    order = sorted(best.values(), key=_get_sort_key)
+    return ExperimentRanking(one.id, one.verdict, half, tuple(order))
 
 
-def _noise_power(fit: LikelihoodFit, row: FloatArray) -> float:
+def _compute_noise_power(fit: LikelihoodFit, row: FloatArray) -> float:
     """Compute the noise power of this log along a parameter's derivative (r,), slow errors
     included: an experiment has the same sensors."""
     own = row[: len(fit.point.names)]
-    return noise_power(fit, own[None, :]) if own.any() else max(fit.chi2, 1.0)
+    return compute_variance_inflation(fit, own[None, :]) if own.any() else max(fit.chi2, 1.0)
 
 
-def _worth(prospect: Prospect) -> tuple[bool, float]:
+def _get_sort_key(prospect: ExpectedPrecision) -> tuple[bool, float]:
     """Return the sort key: experiments that settle the parameter first, then by recording
     effort."""
     settles = prospect.verdict is Verdict.IDENTIFIED
     return (not settles, prospect.half_width * np.sqrt(prospect.repeats))
 
 
-def _row(
+def _compute_row(
     name: str, fit: LikelihoodFit, signals: Sequence[ShiftSignals], names: tuple[str, ...]
 ) -> FloatArray:
     """Compute the derivative (r,) of a parameter by the unknowns `names`."""
     row = np.zeros(len(names))
-    if name == of_log(AGE, fit.problem.parts[-1].structure.log):
-        row[names.index(_age_of(fit))] = 1.0
+    if name == make_log_id(AGE, fit.problem.parts[-1].structure.log):
+        row[names.index(_get_delay_name(fit))] = 1.0
         return row
     std = np.sqrt(np.diag(fit.covariance))
-    matrix = slopes(fit.problem, fit.point, std, signals)
-    place = list(parameters(fit.problem, fit.point, signals)).index(name)
+    matrix = compute_jacobian(fit.problem, fit.point, std, signals)
+    place = list(compute_parameters(fit.problem, fit.point, signals)).index(name)
     row[: len(fit.point.names)] = matrix[place]
     return row

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import LATEST, Output, Record
-from drivetwin.estimation.likelihood.objective import Part
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.data.shift_record import MAX_DELAY_S, Output, ShiftRecord
+from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.suggestion import FIRMER, SOFTER, TORQUE_LEVEL, Experiment
 from drivetwin.simulation.dual_clutch import Signal
 
@@ -28,15 +28,15 @@ COAST = (6.0, -0.1)
 
 
 @dataclass(frozen=True, eq=False)
-class Base:
+class BaseShift:
     """Shift that an experiment starts from: its part of the fit at the minimum, its lock-up [s]."""
 
-    part: Part
-    point: Point
+    part: ShiftTerm
+    point: ParameterVector
     lockup: float
 
     @property
-    def record(self) -> Record:
+    def record(self) -> ShiftRecord:
         """Recorded data of the shift."""
         return self.part.record
 
@@ -47,94 +47,98 @@ class Base:
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
+class ExperimentPlan:
     """An experiment as a part of a fit, with a start of its own at `point`."""
 
     experiment: Experiment
-    part: Part
-    point: Point
+    part: ShiftTerm
+    point: ParameterVector
 
 
-def planned(experiment: Experiment, base: Base) -> Planned:
+def plan_experiment(experiment: Experiment, base: BaseShift) -> ExperimentPlan:
     """Build an experiment that starts like the log; its outputs hold no measurements."""
     part, point = base.part, base.point
     label = "next"
     starts = [name for name in point.names if name.startswith(f"{part.structure.label}.")]
     renamed = [f"{label}.{name.rpartition('.')[2]}" for name in starts]
     values = np.concatenate([point.values, [point[name] for name in starts]])
-    extended = Point((*point.names, *renamed), values)
+    extended = ParameterVector((*point.names, *renamed), values)
     structure = replace(part.structure, label=label)
     record = _RECORDS[experiment](base)
-    return Planned(experiment, Part.unweighted(structure, record), extended)
+    return ExperimentPlan(experiment, ShiftTerm.from_sensor_noise(structure, record), extended)
 
 
-def _again(base: Base) -> Record:
+def _repeat_shift(base: BaseShift) -> ShiftRecord:
     return base.record
 
 
-def _throttle_steps(base: Base) -> Record:
+def _build_throttle_steps(base: BaseShift) -> ShiftRecord:
     largest = base.largest / max(STEPS)
     ends = DWELL * np.arange(len(STEPS) + 1)
     time = np.sort(np.concatenate([ends[:-1], ends[1:] - 0.06]))
-    return _in_gear(base, Signal(time, np.repeat(largest * np.array(STEPS), 2)), float(ends[-1]))
+    return _build_gear_record(
+        base, Signal(time, np.repeat(largest * np.array(STEPS), 2)), float(ends[-1])
+    )
 
 
-def _coast_down(base: Base) -> Record:
+def _build_coast_down(base: BaseShift) -> ShiftRecord:
     length, share = COAST
     time = np.array([0.0, 0.1, 0.3, length])
-    first = float(np.interp(base.record.time[0], *_samples(base.record.engine_torque)))
+    first = float(np.interp(base.record.time[0], *_get_samples(base.record.engine_torque)))
     closed = share * base.largest
-    return _in_gear(base, Signal(time, np.array([first, first, closed, closed])), length)
+    return _build_gear_record(base, Signal(time, np.array([first, first, closed, closed])), length)
 
 
-def _torque_level(base: Base) -> Record:
+def _build_torque_level(base: BaseShift) -> ShiftRecord:
     elements = base.part.structure.elements
-    scaled = _scaled(base, {one.name: TORQUE_LEVEL for one in elements})
-    return _with_torque(scaled, lambda _, values: TORQUE_LEVEL * values)
+    scaled = _scale_pressures(base, {one.name: TORQUE_LEVEL for one in elements})
+    return _replace_torque(scaled, lambda _, values: TORQUE_LEVEL * values)
 
 
-def _firmer(base: Base) -> Record:
-    return _scaled(base, {base.part.structure.driveline.oncoming.name: FIRMER})
+def _build_firmer_shift(base: BaseShift) -> ShiftRecord:
+    return _scale_pressures(base, {base.part.structure.driveline.oncoming.name: FIRMER})
 
 
-def _softer(base: Base) -> Record:
-    return _scaled(base, {base.part.structure.driveline.oncoming.name: SOFTER})
+def _build_softer_shift(base: BaseShift) -> ShiftRecord:
+    return _scale_pressures(base, {base.part.structure.driveline.oncoming.name: SOFTER})
 
 
-def _still_pedal(base: Base) -> Record:
+def _build_still_pedal(base: BaseShift) -> ShiftRecord:
     def held(time: FloatArray, values: FloatArray) -> FloatArray:
         return np.where(time > base.lockup, np.interp(base.lockup, time, values), values)
 
-    return _with_torque(base.record, held)
+    return _replace_torque(base.record, held)
 
 
-_RECORDS: Mapping[Experiment, Callable[[Base], Record]] = {
-    Experiment.AGAIN: _again,
-    Experiment.THROTTLE_STEPS: _throttle_steps,
-    Experiment.TORQUE_LEVEL: _torque_level,
-    Experiment.COAST_DOWN: _coast_down,
-    Experiment.FIRMER: _firmer,
-    Experiment.SOFTER: _softer,
-    Experiment.STILL_PEDAL: _still_pedal,
+_RECORDS: Mapping[Experiment, Callable[[BaseShift], ShiftRecord]] = {
+    Experiment.AGAIN: _repeat_shift,
+    Experiment.THROTTLE_STEPS: _build_throttle_steps,
+    Experiment.TORQUE_LEVEL: _build_torque_level,
+    Experiment.COAST_DOWN: _build_coast_down,
+    Experiment.FIRMER: _build_firmer_shift,
+    Experiment.SOFTER: _build_softer_shift,
+    Experiment.STILL_PEDAL: _build_still_pedal,
 }
 
 
-def _samples(signal: Signal) -> tuple[FloatArray, FloatArray]:
+def _get_samples(signal: Signal) -> tuple[FloatArray, FloatArray]:
     return signal.time, signal.values
 
 
-def _scaled(base: Base, factors: Mapping[str, float]) -> Record:
+def _scale_pressures(base: BaseShift, factors: Mapping[str, float]) -> ShiftRecord:
     """Multiply the pressures above P0 of some elements."""
     pressures = dict(base.record.pressures)
     for name, factor in factors.items():
-        P0 = base.part.structure.value(base.point, f"{name}.P0")
+        P0 = base.part.structure.get_value(base.point, f"{name}.P0")
         signal = pressures[name]
         values = np.where(signal.values > P0, P0 + factor * (signal.values - P0), signal.values)
         pressures[name] = Signal(signal.time, values)
     return replace(base.record, pressures=pressures)
 
 
-def _with_torque(record: Record, change: Callable[[FloatArray, FloatArray], FloatArray]) -> Record:
+def _replace_torque(
+    record: ShiftRecord, change: Callable[[FloatArray, FloatArray], FloatArray]
+) -> ShiftRecord:
     """Change the engine torque by a function of time [s] and torque [N m]."""
     torque, steady = (
         Signal(signal.time, change(signal.time, signal.values))
@@ -143,41 +147,41 @@ def _with_torque(record: Record, change: Callable[[FloatArray, FloatArray], Floa
     return replace(record, engine_torque=torque, steady_torque=steady)
 
 
-def _in_gear(base: Base, demand: Signal, length: float) -> Record:
+def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> ShiftRecord:
     """Build a record of the off-going element's gear alone, with the rates and noise of the log."""
     record, driveline = base.record, base.part.structure.driveline
     step = float(np.median(np.diff(record.time)))
     time = step * np.arange(int(length / step), dtype=np.float64)
     period = float(np.median(np.diff(record.engine_torque.time)))
-    stamps = np.arange(-2.0 * LATEST, length + 2.0 * LATEST, period)
+    stamps = np.arange(-2.0 * MAX_DELAY_S, length + 2.0 * MAX_DELAY_S, period)
     torque = Signal(stamps, np.interp(stamps, demand.time, demand.values))
     ends = np.array([0.0, length])
     closed = float(np.max(record.pressures[driveline.offgoing.name].values))
     raster = {name: float(np.median(np.diff(p.time))) for name, p in record.pressures.items()}
     levels = {driveline.offgoing.name: closed, driveline.oncoming.name: 0.0}
     pressures = {
-        name: _held(np.append(np.arange(0.0, length, raster[name]), ends[1]), level)
+        name: _make_constant(np.append(np.arange(0.0, length, raster[name]), ends[1]), level)
         for name, level in levels.items()
     }
-    return Record(
+    return ShiftRecord(
         time,
         torque,
         pressures,
-        tuple(_blank(out, record.time, time) for out in record.outputs),
+        tuple(_make_empty_output(out, record.time, time) for out in record.outputs),
         torque,
         np.zeros(torque.time.size),
         record.input_sigma,
     )
 
 
-def _held(time: FloatArray, level: float) -> Signal:
+def _make_constant(time: FloatArray, level: float) -> Signal:
     return Signal(time, np.full(time.size, level))
 
 
-def _blank(out: Output, before: FloatArray, time: FloatArray) -> Output:
+def _make_empty_output(out: Output, before: FloatArray, time: FloatArray) -> Output:
     """Build the same sensor on another grid, without measurements."""
     period = float(np.median(np.diff(before[out.place])))
     stride = max(1, round(period / float(time[1] - time[0])))
     place = np.arange(0, time.size, stride)
     fresh = Output(out.name, place, np.zeros(place.size), out.sigma)
-    return fresh if out.window == 0.0 else fresh.after_period(time).averaged(time)
+    return fresh if out.window == 0.0 else fresh.drop_first_period(time).convert_to_means(time)

@@ -23,14 +23,14 @@ from enum import StrEnum
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.diagnostics.misspecification import score_of
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, spread_of
-from drivetwin.estimation.likelihood.objective import Part
-from drivetwin.estimation.likelihood.slip_contact import Contact, contact_of
-from drivetwin.estimation.optimize.gauss_newton import minimise, step_of
+from drivetwin.estimation.likelihood.diagnostics.misspecification import compute_score
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
+from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
+from drivetwin.estimation.optimize.gauss_newton import minimise, solve_step
 
 
 @dataclass(frozen=True)
@@ -93,22 +93,24 @@ class _Effect:
     plausible: float
 
 
-def departures(found: Identification, temperature: Sampled | None = None) -> tuple[Departure, ...]:
+def estimate_departures(
+    found: Identification, temperature: MeasuredSignal | None = None
+) -> tuple[Departure, ...]:
     """Estimate the deviations of all elements of a likelihood identification.
 
     `temperature` [K] is that of the oil over the log, which changes so slowly that it is also told
     across a gap. Raises IdentificationError where the
     identification is by another method.
     """
-    fit, signals = likelihood_of(found)
+    fit, signals = get_likelihood_fit(found)
     largest = max(float(np.max(np.abs(s.engine_torque.values))) for s in signals)
-    total, step = np.zeros(0), _step(fit, largest, temperature)
+    total, step = np.zeros(0), _compute_step(fit, largest, temperature)
     for _ in range(DEPENDENCE.rounds):
         total = step.values if total.size == 0 else total + step.values
-        again = _put_back(fit, step, total)
+        again = _subtract_effects(fit, step, total)
         if again is None:
             break
-        step = _step(again, largest, temperature, total)
+        step = _compute_step(again, largest, temperature, total)
     std = np.sqrt(np.diag(step.covariance))
     return tuple(
         Departure(e.kind, e.element, float(value), float(error), e.plausible)
@@ -126,24 +128,26 @@ class _Step:
     covariance: FloatArray
 
 
-def _step(
+def _compute_step(
     fit: LikelihoodFit,
     largest: float,
-    temperature: Sampled | None,
+    temperature: MeasuredSignal | None,
     known: FloatArray | None = None,
 ) -> _Step:
     """Compute one step from the minimum; `known` (q,) is already in the residuals."""
-    effects = [e for e in _effects(fit, largest, temperature) if e.plausible > 0.0]
-    columns = [_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
+    effects = [e for e in _iterate_effects(fit, largest, temperature) if e.plausible > 0.0]
+    columns = [_compute_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
     precision = np.array([e.plausible for e in effects]) ** -2.0
-    score = score_of(fit.problem, fit.normal, columns)
-    normal = score.beside(fit.normal, precision, 0.0 if known is None else known)
+    score = compute_score(fit.problem, fit.normal, columns)
+    normal = score.extend_expansion(fit.normal, precision, 0.0 if known is None else known)
     mine = slice(fit.point.values.size, None)
-    covariance = spread_of(fit.problem, normal, fit.chi2)[mine, mine]
-    return _Step(effects, columns, step_of(normal.information, normal.gradient)[mine], covariance)
+    covariance = compute_covariance(fit.problem, normal, fit.chi2)[mine, mine]
+    return _Step(
+        effects, columns, solve_step(normal.information, normal.gradient)[mine], covariance
+    )
 
 
-def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodFit | None:
+def _subtract_effects(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodFit | None:
     """Refit with the effects subtracted from the residuals; None if the fit fails."""
     parts = tuple(
         replace(part, returned=part.returned + z @ total)
@@ -155,27 +159,31 @@ def _put_back(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodF
     return replace(fit, problem=found.problem, point=found.point, normal=found.normal)
 
 
-def _effects(fit: LikelihoodFit, largest: float, temperature: Sampled | None) -> Iterator[_Effect]:
+def _iterate_effects(
+    fit: LikelihoodFit, largest: float, temperature: MeasuredSignal | None
+) -> Iterator[_Effect]:
     """Yield every deviation of every element."""
-    runs = [part.run(fit.point) for part in fit.problem.parts]
+    runs = [part.simulate(fit.point) for part in fit.problem.parts]
     names = dict.fromkeys(e.name for part in fit.problem.parts for e in part.structure.elements)
     for name in names:
         seen = [
-            contact_of(part, fit.point, run, name)
+            evaluate_contact(part, fit.point, run, name)
             for part, run in zip(fit.problem.parts, runs, strict=True)
             if run is not None
         ]
         slip = tuple(one.slip for one in seen)
         reach = max(float(np.max(np.abs(s))) for s in slip)
         yield _Effect(Kind.DRAG, name, slip, DEPENDENCE.drag_share * largest / reach)
-        yield _level(Kind.PRESSURE, name, seen, [one.above for one in seen])
+        yield _build_level_effect(Kind.PRESSURE, name, seen, [one.above for one in seen])
         if temperature is not None:
             known = temperature.time, temperature.values
             courses = [np.interp(one.middle, *known) for one in seen]
-            yield _level(Kind.TEMPERATURE, name, seen, courses)
+            yield _build_level_effect(Kind.TEMPERATURE, name, seen, courses)
 
 
-def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray]) -> _Effect:
+def _build_level_effect(
+    kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray]
+) -> _Effect:
     """Build the change of μ in proportion to a quantity, about its mean while the element slips."""
     contact = [one.friction * one.per_mu for one in seen]
     weights = np.abs(np.concatenate(contact))
@@ -188,13 +196,15 @@ def _level(kind: Kind, name: str, seen: list[Contact], quantity: list[FloatArray
     return _Effect(kind, name, torques, DEPENDENCE.level_share / float(np.ptp(values[slipping])))
 
 
-def _columns(part: Part, fit: LikelihoodFit, effects: list[_Effect], place: int) -> FloatArray:
+def _compute_columns(
+    part: ShiftTerm, fit: LikelihoodFit, effects: list[_Effect], place: int
+) -> FloatArray:
     """Compute the change (n, q) of the outputs of one part by a unit of each effect."""
-    run = part.run(fit.point)
+    run = part.simulate(fit.point)
     assert run is not None
     columns = []
     for effect in effects:
-        contact = contact_of(part, fit.point, run, effect.element)
-        force = contact.forces(effect.torques[place])
-        columns.append(part.answer_to_force(fit.point, run, force))
+        contact = evaluate_contact(part, fit.point, run, effect.element)
+        force = contact.compute_forces(effect.torques[place])
+        columns.append(part.respond_to_forces(fit.point, run, force))
     return np.column_stack(columns)

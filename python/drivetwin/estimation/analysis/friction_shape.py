@@ -16,20 +16,20 @@ from scipy.optimize import lsq_linear
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.analysis.friction_shape_prior import Shape
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.data.shift_data import Coupling, ShiftSignals
+from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
+from drivetwin.estimation.data.shift_data import ShiftElementKinematics, ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.data.shift_record import Record, record_of
+from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord, build_record
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import Part, Problem
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
-from drivetwin.estimation.likelihood.parametrization import LAW, Structure
-from drivetwin.estimation.likelihood.priors import spans
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.parametrization import LAW, ShiftModel
+from drivetwin.estimation.likelihood.priors import split_spans
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
-from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import sensor_shifts
-from drivetwin.estimation.optimize.gauss_newton import step_of
-from drivetwin.estimation.optimize.objective import Normal, Point
+from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensor_shifts
+from drivetwin.estimation.optimize.gauss_newton import solve_step
+from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import FrictionTable, ShiftElement, Stribeck
@@ -45,32 +45,34 @@ LEVEL = (0.12, 0.2)
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class KnotTable:
     """Knots (K,) of |slip| [rad/s], the first 0, between which μ is linear."""
 
     knots: FloatArray
 
-    def names(self, element: str) -> tuple[str, ...]:
+    def list_names(self, element: str) -> tuple[str, ...]:
         """Unknowns of an element: its μ at the knots."""
         return tuple(f"{element}.mu.{k}" for k in range(self.knots.size))
 
 
 @dataclass(frozen=True, eq=False)
-class Shaped(Structure):
+class TableShiftModel(ShiftModel):
     """A structure whose `tables` take the place of laws, by element."""
 
-    tables: Mapping[str, Table] = field(default_factory=dict)
+    tables: Mapping[str, KnotTable] = field(default_factory=dict)
 
-    def _element(self, point: Point, one: Coupling) -> ShiftElement:
-        element = super()._element(point, one)
+    def _build_element(self, point: ParameterVector, one: ShiftElementKinematics) -> ShiftElement:
+        element = super()._build_element(point, one)
         if one.name not in self.tables:
             return element
         table = self.tables[one.name]
-        mu = tuple(point[name] for name in table.names(one.name))
+        mu = tuple(point[name] for name in table.list_names(one.name))
         return replace(element, friction=FrictionTable(tuple(table.knots.tolist()), mu))
 
-    def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
-        yield from super()._entries(point, name)
+    def _iterate_entries(
+        self, point: ParameterVector, name: str
+    ) -> Iterator[tuple[str, str, float]]:
+        yield from super()._iterate_entries(point, name)
         element, _, key = name.partition(".")
         if element in self.tables and key.startswith("mu."):
             yield name, name, 1.0
@@ -85,43 +87,45 @@ class ShapedFriction:
     changes in the curves alone.
     """
 
-    shape: Shape
+    shape: FrictionShape
     curves: Mapping[str, FrictionCurve]
     gain: float
     bend: float
     fit: LikelihoodFit
 
 
-def shaped_friction(
-    found: Identification, shape: Shape, tolerances: Mapping[str, SensorTolerance]
+def fit_friction_shape(
+    found: Identification, shape: FrictionShape, tolerances: Mapping[str, SensorTolerance]
 ) -> ShapedFriction:
     """Fit μ over slip as a curve of `shape` for every element that has a friction curve.
 
     Raises IdentificationError where the identification is by another method or no fit converges.
     """
-    base, signals = likelihood_of(found)
-    tables = {name: Table(_knots(curve)) for name, curve in found.friction.items()}
-    problem, start = _problem(base, signals, tables)
-    normal = problem.weighted_by(start).normal(start)
-    priors = {bend: _prior(problem.prior, start, tables, bend) for bend in BENDS}
+    base, signals = get_likelihood_fit(found)
+    tables = {name: KnotTable(_place_knots(curve)) for name, curve in found.friction.items()}
+    problem, start = _build_problem(base, signals, tables)
+    normal = problem.update_weighting(start).normal(start)
+    priors = {bend: _build_prior(problem.prior, start, tables, bend) for bend in BENDS}
     best: LikelihoodFit | None = None
     if normal is not None:
-        bend = min(BENDS, key=lambda one: _evidence(normal, problem.prior, priors[one], start))
-        best = nearest(replace(problem, prior=priors[bend]), start)
+        bend = min(
+            BENDS, key=lambda one: _compute_evidence(normal, problem.prior, priors[one], start)
+        )
+        best = fit_local(replace(problem, prior=priors[bend]), start)
     if best is None:
         raise IdentificationError(
             "the fit with friction of free shape does not converge",
             "use the Stribeck law, which the identification has",
         )
     systematic = sum(
-        (np.outer(s, s) for s in sensor_shifts(best, tolerances).values()),
+        (np.outer(s, s) for s in compute_sensor_shifts(best, tolerances).values()),
         np.zeros_like(best.covariance),
     )
     gain = base.chi2 * base.problem.size - best.chi2 * best.problem.size
     return ShapedFriction(
         shape,
         {
-            name: _curve(best, (name, table, shape), found.friction[name], systematic)
+            name: _build_curve(best, (name, table, shape), found.friction[name], systematic)
             for name, table in tables.items()
         },
         gain,
@@ -130,47 +134,47 @@ def shaped_friction(
     )
 
 
-def _knots(curve: FrictionCurve) -> FloatArray:
+def _place_knots(curve: FrictionCurve) -> FloatArray:
     """Place knots from zero slip to the largest observed, even in the root of slip: denser where
     μ changes."""
     return np.asarray(np.linspace(0.0, np.sqrt(curve.slip[-1]), KNOTS) ** 2, dtype=np.float64)
 
 
-def _problem(
+def _build_problem(
     base: LikelihoodFit,
     signals: Sequence[ShiftSignals],
-    tables: Mapping[str, Table],
-) -> tuple[Problem, Point]:
+    tables: Mapping[str, KnotTable],
+) -> tuple[LikelihoodObjective, ParameterVector]:
     """Build the problem with knots in place of laws, and its initial point."""
     laws = {f"{name}.{key}" for name in tables for key in LAW}
     kept = [k for k, name in enumerate(base.point.names) if name not in laws]
     names = [base.point.names[k] for k in kept]
     values = [float(base.point.values[k]) for k in kept]
     for name, table in tables.items():
-        law = _law_of(base, name)
-        names += table.names(name)
-        values += law.at(table.knots).tolist()
-    point = Point(tuple(names), np.array(values))
+        law = _get_law(base, name)
+        names += table.list_names(name)
+        values += law.evaluate(table.knots).tolist()
+    point = ParameterVector(tuple(names), np.array(values))
     parts = tuple(
-        _part(replace(part, record=_measured(part, s, span)), base, tables)
-        for part, s, span in zip(base.problem.parts, signals, spans(signals), strict=True)
+        _replace_laws(replace(part, record=_restore_inputs(part, s, span)), base, tables)
+        for part, s, span in zip(base.problem.parts, signals, split_spans(signals), strict=True)
     )
     size = point.values.size
     lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
     lower[: len(kept)], upper[: len(kept)] = base.problem.lower[kept], base.problem.upper[kept]
     for name, table in tables.items():
-        first = names.index(table.names(name)[0])
+        first = names.index(table.list_names(name)[0])
         lower[first : first + table.knots.size] = LEAST
     mean, precision = np.zeros(size), np.zeros((size, size))
     mean[: len(kept)] = base.problem.prior.mean[kept]
     precision[: len(kept), : len(kept)] = base.problem.prior.precision[np.ix_(kept, kept)]
-    return Problem(parts, Prior(mean, precision), lower, upper), point
+    return LikelihoodObjective(parts, Prior(mean, precision), lower, upper), point
 
 
-def _law_of(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
+def _get_law(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
     """Return the friction law of an element at the minimum."""
     for part in base.problem.parts:
-        for one in part.structure.model(base.point).elements:
+        for one in part.structure.build_model(base.point).elements:
             if one.name == name:
                 return one.friction
     raise IdentificationError(
@@ -178,27 +182,31 @@ def _law_of(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
     )
 
 
-def _part(part: Part, base: LikelihoodFit, tables: Mapping[str, Table]) -> Part:
+def _replace_laws(
+    part: ShiftTerm, base: LikelihoodFit, tables: Mapping[str, KnotTable]
+) -> ShiftTerm:
     """Replace the laws of a part by tables."""
     old = part.structure
     laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
-    fixed = {**old.fixed, **{name: old.value(base.point, name) for name in laws}}
+    fixed = {**old.fixed, **{name: old.get_value(base.point, name) for name in laws}}
     mine = {one.name: tables[one.name] for one in old.elements if one.name in tables}
-    structure = Shaped(**{**vars(old), "fixed": fixed, "tables": mine})
-    return Part.unweighted(structure, part.record)
+    structure = TableShiftModel(**{**vars(old), "fixed": fixed, "tables": mine})
+    return ShiftTerm.from_sensor_noise(structure, part.record)
 
 
-def _measured(part: Part, signals: ShiftSignals, span: Span) -> Record:
+def _restore_inputs(part: ShiftTerm, signals: ShiftSignals, span: Span) -> ShiftRecord:
     """Restore the inputs as measured: those of a fit are the expected ones."""
-    return record_of(signals, span, part.record.fills).of_kinds(part.record.kinds)
+    return build_record(signals, span, part.record.fills).select_modes(part.record.kinds)
 
 
-def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) -> Prior:
+def _build_prior(
+    base: Prior, point: ParameterVector, tables: Mapping[str, KnotTable], bend: float
+) -> Prior:
     """Add the priors on level and smoothness of every μ to `base`."""
     level, spread = LEVEL
     mean, precision = base.mean.copy(), base.precision.copy()
     for name, table in tables.items():
-        first = point.names.index(table.names(name)[0])
+        first = point.names.index(table.list_names(name)[0])
         part = slice(first, first + table.knots.size)
         second = np.diff(np.eye(table.knots.size), 2, axis=0) / bend
         on_mu = second.T @ second + np.eye(table.knots.size) / spread**2
@@ -206,35 +214,43 @@ def _prior(base: Prior, point: Point, tables: Mapping[str, Table], bend: float) 
     return Prior(mean, precision)
 
 
-def _evidence(normal: Normal, without: Prior, prior: Prior, point: Point) -> float:
+def _compute_evidence(
+    normal: NormalEquations, without: Prior, prior: Prior, point: ParameterVector
+) -> float:
     """Compute -2·log-evidence of a prior, up to a constant, with Q expanded at `point`."""
-    gradient = normal.gradient - without.pull(point.values) + prior.pull(point.values)
+    gradient = (
+        normal.gradient
+        - without.compute_gradient(point.values)
+        + prior.compute_gradient(point.values)
+    )
     information = normal.data + prior.precision
     scale = np.sqrt(np.diag(information))
     unit = information / np.outer(scale, scale)
-    step = step_of(information, gradient)
+    step = solve_step(information, gradient)
     fall = float(2.0 * step @ gradient + step @ information @ step)
     known = np.flatnonzero(np.diag(prior.precision))
     block = prior.precision[np.ix_(known, known)]
     power = np.linalg.slogdet(unit)[1] + 2.0 * np.sum(np.log(scale))
-    return prior.cost(point.values) + fall + float(power - np.linalg.slogdet(block)[1])
+    return (
+        prior.compute_prior_cost(point.values) + fall + float(power - np.linalg.slogdet(block)[1])
+    )
 
 
-def _curve(
+def _build_curve(
     best: LikelihoodFit,
-    one: tuple[str, Table, Shape],
+    one: tuple[str, KnotTable, FrictionShape],
     seen: FrictionCurve,
     systematic: FloatArray,
 ) -> FrictionCurve:
     """Interpolate μ between the knots over the observed slips, with the band of noise and
     sensors."""
     name, table, shape = one
-    first = best.point.names.index(table.names(name)[0])
+    first = best.point.names.index(table.list_names(name)[0])
     part = slice(first, first + table.knots.size)
     slip = np.linspace(float(seen.slip[0]), float(seen.slip[-1]), POINTS)
     between = np.array([np.interp(slip, table.knots, row) for row in np.eye(table.knots.size)]).T
     total = (best.covariance + systematic)[part, part]
-    at_knots, spread = shaped(shape, best.point.values[part], total)
+    at_knots, spread = project_shape(shape, best.point.values[part], total)
     mu = between @ at_knots
     half = Z95 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
     return replace(
@@ -249,12 +265,14 @@ def _curve(
     )
 
 
-def shaped(shape: Shape, mu: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+def project_shape(
+    shape: FrictionShape, mu: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Project μ (K,) at the knots, and its covariance (K, K), onto curves of `shape`."""
-    if shape is Shape.FREE:
+    if shape is FrictionShape.FREE:
         return mu, covariance
     matrix = np.tril(np.ones((mu.size, mu.size)))
-    if shape is Shape.FALLING:
+    if shape is FrictionShape.FALLING:
         matrix = matrix[::-1]
     scale = np.sqrt(np.diag(covariance))
     root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale)))

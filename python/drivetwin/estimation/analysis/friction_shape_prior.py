@@ -6,7 +6,7 @@ from __future__ import annotations
 from enum import StrEnum
 
 
-class Shape(StrEnum):
+class FrictionShape(StrEnum):
     """Prior knowledge of μ over slip."""
 
     FREE = "free"

@@ -16,15 +16,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import tell
+from drivetwin._util.progress import notify_progress
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.budget import REMEDY
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, noise_power
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters, slopes
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_variance_inflation
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
+    compute_jacobian,
+    compute_parameters,
+)
 from drivetwin.estimation.optimize.gauss_newton import minimise, minimise_constrained
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95
 
 
@@ -64,38 +67,38 @@ class Profile:
     linear: tuple[float, float]
 
 
-def profile(found: Identification, parameter: str) -> Profile:
+def compute_profile(found: Identification, parameter: str) -> Profile:
     """Compute the profile of a parameter of a likelihood identification.
 
     Raises InputError for a parameter that the fit does not have or that is known from design, and
     IdentificationError where the identification is by another method.
     """
-    fit, signals = likelihood_of(found)
-    told = parameters(fit.problem, fit.point, signals)
+    fit, signals = get_likelihood_fit(found)
+    told = compute_parameters(fit.problem, fit.point, signals)
     if parameter not in told:
         raise InputError(
             f"the fit has no parameter {parameter!r}", f"choose one of {', '.join(told)}"
         )
-    held = _Held(fit, signals, list(told).index(parameter), parameter)
+    held = _FixedParameter(fit, signals, list(told).index(parameter), parameter)
     if held.std == 0.0:
         raise InputError(
             f"{parameter} is known from design and does not move",
             "give it a standard deviation on the vehicle card, or choose another",
         )
-    tell(0.0)
-    below = _side(held, -1.0)
-    tell(0.5)
-    above = _side(held, 1.0)
+    notify_progress(0.0)
+    below = _trace_side(held, -1.0)
+    notify_progress(0.5)
+    above = _trace_side(held, 1.0)
     sides = np.array([*below[::-1], (0.0, 0.0), *above], dtype=np.float64)
     distance, rise = sides[:, 0], sides[:, 1]
     values = held.estimate + held.std * distance
-    ends = (_crossing(values[::-1], rise[::-1]), _crossing(values, rise))
+    ends = (_find_crossing(values[::-1], rise[::-1]), _find_crossing(values, rise))
     half = Z95 * held.std
     linear = (held.estimate - half, held.estimate + half)
     return Profile(parameter, values, rise, held.estimate, ends, linear)
 
 
-def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
+def get_likelihood_fit(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
     """Return the fit behind an identification and its signals.
 
     Raises IdentificationError where it is by another method, or the likelihood method gave up.
@@ -115,7 +118,7 @@ def likelihood_of(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftS
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
+class _FixedParameter:
     """Fit with one parameter to be fixed, by its index among the reported ones and its name."""
 
     fit: LikelihoodFit
@@ -123,34 +126,34 @@ class _Held:
     place: int
     parameter: str
 
-    def value(self, point: Point) -> float:
+    def compute_value(self, point: ParameterVector) -> float:
         """Compute the parameter at `point`."""
-        return list(parameters(self.fit.problem, point, self.signals).values())[self.place]
+        return list(compute_parameters(self.fit.problem, point, self.signals).values())[self.place]
 
-    def row(self, point: Point) -> FloatArray:
+    def compute_gradient(self, point: ParameterVector) -> FloatArray:
         """Compute its derivative (p,) by the unknowns."""
         std = np.sqrt(np.diag(self.fit.covariance))
-        return np.asarray(slopes(self.fit.problem, point, std, self.signals)[self.place])
+        return np.asarray(compute_jacobian(self.fit.problem, point, std, self.signals)[self.place])
 
     @property
     def estimate(self) -> float:
         """Its value at the minimum."""
-        return self.value(self.fit.point)
+        return self.compute_value(self.fit.point)
 
     @property
     def std(self) -> float:
         """Its standard deviation by the covariance."""
-        row = self.row(self.fit.point)
+        row = self.compute_gradient(self.fit.point)
         return float(np.sqrt(max(float(row @ self.fit.covariance @ row), 0.0)))
 
     @property
     def unit(self) -> float:
         """Rise of Q that counts as one: noise that is louder or slower than the sensors' shows the
         parameter less."""
-        return noise_power(self.fit, self.row(self.fit.point)[None, :])
+        return compute_variance_inflation(self.fit, self.compute_gradient(self.fit.point)[None, :])
 
 
-def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
+def _trace_side(held: _FixedParameter, sign: float) -> list[tuple[float, float]]:
     """Compute (distance in standard deviations, rise of Q) from the minimum outwards."""
     fit = held.fit
     lowest, unit = fit.normal.cost, held.unit
@@ -170,7 +173,9 @@ def _side(held: _Held, sign: float) -> list[tuple[float, float]]:
     return found
 
 
-def _minimise_at(held: _Held, start: Point, value: float) -> tuple[Point, float] | None:
+def _minimise_at(
+    held: _FixedParameter, start: ParameterVector, value: float
+) -> tuple[ParameterVector, float] | None:
     """Minimise Q with the parameter fixed at `value`; None if the simulation fails.
 
     If the parameter is itself an unknown of the fit, the damped search goes on from the constrained
@@ -180,23 +185,27 @@ def _minimise_at(held: _Held, start: Point, value: float) -> tuple[Point, float]
     reached = minimise_constrained(
         problem,
         start,
-        lambda point: value - held.value(point),
-        held.row,
+        lambda point: value - held.compute_value(point),
+        held.compute_gradient,
         PROFILE.tolerance * held.std,
     )
     if reached is None or held.parameter not in held.fit.point.names:
         return reached
     place = held.fit.point.names.index(held.parameter)
-    prior = problem.prior.held(place, value)
+    prior = problem.prior.fix_parameter(place, value)
     found = minimise(replace(problem, prior=prior), reached[0])
     if found is None:
         return reached
     point = found.point
-    cost = found.normal.cost - prior.cost(point.values) + problem.prior.cost(point.values)
+    cost = (
+        found.normal.cost
+        - prior.compute_prior_cost(point.values)
+        + problem.prior.compute_prior_cost(point.values)
+    )
     return (point, cost) if cost < reached[1] else reached
 
 
-def _crossing(values: FloatArray, rise: FloatArray) -> float:
+def _find_crossing(values: FloatArray, rise: FloatArray) -> float:
     """Find the value at which the rise passes `PROFILE.rise` outwards; infinite if it does not."""
     outwards = float(np.sign(float(values[-1]) - float(values[0])))
     start = int(np.argmin(np.abs(rise)))

@@ -10,13 +10,13 @@ import numpy as np
 
 from drivetwin._util.arrays import Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.data.vehicle_balance import (
     GROWTH,
     INERTIA,
     WIDTH,
     VehicleBalance,
-    recorded_windows,
+    build_recorded_windows,
 )
 from drivetwin.estimation.regression.errors_in_variables import Prior
 
@@ -27,7 +27,7 @@ AGREEING = 3
 
 
 @dataclass(frozen=True)
-class OwnLoad:
+class ConstantLoadFit:
     """Constant-load fit of eq. 11 over one span.
 
     `left` is the residual noise power of the best load (1: noise alone). J3 [kg m^2] and the part
@@ -40,40 +40,40 @@ class OwnLoad:
     growth: tuple[float, float]
 
 
-def own_load(
-    torque: Sampled,
-    wheel: Sampled,
+def fit_constant_load(
+    torque: MeasuredSignal,
+    wheel: MeasuredSignal,
     i_f: float,
     span: Span,
     vehicle: tuple[float, float] | None = None,
-) -> OwnLoad | None:
+) -> ConstantLoadFit | None:
     """Fit a load that is constant over `span` [s], but for what grows with the speed `wheel`.
 
     J3 and that growth too, unless the `vehicle` gives both: much more than noise is then left
     where something else moves it, a brake or a change of grade. By itself a shift would take a
     part of that for inertia. None where the span holds nothing to tell it from.
     """
-    windows = recorded_windows(torque, wheel, (span,), WIDTH / 4.0)
+    windows = build_recorded_windows(torque, wheel, (span,), WIDTH / 4.0)
     if windows.count <= UNKNOWNS:
         return None
-    balance = VehicleBalance.over(torque, wheel, (1.0, i_f), windows)
+    balance = VehicleBalance.from_torque(torque, wheel, (1.0, i_f), windows)
     square = balance.square
     width = max(float(np.ptp(square)), np.finfo(float).tiny)
     grown = (square - square.mean()) / width
-    start, prior = np.zeros(UNKNOWNS), Prior.independent(UNKNOWNS, {})
+    start, prior = np.zeros(UNKNOWNS), Prior.from_independent(UNKNOWNS, {})
     if vehicle is not None:
         start[1:] = vehicle[0], vehicle[1] * width
-        prior = prior.held(INERTIA, start[INERTIA]).held(GROWTH, start[GROWTH])
+        prior = prior.fix_parameter(INERTIA, start[INERTIA]).fix_parameter(GROWTH, start[GROWTH])
     try:
-        fit = balance.fit(grown, start, prior)
+        fit = balance.solve_load(grown, start, prior)
     except IdentificationError:
         return None
     std = fit.std
     growth = float(fit.theta[GROWTH]) / width, float(std[GROWTH]) / width
-    return OwnLoad(fit.chi2, (float(fit.theta[INERTIA]), float(std[INERTIA])), growth)
+    return ConstantLoadFit(fit.chi2, (float(fit.theta[INERTIA]), float(std[INERTIA])), growth)
 
 
-def vehicle_of(loads: Sequence[OwnLoad]) -> tuple[float, float] | None:
+def estimate_common_vehicle(loads: Sequence[ConstantLoadFit]) -> tuple[float, float] | None:
     """J3 [kg m^2] and growth of the load [N m s^2/rad^2] that most of the shifts agree on.
 
     Medians weighted by information: a shift over which the load changes takes that for inertia or
@@ -82,10 +82,12 @@ def vehicle_of(loads: Sequence[OwnLoad]) -> tuple[float, float] | None:
     told = [one for one in loads if min(one.J_vehicle[1], one.growth[1]) > 0.0]
     if len(told) < AGREEING:
         return None
-    return _median([one.J_vehicle for one in told]), _median([one.growth for one in told])
+    return _compute_weighted_median([one.J_vehicle for one in told]), _compute_weighted_median(
+        [one.growth for one in told]
+    )
 
 
-def _median(told: Sequence[tuple[float, float]]) -> float:
+def _compute_weighted_median(told: Sequence[tuple[float, float]]) -> float:
     """Median of values weighted by the inverse of their standard deviations."""
     value, std = np.array(sorted(told)).T
     share = np.cumsum(1.0 / std)

@@ -20,7 +20,7 @@ _INNER_POWER = 0.97334
 _PASSES = 10
 
 
-def white_noise(values: FloatArray, block: int = 25, spread: float = 3.0) -> float:
+def estimate_white_noise(values: FloatArray, block: int = 25, spread: float = 3.0) -> float:
     """Standard deviation of the sample-to-sample noise of `values` (n,), in their unit.
 
     The mean square of the third difference is averaged over the blocks of `block` samples whose
@@ -33,10 +33,10 @@ def white_noise(values: FloatArray, block: int = 25, spread: float = 3.0) -> flo
         return float(np.sqrt(np.mean(third**2)))
     blocks = third[: count * block].reshape(count, block) ** 2
     power = np.mean(blocks, axis=1)
-    return _without_corners(blocks[power <= spread * np.median(power)].ravel())
+    return _compute_clipped_rms(blocks[power <= spread * np.median(power)].ravel())
 
 
-def _without_corners(squares: FloatArray) -> float:
+def _compute_clipped_rms(squares: FloatArray) -> float:
     """Root mean of squares (n,) of normal deviates, those beyond `_CLIP` sigma left out."""
     level = float(np.mean(squares))
     for _ in range(_PASSES):
@@ -45,7 +45,7 @@ def _without_corners(squares: FloatArray) -> float:
     return float(np.sqrt(level))
 
 
-def resolution(values: FloatArray) -> float:
+def estimate_resolution(values: FloatArray) -> float:
     """Rounding step of a channel: the least distance of two of its numbers, of which all distances
     are multiples; 0 where there is none, or the channel moves too seldom to show it.
 

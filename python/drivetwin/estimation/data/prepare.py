@@ -13,24 +13,28 @@ from typing import Protocol
 
 import numpy as np
 
-from drivetwin._util.progress import part
+from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError, NoShiftError, Where
-from drivetwin.estimation.data.noise import resolution, white_noise
-from drivetwin.estimation.data.select_shifts import BESIDE, chosen
+from drivetwin.estimation.data.noise import estimate_resolution, estimate_white_noise
+from drivetwin.estimation.data.select_shifts import BESIDE, select_shifts
 from drivetwin.estimation.data.shift_data import (
-    Coupling,
     DesignData,
-    Driveline,
+    KnownDriveline,
+    MeasuredSignal,
     PreparedLog,
-    Sampled,
     ShiftData,
+    ShiftElementKinematics,
     ShiftSignals,
     TorqueOfSpeeds,
 )
-from drivetwin.shifts.coverage import near, recorded
-from drivetwin.shifts.lockup_clutch import behind_converter, require_closed, unseen
-from drivetwin.shifts.pressures import shift_pressures
+from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
+from drivetwin.shifts.lockup_clutch import (
+    refer_to_turbine,
+    require_locked_converter,
+    warn_unobserved_lockup,
+)
+from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -71,7 +75,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> Prepare
         )
     sampler = _Sampler()
     usable, refused = _split_usable(log, card, shifts.shifts)
-    with part(0.0, 0.05, "loads of the shifts"):
+    with scale_progress(0.0, 0.05, "loads of the shifts"):
         kept, left_out = _select(log, card, [one.shift for one in usable], sampler)
     fitted = [one for one in usable if one.shift in kept]
     first = fitted[0].log
@@ -93,7 +97,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> Prepare
         sha256=log.sha256,
         inputs={**log.inputs, **card.inputs},
         warnings=log.warnings,
-        notes=unseen(log, card),
+        notes=warn_unobserved_lockup(log, card),
     )
 
 
@@ -102,7 +106,7 @@ def prepare_shift(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftData:
 
     Raises MissingChannelError for a missing channel.
     """
-    usable = _UsableShift(shift, behind_converter(log, card, shift))
+    usable = _UsableShift(shift, refer_to_turbine(log, card, shift))
     return _prepare_shift(log, card, usable, _Sampler())
 
 
@@ -126,11 +130,11 @@ def _split_usable(
     usable: list[_UsableShift] = []
     rejected: list[RejectedShift] = []
     for shift in shifts:
-        fills = {name: card.element(name).P0 for name in (shift.offgoing, shift.oncoming)}
+        fills = {name: card.get_element(name).P0 for name in (shift.offgoing, shift.oncoming)}
         try:
-            require_closed(log, card, shift)
-            referred = behind_converter(log, card, shift)
-            trimmed = near(recorded(referred, shift, fills, card.i_in))
+            require_locked_converter(log, card, shift)
+            referred = refer_to_turbine(log, card, shift)
+            trimmed = trim_to_window(trim_to_recorded(referred, shift, fills, card.i_in))
         except (DamagedChannelError, IdentificationError) as refusal:
             if len(shifts) == len(rejected) + 1:
                 raise
@@ -157,39 +161,41 @@ def _select(
     if len(shifts) < 2:
         return tuple(shifts), ()
     if "output_torque" not in log:
-        return chosen(None, card.final_drive, shifts)
+        return select_shifts(None, card.final_drive, shifts)
     torque = sampler.sample(log["output_torque"])
     if "wheel_speed" in log:
         wheel = sampler.sample(log["wheel_speed"])
     else:
         wheel = sampler.sample(log["output_speed"], 1.0 / card.final_drive)
-    return chosen((torque, wheel), card.final_drive, shifts)
+    return select_shifts((torque, wheel), card.final_drive, shifts)
 
 
 @dataclass(eq=False)
 class _Sampler:
     """Samples of the channels of one log, each computed once."""
 
-    known: dict[tuple[Channel, float], Sampled] = field(default_factory=dict)
+    known: dict[tuple[Channel, float], MeasuredSignal] = field(default_factory=dict)
 
-    def sample(self, channel: Channel, factor: float = 1.0) -> Sampled:
+    def sample(self, channel: Channel, factor: float = 1.0) -> MeasuredSignal:
         """Return the samples of a channel times `factor`."""
         key = channel, factor
         if key not in self.known:
-            self.known[key] = sampled(channel, factor)
+            self.known[key] = prepare_signal(channel, factor)
         return self.known[key]
 
 
-def sampled(channel: Channel, factor: float = 1.0) -> Sampled:
+def prepare_signal(channel: Channel, factor: float = 1.0) -> MeasuredSignal:
     """Return the finite updates of a channel times `factor`, with their noise."""
     updates = channel.updates
     finite = np.isfinite(updates.values)
     values = factor * updates.values[finite]
-    floor = resolution(values) / np.sqrt(12.0)
-    return Sampled(updates.time[finite], values, max(white_noise(values), float(floor)))
+    floor = estimate_resolution(values) / np.sqrt(12.0)
+    return MeasuredSignal(
+        updates.time[finite], values, max(estimate_white_noise(values), float(floor))
+    )
 
 
-def pressures_of(log: ShiftLog, shift: Shift) -> dict[str, Sampled]:
+def collect_pressures(log: ShiftLog, shift: Shift) -> dict[str, MeasuredSignal]:
     """Return the pressures of both elements by name, with the noise of their whole channels.
 
     Raises MissingChannelError where one is missing.
@@ -197,10 +203,12 @@ def pressures_of(log: ShiftLog, shift: Shift) -> dict[str, Sampled]:
     return _sample_pressures(log, shift, _Sampler())
 
 
-def _sample_pressures(log: ShiftLog, shift: Shift, sampler: _Sampler) -> dict[str, Sampled]:
-    parts = shift_pressures(log, shift)
+def _sample_pressures(log: ShiftLog, shift: Shift, sampler: _Sampler) -> dict[str, MeasuredSignal]:
+    parts = get_shift_pressures(log, shift)
     return {
-        name: replace(sampler.sample(parts[name]), sigma=sampler.sample(log.pressure(name)).sigma)
+        name: replace(
+            sampler.sample(parts[name]), sigma=sampler.sample(log.get_pressure(name)).sigma
+        )
         for name in sorted(parts)
     }
 
@@ -211,9 +219,9 @@ def _prepare_shift(
     """Cut out one shift. The noise is that of whole channels; the output torque may be missing."""
     shift, referred = usable.shift, usable.log
     whole = _sample_shift(referred, card, shift, sampler)
-    driveline = driveline_of(card, shift)
+    driveline = build_driveline(card, shift)
     if referred is not log:
-        whole = replace(whole, torque_of_speeds=_torque_of_speeds(log, card, whole, sampler))
+        whole = replace(whole, torque_of_speeds=_build_speed_torque(log, card, whole, sampler))
         driveline = replace(driveline, known={**driveline.known, "te_delay": NO_AGE})
     return ShiftData(_cut(whole, (shift.before[0] - BESIDE, shift.after[1] + BESIDE)), driveline)
 
@@ -221,9 +229,9 @@ def _prepare_shift(
 def _cut(whole: ShiftSignals, span: tuple[float, float]) -> ShiftSignals:
     """Cut all signals to `span` [s]."""
 
-    def cut(signal: Sampled) -> Sampled:
+    def cut(signal: MeasuredSignal) -> MeasuredSignal:
         within = signal.time.size == 0 or (span[0] <= signal.time[0] and signal.time[-1] <= span[1])
-        return signal if within else signal.within(span)
+        return signal if within else signal.select_span(span)
 
     return replace(
         whole,
@@ -254,15 +262,15 @@ def _sample_shift(
         wheel_speed=sample(log["wheel_speed"]) if "wheel_speed" in log else None,
         pressures=_sample_pressures(log, shift, sampler),
         shift=shift,
-        torque_resolution=resolution(engine_torque.values),
+        torque_resolution=estimate_resolution(engine_torque.values),
     )
 
 
-_NOTHING = Sampled(np.empty(0), np.empty(0))
+_NOTHING = MeasuredSignal(np.empty(0), np.empty(0))
 """Samples of a sensor that the log does not have."""
 
 
-def _torque_of_speeds(
+def _build_speed_torque(
     log: ShiftLog, card: VehicleCard, behind: ShiftSignals, sampler: _Sampler
 ) -> TorqueOfSpeeds:
     """Differentiate the turbine's torque by its speed, which the fit compares."""
@@ -271,16 +279,16 @@ def _torque_of_speeds(
     time = behind.engine_torque.time
     pump, speed = (np.interp(time, one.time, one.values) for one in (engine, turbine))
     steps = max(engine.sigma, SECANT), max(turbine.sigma, SECANT)
-    by_pump, by_turbine = card.converter.turbine_slopes(pump, speed, steps)
+    by_pump, by_turbine = card.converter.compute_turbine_slopes(pump, speed, steps)
     return TorqueOfSpeeds(time, by_turbine, engine.sigma * np.abs(by_pump))
 
 
-def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
+def build_driveline(card: VehicleCard, shift: Shift) -> KnownDriveline:
     """Return the known structure in `shift`, ratios referred to the engine speed."""
     couplings = {}
     for name, spec in card.elements.items():
-        i_c, i_out = card.clutch_ratios(name)
-        couplings[name] = Coupling(
+        i_c, i_out = card.get_clutch_ratios(name)
+        couplings[name] = ShiftElementKinematics(
             name,
             1.0 / (card.i_in * i_c),
             i_out,
@@ -289,7 +297,7 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
             spec.drum_inertia,
             spec.peak,
         )
-    return Driveline(
+    return KnownDriveline(
         i_f=card.final_drive,
         offgoing=couplings[shift.offgoing],
         oncoming=couplings[shift.oncoming],
@@ -300,13 +308,15 @@ def driveline_of(card: VehicleCard, shift: Shift) -> Driveline:
     )
 
 
-def tolerances_of(log: ShiftLog, card: VehicleCard, shift: Shift) -> dict[str, SensorTolerance]:
+def collect_tolerances(
+    log: ShiftLog, card: VehicleCard, shift: Shift
+) -> dict[str, SensorTolerance]:
     """Return the card's sensor tolerances by role, with ω_e from the speed sensor that is used.
 
     A speed sensor that is not used has none. If the log's table shows values up to a row late, the
     age of each channel is uncertain by that.
     """
-    return _collect_tolerances(log, behind_converter(log, card, shift), card)
+    return _collect_tolerances(log, refer_to_turbine(log, card, shift), card)
 
 
 def _collect_tolerances(

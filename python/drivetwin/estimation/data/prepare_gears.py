@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from drivetwin._util.arrays import Span
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.data.prepare import sampled
-from drivetwin.estimation.data.shift_data import GearData, Sampled
-from drivetwin.shifts.detect import held_spans
-from drivetwin.shifts.lockup_clutch import CLOSED, converter_slip, lock_ups
+from drivetwin.estimation.data.prepare import prepare_signal
+from drivetwin.estimation.data.shift_data import GearData, MeasuredSignal
+from drivetwin.shifts.detect import find_gear_spans
+from drivetwin.shifts.lockup_clutch import CLOSED, compute_mean_slip, detect_lock_ups
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -27,21 +27,21 @@ def prepare_gears(
     """
     if not {"engine_torque", "output_speed"} <= log.channels.keys():
         return ()
-    torque, speed = sampled(log["engine_torque"]), sampled(log["output_speed"])
+    torque, speed = prepare_signal(log["engine_torque"]), prepare_signal(log["output_speed"])
     if shifts:
         spans = [(shifts[0].start_gear, shifts[0].before)]
         spans += [(s.end_gear, (s.lockup_time + SETTLED, s.after[1])) for s in shifts]
     else:
-        spans = held_spans(log, card)
+        spans = find_gear_spans(log, card)
     return tuple(
-        GearData(gear, card.ratio(gear), _trim_to_closed(log, card, span), torque, speed)
+        GearData(gear, card.compute_ratio(gear), _trim_to_closed(log, card, span), torque, speed)
         for gear, span in spans
     )
 
 
-def prepare_input_speed(log: ShiftLog) -> Sampled:
+def prepare_input_speed(log: ShiftLog) -> MeasuredSignal:
     """Return the gearbox input speed, or the engine speed in its place [rad/s]."""
-    return sampled(log["input_speed" if "input_speed" in log else "engine_speed"])
+    return prepare_signal(log["input_speed" if "input_speed" in log else "engine_speed"])
 
 
 def _trim_to_closed(log: ShiftLog, card: VehicleCard, span: Span) -> Span:
@@ -49,11 +49,11 @@ def _trim_to_closed(log: ShiftLog, card: VehicleCard, span: Span) -> Span:
 
     A gearbox without a signal of the clutch is taken to have no converter.
     """
-    closings = lock_ups(log, card)
+    closings = detect_lock_ups(log, card)
     for closing in reversed(closings):
         start, end = max(span[0], closing.time + SETTLED), min(span[1], closing.end)
         if end > start:
             return start, end
-    slip = converter_slip(log, card, span)
+    slip = compute_mean_slip(log, card, span)
     open_all_along = bool(closings) or (slip is not None and abs(slip) > CLOSED)
     return (span[1], span[1]) if open_all_along else span

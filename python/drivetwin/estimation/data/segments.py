@@ -10,9 +10,9 @@ import numpy as np
 from drivetwin._util.arrays import Span
 from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
-from drivetwin.estimation.regression.modulating_functions import Windows, windows_in
-from drivetwin.shifts.coverage import parts_between
+from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.regression.modulating_functions import Windows, build_windows
+from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
 
@@ -33,13 +33,13 @@ class MomentumSettings:
     delay_prior: PriorValue = field(default_factory=lambda: PriorValue(0.02, 0.03))
     delay_grid: tuple[float, ...] = tuple(np.linspace(-0.02, 0.08, 21).tolist())
 
-    def guard(self, boundary: str, shift: Shift) -> float:
+    def compute_guard(self, boundary: str, shift: Shift) -> float:
         """Distance kept from a phase boundary [s]: the margin and three standard deviations."""
         return self.margin + 3.0 * shift.sigma.get(boundary, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class Segment:
     """A stretch of the log where one momentum equation holds.
 
     `ratio` is i_g or i_h; `tied` says that the gear is locked, so ω_e = ratio·ω_out.
@@ -68,8 +68,8 @@ LEAST_BESIDE = 0.25
 """A gear held for less [s] beside a gap has windows that a torque as late as it may be leaves."""
 
 
-def off_going_free(
-    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
+def find_off_going_release(
+    signals: ShiftSignals, driveline: KnownDriveline, settings: MomentumSettings
 ) -> float:
     """First instant of the inertia phase at which the off-going element carries nothing [s].
 
@@ -78,11 +78,11 @@ def off_going_free(
     left of it after lock-up.
     """
     shift = signals.shift
-    start = shift.inertia_phase[0] + settings.guard("inertia_start", shift)
+    start = shift.inertia_phase[0] + settings.compute_guard("inertia_start", shift)
     element = driveline.offgoing
     pressure = signals.pressures[element.name]
     limit = element.P0.value - 2.0 * element.P0.std
-    rest, margin = _vented(pressure, shift)
+    rest, margin = _estimate_vented_pressure(pressure, shift)
     if limit < rest + margin and rest < max(VENTED * element.P0.value, margin):
         limit = rest + margin
     smooth = compute_moving_mean(pressure.values, SMOOTH)
@@ -91,17 +91,17 @@ def off_going_free(
     return float(held[-1]) if held.size else start
 
 
-def _vented(pressure: Sampled, shift: Shift) -> tuple[float, float]:
+def _estimate_vented_pressure(pressure: MeasuredSignal, shift: Shift) -> tuple[float, float]:
     """Residual off-going pressure after lock-up [Pa] and the tolerance for reaching it.
 
     The tolerance is the standard error of the mean plus a hundredth of the whole pressure drop.
     """
     spans = (np.linspace(*span, 100) for span in (shift.before, shift.after))
-    before, rest = (float(np.median(pressure.at(time))) for time in spans)
+    before, rest = (float(np.median(pressure.interpolate_at_times(time))) for time in spans)
     return rest, 5.0 * pressure.sigma / float(np.sqrt(SMOOTH)) + 0.01 * abs(before - rest)
 
 
-def _driving(torque: Sampled, windows: Windows) -> Windows:
+def _select_driving_windows(torque: MeasuredSignal, windows: Windows) -> Windows:
     """The windows in which torque flows from engine to wheels throughout.
 
     Elsewhere the dissipative loss law has another efficiency (THEORY section 3). The output
@@ -115,17 +115,17 @@ def _driving(torque: Sampled, windows: Windows) -> Windows:
     return Windows(windows.start[keep], windows.width[keep])
 
 
-def stretches(
-    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
-) -> tuple[Stretch, ...]:
+def find_segments(
+    signals: ShiftSignals, driveline: KnownDriveline, settings: MomentumSettings
+) -> tuple[Segment, ...]:
     """The stretches of a shift that carry an equation, with their windows."""
     shift = signals.shift
-    lockup = settings.guard("lockup", shift)
-    free = off_going_free(signals, driveline, settings)
+    lockup = settings.compute_guard("lockup", shift)
+    free = find_off_going_release(signals, driveline, settings)
     spans = (
         (
             "before",
-            (shift.before[0], shift.before[1] - settings.guard("torque_start", shift)),
+            (shift.before[0], shift.before[1] - settings.compute_guard("torque_start", shift)),
             True,
         ),
         ("inertia", (free, shift.lockup_time - lockup), False),
@@ -134,15 +134,15 @@ def stretches(
     found, backwards = [], False
     for name, span, tied in spans:
         ratio = driveline.i_before if name == "before" else driveline.i_after
-        for part in parts_between(span, signals.output_gaps):
+        for part in split_at_gaps(span, signals.output_gaps):
             if tied and part != span and part[1] - part[0] < LEAST_BESIDE:
                 continue
-            windows = _windows(part, settings)
+            windows = _build_span_windows(part, settings)
             if driveline.loss_law == "dissipative" and windows.count:
-                windows = _driving(signals.output_torque, windows)
+                windows = _select_driving_windows(signals.output_torque, windows)
                 backwards = backwards or not windows.count
             if windows.count:
-                found.append(Stretch(name, part, ratio, tied, windows))
+                found.append(Segment(name, part, ratio, tied, windows))
     if backwards and not found:
         raise IdentificationError(
             "nowhere does torque flow from the engine to the wheels throughout, which the momentum "
@@ -157,11 +157,11 @@ def stretches(
     return tuple(found)
 
 
-def _windows(span: Span, settings: MomentumSettings) -> Windows:
+def _build_span_windows(span: Span, settings: MomentumSettings) -> Windows:
     """Windows over a span, narrower ones where it is short; none below LEAST_SPAN."""
     length = span[1] - span[0]
     if length < LEAST_SPAN:
-        return windows_in(span, np.inf, settings.step)
+        return build_windows(span, np.inf, settings.step)
     short = length < 2.0 * settings.width
     width = settings.share * length if short else settings.width
-    return windows_in(span, width, settings.step * width / settings.width)
+    return build_windows(span, width, settings.step * width / settings.width)

@@ -14,26 +14,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.progress import tell
+from drivetwin._util.progress import notify_progress
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.load_stationarity import own_load, vehicle_of
-from drivetwin.estimation.data.segments import MomentumSettings, stretches
-from drivetwin.estimation.data.shift_data import PreparedLog, Sampled
+from drivetwin.estimation.data.load_stationarity import estimate_common_vehicle, fit_constant_load
+from drivetwin.estimation.data.segments import MomentumSettings, find_segments
+from drivetwin.estimation.data.shift_data import MeasuredSignal, PreparedLog
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 BESIDE = 10.0
 """Time of a log that is kept before and after the engaged gears of a shift [s]: smoothing and ages
 of channels reach no further."""
-MOST = 12
+MAX_SHIFTS = 12
 """Most shifts of one log in one fit."""
-CONSTANT = 5.0
+MAX_LOAD_MISFIT = 5.0
 """Noise power left by eq. 11 up to which a load counts as constant, over that of the best shift:
 braked ones and those over a change of grade leave 30 to 10000 times as much, others 0.7 to 1.5
 times. That of the best is 1, or what a delay of the sensors makes of it, which is the same in all.
 """
 
 
-def balanced(log: PreparedLog) -> PreparedLog:
+def drop_unbalanced(log: PreparedLog) -> PreparedLog:
     """Reject the shifts that a fit cannot start from, unless there would be none left.
 
     In overrun the dissipative law leaves no momentum balance.
@@ -41,7 +41,7 @@ def balanced(log: PreparedLog) -> PreparedLog:
     kept, rejected = [], []
     for one in log.shifts:
         try:
-            stretches(one.signals, one.driveline, MomentumSettings())
+            find_segments(one.signals, one.driveline, MomentumSettings())
         except IdentificationError as fault:
             shift = one.signals.shift
             span = (shift.before[1], shift.lockup_time)
@@ -53,8 +53,8 @@ def balanced(log: PreparedLog) -> PreparedLog:
     return replace(log, shifts=tuple(kept), rejected=(*log.rejected, *rejected))
 
 
-def chosen(
-    channels: tuple[Sampled, Sampled] | None, i_f: float, shifts: Sequence[Shift]
+def select_shifts(
+    channels: tuple[MeasuredSignal, MeasuredSignal] | None, i_f: float, shifts: Sequence[Shift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
     """Return the shifts to be fitted, in order of time, and those left out with the reason.
 
@@ -63,22 +63,24 @@ def chosen(
     """
     if len(shifts) < 2:
         return tuple(shifts), ()
-    left = [0.0] * len(shifts) if channels is None else _left(*channels, i_f, shifts)
-    most = CONSTANT * max(1.0, min(left))
+    left = (
+        [0.0] * len(shifts) if channels is None else _compute_load_misfits(*channels, i_f, shifts)
+    )
+    most = MAX_LOAD_MISFIT * max(1.0, min(left))
     steady = [k for k, power in enumerate(left) if power <= most]
-    taken = sorted(_first(shifts, left, steady))
+    taken = sorted(_rank_steady_shifts(shifts, left, steady))
     refused = [
-        RejectedShift((one.before[1], one.lockup_time), _reason(left[k], k in steady))
+        RejectedShift((one.before[1], one.lockup_time), _describe_rejection(left[k], k in steady))
         for k, one in enumerate(shifts)
         if k not in taken
     ]
     return tuple(shifts[k] for k in taken), tuple(refused)
 
 
-def _reason(left: float, steady: bool) -> str:
+def _describe_rejection(left: float, steady: bool) -> str:
     if steady:
         return (
-            f"not needed: {MOST} shifts of the log are fitted, of every change of gears those "
+            f"not needed: {MAX_SHIFTS} shifts of the log are fitted, of every change of gears those "
             "first whose load is the most constant; hold it out to see it predicted"
         )
     if not np.isfinite(left):
@@ -89,34 +91,38 @@ def _reason(left: float, steady: bool) -> str:
     )
 
 
-def _left(torque: Sampled, wheel: Sampled, i_f: float, shifts: Sequence[Shift]) -> list[float]:
+def _compute_load_misfits(
+    torque: MeasuredSignal, wheel: MeasuredSignal, i_f: float, shifts: Sequence[Shift]
+) -> list[float]:
     """Compute the noise power that the best constant load leaves of each shift.
 
     The vehicle is the same in all. Infinite if a shift has no information on its load.
     """
     spans = [(one.before[0], one.after[1]) for one in shifts]
     near = [(start - BESIDE, end + BESIDE) for start, end in spans]
-    seen = [(torque.within(span), wheel.within(span)) for span in near]
+    seen = [(torque.select_span(span), wheel.select_span(span)) for span in near]
     alone = []
     for k, (span, (T_o, w)) in enumerate(zip(spans, seen, strict=True)):
-        tell(0.5 * k / len(spans))
-        alone.append(own_load(T_o, w, i_f, span))
-    vehicle = vehicle_of([one for one in alone if one is not None])
+        notify_progress(0.5 * k / len(spans))
+        alone.append(fit_constant_load(T_o, w, i_f, span))
+    vehicle = estimate_common_vehicle([one for one in alone if one is not None])
     left = [float("inf") if one is None else one.left for one in alone]
     if vehicle is None:
         return left
     for k, (span, (T_o, w)) in enumerate(zip(spans, seen, strict=True)):
-        tell(0.5 + 0.5 * k / len(spans))
-        one = None if alone[k] is None else own_load(T_o, w, i_f, span, vehicle)
+        notify_progress(0.5 + 0.5 * k / len(spans))
+        one = None if alone[k] is None else fit_constant_load(T_o, w, i_f, span, vehicle)
         left[k] = float("inf") if one is None else one.left
     return left
 
 
-def _first(shifts: Sequence[Shift], left: Sequence[float], steady: Sequence[int]) -> list[int]:
+def _rank_steady_shifts(
+    shifts: Sequence[Shift], left: Sequence[float], steady: Sequence[int]
+) -> list[int]:
     """At most MOST of `steady`: the best of every change of gears, then the second best, ..."""
     kinds: dict[tuple[str, str, str], list[int]] = {}
     for k in sorted(steady, key=lambda k: left[k]):
         one = shifts[k]
         kinds.setdefault((one.start_gear, one.end_gear, one.kind), []).append(k)
     ranked = [(place, left[k], k) for same in kinds.values() for place, k in enumerate(same)]
-    return [k for _, _, k in sorted(ranked)[:MOST]]
+    return [k for _, _, k in sorted(ranked)[:MAX_SHIFTS]]

@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
-from drivetwin.channels.shiftlog import pauses
-from drivetwin.parameters import OVER_ETA, spec_of
+from drivetwin.channels.shiftlog import find_pauses
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
@@ -23,7 +23,7 @@ NO_DRUM = PriorValue(0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class MeasuredSignal:
     """One signal: `time` (n,) s increasing, `values` (n,) SI, `sigma` white noise of a sample."""
 
     time: FloatArray
@@ -33,7 +33,7 @@ class Sampled:
     @cached_property
     def gaps(self) -> tuple[Span, ...]:
         """Spans [s] between samples across which nothing is interpolated."""
-        return pauses(self.time)
+        return find_pauses(self.time)
 
     @property
     def unrecorded(self) -> tuple[Span, ...]:
@@ -44,17 +44,17 @@ class Sampled:
         first, last = float(self.time[0]), float(self.time[-1])
         return ((-np.inf, first), *self.gaps, (last, np.inf))
 
-    def at(self, time: FloatArray) -> FloatArray:
+    def interpolate_at_times(self, time: FloatArray) -> FloatArray:
         """Values at `time` (m,), linear between samples; NaN inside a gap."""
         values = np.interp(time, self.time, self.values)
         for start, end in self.gaps:
             values[(time > start) & (time < end)] = np.nan
         return values
 
-    def within(self, span: Span) -> Sampled:
+    def select_span(self, span: Span) -> MeasuredSignal:
         """The samples inside `span` [s], both ends included."""
         keep = (self.time >= span[0]) & (self.time <= span[1])
-        return Sampled(self.time[keep], self.values[keep], self.sigma)
+        return MeasuredSignal(self.time[keep], self.values[keep], self.sigma)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class TorqueOfSpeeds:
 
 
 @dataclass(frozen=True)
-class Coupling:
+class ShiftElementKinematics:
     """A shift element in the dual-clutch form: slip = a·ω_e - b·ω_out (eq. 15).
 
     `a` = 1/(i_in·i_c), `b` = i_out; its torque acts as -a·T on the engine and b·T on the output
@@ -94,16 +94,16 @@ class Coupling:
 
 
 @dataclass(frozen=True)
-class Driveline:
+class KnownDriveline:
     """Known structure during one shift. `couplings` holds every shift element by name.
 
     `known` is what is known beforehand, by parameter id, beside Jo′, P0 and drums.
     """
 
     i_f: float
-    offgoing: Coupling
-    oncoming: Coupling
-    couplings: Mapping[str, Coupling]
+    offgoing: ShiftElementKinematics
+    oncoming: ShiftElementKinematics
+    couplings: Mapping[str, ShiftElementKinematics]
     J_out: PriorValue | None
     loss_law: LossLaw = "paper"
     known: Mapping[str, PriorValue] = field(default_factory=dict)
@@ -120,7 +120,7 @@ class Driveline:
 
     def find_prior(self, name: str) -> PriorValue | None:
         """Return the prior of a reported parameter by id; None if the card has none."""
-        spec = spec_of(name)
+        spec = get_parameter_spec(name)
         ending = OVER_ETA if name.endswith(OVER_ETA) else ""
         known = self.known.get(spec.stem + ending if spec.suffix == "log" else name)
         if known is not None:
@@ -141,7 +141,7 @@ class Driveline:
         return PriorValue(value, float(np.hypot(quantity.std / eta.value, spread)))
 
     @property
-    def drums(self) -> tuple[Coupling, ...]:
+    def drums(self) -> tuple[ShiftElementKinematics, ...]:
         """Elements whose drum inertia is not zero."""
         return tuple(c for c in self.couplings.values() if c.drum.value > 0 or c.drum.std > 0)
 
@@ -155,12 +155,12 @@ class ShiftSignals:
     section 3.
     """
 
-    engine_torque: Sampled
-    output_torque: Sampled
-    engine_speed: Sampled
-    output_speed: Sampled
-    wheel_speed: Sampled | None
-    pressures: Mapping[str, Sampled]
+    engine_torque: MeasuredSignal
+    output_torque: MeasuredSignal
+    engine_speed: MeasuredSignal
+    output_speed: MeasuredSignal
+    wheel_speed: MeasuredSignal | None
+    pressures: Mapping[str, MeasuredSignal]
     shift: Shift
     torque_resolution: float = field(default=0.0)
     """Rounding step of the engine torque [N m]; 0 where none shows."""
@@ -187,7 +187,7 @@ class ShiftData:
     """Measured signals of one shift and the known structure of its driveline."""
 
     signals: ShiftSignals
-    driveline: Driveline
+    driveline: KnownDriveline
 
 
 @dataclass(frozen=True)
@@ -233,7 +233,7 @@ class PreparedLog:
         return tuple(shift.signals for shift in self.shifts)
 
     @property
-    def drivelines(self) -> tuple[Driveline, ...]:
+    def drivelines(self) -> tuple[KnownDriveline, ...]:
         """Structure of the driveline in the shifts to be fitted."""
         return tuple(shift.driveline for shift in self.shifts)
 
@@ -256,5 +256,5 @@ class GearData:
     gear: str
     ratio: float
     span: Span
-    engine_torque: Sampled
-    output_speed: Sampled
+    engine_torque: MeasuredSignal
+    output_speed: MeasuredSignal

@@ -15,17 +15,17 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray, Span
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.regression.errors_in_variables import Fit, Prior, Term, solve
 from drivetwin.estimation.regression.modulating_functions import (
     Kernels,
     Quadrature,
     Windows,
-    hann_kernels,
-    join,
-    windows_in,
+    build_hann_kernels,
+    build_windows,
+    join_windows,
 )
-from drivetwin.shifts.coverage import parts_between
+from drivetwin.shifts.coverage import split_at_gaps
 
 WIDTH = 0.4
 """Width of a window [s]."""
@@ -33,14 +33,18 @@ LOAD, INERTIA, GROWTH = range(3)
 """Places of T_v/i_f [N m], J3 [kg m^2] and growth in θ."""
 
 
-def recorded_windows(
-    torque: Sampled, speed: Sampled, spans: Sequence[Span], step: float, width: float = WIDTH
+def build_recorded_windows(
+    torque: MeasuredSignal,
+    speed: MeasuredSignal,
+    spans: Sequence[Span],
+    step: float,
+    width: float = WIDTH,
 ) -> Windows:
     """Windows of `width` every `step` [s] wherever in `spans` both were recorded; there may be
     none."""
     gaps = (*speed.unrecorded, *torque.unrecorded)
-    parts = [part for span in spans for part in parts_between(span, gaps)]
-    return join([windows_in(part, width, step) for part in parts])
+    parts = [part for span in spans for part in split_at_gaps(span, gaps)]
+    return join_windows([build_windows(part, width, step) for part in parts])
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +54,8 @@ class VehicleBalance:
     `psi` integrates the torque, `kernels` the speed.
     """
 
-    torque: Sampled
-    speed: Sampled
+    torque: MeasuredSignal
+    speed: MeasuredSignal
     ratio: float
     i_f: float
     windows: Windows
@@ -59,13 +63,17 @@ class VehicleBalance:
     kernels: Kernels
 
     @classmethod
-    def over(
-        cls, torque: Sampled, speed: Sampled, ratios: tuple[float, float], windows: Windows
+    def from_torque(
+        cls,
+        torque: MeasuredSignal,
+        speed: MeasuredSignal,
+        ratios: tuple[float, float],
+        windows: Windows,
     ) -> VehicleBalance:
         """The balance of a torque at the output shaft; `ratios` are `ratio` and i_f. Raises
         IdentificationError for a window without a sample."""
-        psi = hann_kernels(torque.time, windows).psi
-        kernels = hann_kernels(speed.time, windows)
+        psi = build_hann_kernels(torque.time, windows).psi
+        kernels = build_hann_kernels(speed.time, windows)
         return cls(torque, speed, *ratios, windows, psi, kernels)
 
     @property
@@ -91,7 +99,7 @@ class VehicleBalance:
         mean = (self.kernels.psi.matrix @ self.speed.values**2) / self.area
         return np.asarray(mean * self.ratio**2)
 
-    def fit(self, grown: FloatArray | None, start: FloatArray, prior: Prior) -> Fit:
+    def solve_load(self, grown: FloatArray | None, start: FloatArray, prior: Prior) -> Fit:
         """θ = (T_v/i_f, J3), and the growth of the load where `grown` (m,) says how far it grew.
 
         Raises IdentificationError where torque and speed do not determine θ.

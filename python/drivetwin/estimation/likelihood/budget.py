@@ -26,24 +26,24 @@ REMEDY = (
 """What to do where no search ends at a plausible minimum."""
 
 
-class OutOfWork(IdentificationError):
+class BudgetExceeded(IdentificationError):
     """The work limit of a search is exceeded."""
 
 
 @dataclass
-class Meter:
+class Budget:
     """Remaining passes."""
 
     left: float
 
 
-_present: ContextVar[Meter | None] = ContextVar("drivetwin_work", default=None)
+_present: ContextVar[Budget | None] = ContextVar("drivetwin_work", default=None)
 
 
 @contextmanager
-def at_most(passes: float) -> Iterator[Meter]:
+def limit_evaluations(passes: float) -> Iterator[Budget]:
     """Limit the work of all searches of this thread inside the block, in passes over the log."""
-    meter = Meter(passes)
+    meter = Budget(passes)
     token = _present.set(meter)
     try:
         yield meter
@@ -51,8 +51,8 @@ def at_most(passes: float) -> Iterator[Meter]:
         _present.reset(token)
 
 
-def spend(passes: float) -> None:
-    """Count work; free outside a block of `at_most`.
+def charge(passes: float) -> None:
+    """Count work; free outside a block of `limit_evaluations`.
 
     Raises OutOfWork where none is left.
     """
@@ -61,7 +61,7 @@ def spend(passes: float) -> None:
         return
     meter.left -= passes
     if meter.left < 0.0:
-        raise OutOfWork(
+        raise BudgetExceeded(
             "the search was given up without a plausible minimum when it had done the work that it "
             "may do: either its start was too far off, or the model hardly holds on this log",
             REMEDY,

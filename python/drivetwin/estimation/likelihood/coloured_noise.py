@@ -14,8 +14,8 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import Output
-from drivetwin.estimation.likelihood.objective import Part, Problem
-from drivetwin.estimation.optimize.objective import Normal
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
+from drivetwin.estimation.optimize.objective import NormalEquations
 
 BLOCK = 0.02
 """Length of a block [s]: a quarter of a period of a driveline oscillation."""
@@ -26,12 +26,14 @@ SURE = 5.0
 shows, from which it is no chance."""
 
 
-def white_of(part: Part, residual: FloatArray) -> Iterator[tuple[Output, slice, FloatArray]]:
+def split_whitened(
+    part: ShiftTerm, residual: FloatArray
+) -> Iterator[tuple[Output, slice, FloatArray]]:
     """Each output of a part, its rows among the samples (n,), and there the `residual` (n,) over
     the sensor's noise, input noise taken out. Of a right model that is white, of variance 1, or
     less at frequencies at which input noise explains a part of it.
     """
-    white = (residual - part.weighting.driven(residual)) / part.record.sigma
+    white = (residual - part.weighting.estimate_input_part(residual)) / part.record.sigma
     first = 0
     for out in part.record.outputs:
         rows = slice(first, first + out.values.size)
@@ -39,7 +41,7 @@ def white_of(part: Part, residual: FloatArray) -> Iterator[tuple[Output, slice, 
         yield out, rows, white[rows]
 
 
-def block_means(time: FloatArray, white: FloatArray) -> tuple[FloatArray, FloatArray]:
+def compute_block_means(time: FloatArray, white: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Middle times and means over blocks of `BLOCK`, scaled: white noise gives variance one."""
     size = _block(time)
     count = white.size // size
@@ -52,7 +54,9 @@ def _block(time: FloatArray) -> int:
     return max(2, round(BLOCK / float(np.median(np.diff(time)))))
 
 
-def beyond_white(problem: Problem, normal: Normal, counted: float) -> FloatArray:
+def compute_long_run_excess(
+    problem: LikelihoodObjective, normal: NormalEquations, counted: float
+) -> FloatArray:
     """Variance (p, p) of the gradient of Q/2 that slow errors of the outputs add to that of noise.
 
     Noise is `counted` so many times the sensors' power already. Errors as slow as the driveline
@@ -62,14 +66,14 @@ def beyond_white(problem: Problem, normal: Normal, counted: float) -> FloatArray
     for part, residual, regressors in zip(
         problem.parts, normal.residuals, normal.regressors, strict=True
     ):
-        for out, rows, white in white_of(part, residual):
+        for out, rows, white in split_whitened(part, residual):
             columns = out.sigma * regressors[rows]
-            excess = slow_power(part, out, rows, white) - counted
+            excess = compute_slow_power(part, out, rows, white) - counted
             found += max(excess, 0.0) * columns.T @ columns
     return found
 
 
-def slow_power(part: Part, out: Output, rows: slice, white: FloatArray) -> float:
+def compute_slow_power(part: ShiftTerm, out: Output, rows: slice, white: FloatArray) -> float:
     """Power of a sensor's noise where the driveline is slow, over that stated; 1 where the block
     means of its residual `white` (n,) may as well be those of white noise.
 
@@ -77,7 +81,7 @@ def slow_power(part: Part, out: Output, rows: slice, white: FloatArray) -> float
     told by probes: one of random sign for each block, weighted as the residual was. What is slower
     than a block, as a drift, counts with its power over a block, which is less than it does.
     """
-    _, means = block_means(part.record.time[out.place], white)
+    _, means = compute_block_means(part.record.time[out.place], white)
     if means.size == 0:
         return 1.0
     power = float(np.mean(means**2))
@@ -87,7 +91,7 @@ def slow_power(part: Part, out: Output, rows: slice, white: FloatArray) -> float
     return 1.0 + (power - usual) / own
 
 
-def _by_probes(part: Part, rows: slice, size: int) -> tuple[float, float]:
+def _by_probes(part: ShiftTerm, rows: slice, size: int) -> tuple[float, float]:
     """Power of means over `size` samples that noise of inputs and sensors leaves of the output at
     `rows`, and how much of it is this sensor's."""
     count = (rows.stop - rows.start) // size
@@ -96,6 +100,6 @@ def _by_probes(part: Part, rows: slice, size: int) -> tuple[float, float]:
     probes = np.zeros((part.record.size, PROBES))
     probes[held] = np.repeat(signs, size, axis=0) / np.sqrt(size)
     sigma = part.record.sigma[:, None]
-    left = (probes - part.weighting.driven(sigma * probes) / sigma)[held]
+    left = (probes - part.weighting.estimate_input_part(sigma * probes) / sigma)[held]
     means = left.reshape(count, size, PROBES).sum(axis=1) / np.sqrt(size)
     return float(np.mean(signs * means)), float(np.mean(means**2))

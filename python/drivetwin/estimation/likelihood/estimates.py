@@ -9,37 +9,44 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
-from drivetwin.estimation.likelihood.diagnostics.identifiability import at_limits, null_directions
-from drivetwin.estimation.likelihood.diagnostics.misspecification import left_out
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.likelihood.diagnostics.identifiability import (
+    describe_null_directions,
+    find_at_bounds,
+)
+from drivetwin.estimation.likelihood.diagnostics.misspecification import run_score_tests
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
-    against,
-    residual_tests,
-    unweighted,
+    describe_contradiction,
+    describe_unweighted,
+    run_residual_tests,
 )
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.selection.loss_law import other_law_in_words
-from drivetwin.estimation.likelihood.selection.per_shift_load import loads_of
+from drivetwin.estimation.likelihood.selection.loss_law import describe_other_law
+from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
-    absolute_ids,
-    of_log,
-    parameters,
-    slopes,
+    compute_jacobian,
+    compute_parameters,
+    list_absolute_ids,
+    make_log_id,
 )
-from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, curves_of
-from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import sensor_shifts
-from drivetwin.estimation.linear.load_balance import AERO, different_loads
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, build_friction_curves
+from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensor_shifts
+from drivetwin.estimation.linear.load_balance import AERO, describe_different_loads
 from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
-from drivetwin.estimation.result.estimate_set import Conclusions, labels_of, low_gear_notes
+from drivetwin.estimation.result.estimate_set import (
+    EstimateSet,
+    collect_low_gear_notes,
+    collect_shift_labels,
+)
 from drivetwin.estimation.result.verdict import (
     KNOWN,
-    correlation,
-    designed,
-    doubted,
-    judge,
-    judge_with_design,
-    refused,
+    assess,
+    assess_with_prior,
+    compute_correlation,
+    from_prior,
+    refuse_parameter,
+    reject_identified,
 )
 from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
@@ -56,22 +63,26 @@ WITH_PRIOR = "likelihood with design prior"
 """Method of a parameter whose own design value took part in its estimate."""
 
 
-def conclude(
+def build_estimates(
     fit: LikelihoodFit,
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     linear: Mapping[str, FrictionCurve],
     tolerances: Mapping[str, SensorTolerance],
-) -> Conclusions:
+) -> EstimateSet:
     """Judge every parameter. `linear` are the friction curves of the linear method, by element."""
-    shifts = sensor_shifts(fit, tolerances)
+    shifts = compute_sensor_shifts(fit, tolerances)
     systematic = sum(
         (np.outer(shift, shift) for shift in shifts.values()), np.zeros_like(fit.covariance)
     )
-    values = parameters(fit.problem, fit.mean, signals)
-    matrix = slopes(fit.problem, fit.mean, np.sqrt(np.diag(fit.covariance)), signals)
+    values = compute_parameters(fit.problem, fit.mean, signals)
+    matrix = compute_jacobian(fit.problem, fit.mean, np.sqrt(np.diag(fit.covariance)), signals)
     covariance = matrix @ fit.covariance @ matrix.T
-    spread = dict(zip(values, _systematic(matrix, systematic), strict=True)) if shifts else {}
+    spread = (
+        dict(zip(values, _compute_systematic_std(matrix, systematic), strict=True))
+        if shifts
+        else {}
+    )
     fitted = FittedParameters(
         ids=tuple(values),
         values=np.array([*values.values()]),
@@ -79,48 +90,51 @@ def conclude(
         std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
         driveline=drivelines[0],
         systematic=spread,
-        notes=low_gear_notes(signals),
+        notes=collect_low_gear_notes(signals),
         method=METHOD,
         prior_method=WITH_PRIOR,
     )
     ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
     limits = {
         name: text
-        for name, text in at_limits(fit, ids, matrix).items()
+        for name, text in find_at_bounds(fit, ids, matrix).items()
         if estimates[name].verdict is not Verdict.DESIGN
     }
-    estimates |= {name: doubted(estimates[name], text) for name, text in limits.items()}
-    curves = curves_of(fit, linear, systematic)
-    effects = tuple(left_out(fit))
+    estimates |= {name: reject_identified(estimates[name], text) for name, text in limits.items()}
+    curves = build_friction_curves(fit, linear, systematic)
+    effects = tuple(run_score_tests(fit))
     for effect in effects:
         estimates = effect.held_against(estimates, ids, matrix)
         curves = {name: effect.widened(fit, name, curve) for name, curve in curves.items()}
-    for why in (against(fit), unweighted(fit, labels_of(signals))):
+    for why in (
+        describe_contradiction(fit),
+        describe_unweighted(fit, collect_shift_labels(signals)),
+    ):
         if why:
-            estimates = {name: doubted(one, why) for name, one in estimates.items()}
-    estimates |= _of_what_is_fixed(fit, signals, drivelines, estimates)
-    return Conclusions(
+            estimates = {name: reject_identified(one, why) for name, one in estimates.items()}
+    estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
+    return EstimateSet(
         estimates,
         curves,
         ids,
-        correlation(covariance),
+        compute_correlation(covariance),
         (
             *dict.fromkeys(fitted.notes.values()),
             *(one.text for one in fitted.conflicts),
             *(f"{name}: {text}" for name, text in limits.items()),
-            *_warnings(fit, signals),
+            *_collect_warnings(fit, signals),
             *(one.text for one in effects),
-            *other_law_in_words(fit, values, matrix, np.sqrt(np.diag(covariance))),
+            *describe_other_law(fit, values, matrix, np.sqrt(np.diag(covariance))),
         ),
-        _load_law(fit, systematic),
-        loads_of(fit),
+        _build_load_law(fit, systematic),
+        collect_loads(fit),
     )
 
 
-def _of_what_is_fixed(
+def _estimate_fixed(
     fit: LikelihoodFit,
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     estimates: Mapping[str, Estimate],
 ) -> dict[str, Estimate]:
     """Build the estimates of quantities that the fit holds fixed: absolute values of torque-like
@@ -128,17 +142,17 @@ def _of_what_is_fixed(
     found: dict[str, Estimate] = {}
     if not signals[0].scale_known:
         eta = drivelines[0].known.get("eta")
-        for name in absolute_ids(signals):
+        for name in list_absolute_ids(signals):
             ratio = estimates.get(name + OVER_ETA)
-            found[name] = _without_scale(name, eta, ratio, drivelines[0].find_prior(name))
+            found[name] = _estimate_without_scale(name, eta, ratio, drivelines[0].find_prior(name))
     for one in (part.structure for part in fit.problem.parts):
-        if one.unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
-            name = of_log(AGE, one.log)
-            found[name] = refused(name, METHOD, NO_AGE)
+        if one.get_unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
+            name = make_log_id(AGE, one.log)
+            found[name] = refuse_parameter(name, METHOD, NO_AGE)
     return found
 
 
-def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
+def _build_load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
     """Build the load law with its growth with speed; None if the fit has a constant load."""
     if AERO not in fit.point.names:
         return None
@@ -148,7 +162,7 @@ def _load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
     return LoadLaw(fit.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
 
 
-def _without_scale(
+def _estimate_without_scale(
     name: str, eta: PriorValue | None, ratio: Estimate | None, design: PriorValue | None
 ) -> Estimate:
     """Estimate a torque-like parameter of a log without an output torque.
@@ -159,7 +173,7 @@ def _without_scale(
     if eta is None:
         return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
     if ratio is None:
-        return designed(name, eta, KNOWN)
+        return from_prior(name, eta, KNOWN)
     if ratio.value is None or ratio.std_noise is None:
         return replace(ratio, id=name)
     spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
@@ -167,23 +181,23 @@ def _without_scale(
     if ratio.verdict is Verdict.DESIGN:
         return replace(ratio, id=name, value=value, std_noise=noise, std_systematic=spread)
     if design is not None:
-        one = judge_with_design((name, value, noise), design, WITH_ETA, spread, ratio.reason)
+        one = assess_with_prior((name, value, noise), design, WITH_ETA, spread, ratio.reason)
     else:
-        one = judge(name, value, noise, WITH_ETA, spread, ratio.reason)
-    return one if ratio.verdict is Verdict.IDENTIFIED else doubted(one, "")
+        one = assess(name, value, noise, WITH_ETA, spread, ratio.reason)
+    return one if ratio.verdict is Verdict.IDENTIFIED else reject_identified(one, "")
 
 
-def _systematic(matrix: FloatArray, systematic: FloatArray) -> list[float]:
+def _compute_systematic_std(matrix: FloatArray, systematic: FloatArray) -> list[float]:
     variance = np.einsum("qp,pr,qr->q", matrix, systematic, matrix)
     return [float(np.sqrt(max(v, 0.0))) for v in variance]
 
 
-def _warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
+def _collect_warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
     texts = []
-    labels = labels_of(signals)
-    for s, label, tests in zip(signals, labels, residual_tests(fit).values(), strict=True):
+    labels = collect_shift_labels(signals)
+    for s, label, tests in zip(signals, labels, run_residual_tests(fit).values(), strict=True):
         texts += list(s.shift.warnings)
         texts += [f"{label}: {text}" for test in tests for text in test.warnings]
-    if why := unweighted(fit, labels):
+    if why := describe_unweighted(fit, labels):
         texts.append(why)
-    return (*texts, *null_directions(fit), *different_loads(loads_of(fit)))
+    return (*texts, *describe_null_directions(fit), *describe_different_loads(collect_loads(fit)))

@@ -22,204 +22,215 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
-from drivetwin.estimation.likelihood.budget import EXPANSION, RUN, WEIGHTING, spend
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Record
-from drivetwin.estimation.likelihood.noise.linear_response import Response, observed, response_of
-from drivetwin.estimation.likelihood.noise.residual_covariance import (
-    Whiteness,
-    sensor_noise,
-    with_input_noise,
+from drivetwin.estimation.likelihood.budget import EXPANSION, RUN, WEIGHTING, charge
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
+from drivetwin.estimation.likelihood.noise.linear_response import (
+    LinearResponse,
+    build_output_row,
+    linearise_run,
 )
-from drivetwin.estimation.likelihood.parametrization import TE_OFFSET, Structure, retract
-from drivetwin.estimation.optimize.objective import Normal, Point
+from drivetwin.estimation.likelihood.noise.residual_covariance import (
+    Whitener,
+    add_input_noise,
+    build_sensor_whitener,
+)
+from drivetwin.estimation.likelihood.parametrization import TE_OFFSET, ShiftModel, retract
+from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import (
     Sensitivities,
     Signal,
     Trajectory,
-    sensitivities,
     simulate,
+    simulate_sensitivities,
 )
 
-LARGEST = 1e9
+MAX_RESIDUAL_SIGMA = 1e9
 """Residual in standard deviations from which a run counts as failed."""
-ROUND_OFF = 1e-6
+SQUARE_RTOL = 1e-6
 """What a sum of squares may be negative by, relative to the squares in it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ShiftTerm:
     """One shift: its structure, what was recorded, and the weighting of its residuals.
 
     `record` has the inputs that drive the run; `returned` (n,) is G·(u - û), what those held back
     would do, 0 before the part is weighted by input noise.
     """
 
-    structure: Structure
-    record: Record
-    weighting: Whiteness
+    structure: ShiftModel
+    record: ShiftRecord
+    weighting: Whitener
     returned: FloatArray | float = 0.0
 
     @classmethod
-    def unweighted(cls, structure: Structure, record: Record) -> Part:
+    def from_sensor_noise(cls, structure: ShiftModel, record: ShiftRecord) -> ShiftTerm:
         """Build a part whose residuals are weighted by the sensors' noise alone."""
-        return cls(structure, record, sensor_noise(record))
+        return cls(structure, record, build_sensor_whitener(record))
 
     @property
     def scale_known(self) -> bool:
         """True if an output torque is among the compared signals."""
         return any(out.name == "output_torque" for out in self.record.outputs)
 
-    def run(self, point: Point) -> Trajectory | None:
+    def simulate(self, point: ParameterVector) -> Trajectory | None:
         """Simulate the part at `point`; None if the simulation fails or does not reach the end."""
         try:
             found = simulate(
-                self.structure.model(point),
-                self._torque(point),
-                self._pressures(),
-                self.structure.start(point),
+                self.structure.build_model(point),
+                self._get_torque(point),
+                self._get_pressures(),
+                self.structure.build_start(point),
                 self.record.time,
             )
         except InputError:
             return None
-        return found if self._whole(found) else None
+        return found if self._is_complete(found) else None
 
-    def _whole(self, run: Trajectory) -> bool:
+    def _is_complete(self, run: Trajectory) -> bool:
         """Return whether a run reached its end with residuals that can be squared."""
-        worst = np.max(np.abs(self.residual(run)) / self.record.sigma)
-        return run.status == "completed" and bool(worst < LARGEST)
+        worst = np.max(np.abs(self.compute_residual(run)) / self.record.sigma)
+        return run.status == "completed" and bool(worst < MAX_RESIDUAL_SIGMA)
 
-    def residual(self, run: Trajectory) -> FloatArray:
+    def compute_residual(self, run: Trajectory) -> FloatArray:
         """Compute measured minus simulated (n,), the latter as for the measured inputs."""
-        return self.record.measured - self.record.stacked(run) - self.returned
+        return self.record.measured - self.record.sample_run(run) - self.returned
 
-    def linearised(self, point: Point) -> tuple[FloatArray, FloatArray] | None:
+    def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
         `point`."""
-        names, matrix = self.structure.slopes(point)
-        model = self.structure.model(point)
+        names, matrix = self.structure.compute_jacobian(point)
+        model = self.structure.build_model(point)
         try:
-            found: Sensitivities = sensitivities(
+            found: Sensitivities = simulate_sensitivities(
                 model,
-                self._torque(point),
-                self._pressures(),
-                self.structure.start(point),
+                self._get_torque(point),
+                self._get_pressures(),
+                self.structure.build_start(point),
                 self.record.time,
                 names,
             )
         except InputError:
             return None
-        if not self._whole(found.run):
+        if not self._is_complete(found.run):
             return None
-        columns = np.column_stack([self.record.stacked(found.derivatives[n]) for n in names])
+        columns = np.column_stack([self.record.sample_run(found.derivatives[n]) for n in names])
         acting = np.any(matrix != 0.0, axis=0)  # a part depends on few unknowns
         slopes = np.zeros((len(columns), acting.size))
         slopes[:, acting] = columns @ matrix[:, acting]
-        response = self.response(point, found.run)
-        for name, disturbance in self._torque_changes(point).items():
-            answer = self.seen(point, response.to({TORQUE: disturbance}))
+        response = self.compute_response(point, found.run)
+        for name, disturbance in self._compute_torque_changes(point).items():
+            answer = self.observe(point, response.propagate_inputs({TORQUE: disturbance}))
             slopes[:, point.names.index(name)] = answer
         if not np.all(np.isfinite(slopes)):
             return None
-        return self.residual(found.run), slopes
+        return self.compute_residual(found.run), slopes
 
-    def _torque_changes(self, point: Point) -> dict[str, FloatArray]:
+    def _compute_torque_changes(self, point: ParameterVector) -> dict[str, FloatArray]:
         """Compute the change (N-1,) of the acting engine torque per unit of its own unknowns.
 
         The rate is that of the torque without noise: jitter has no age, and would seem to show one.
         """
         found = {}
-        age, offset = self.structure.unknown("te_delay"), self.structure.unknown(TE_OFFSET)
+        age, offset = self.structure.get_unknown("te_delay"), self.structure.get_unknown(TE_OFFSET)
         if age in point.names:
-            found[age] = self.record.torque_rate(point[age])
+            found[age] = self.record.compute_torque_rate(point[age])
         if offset in point.names:
             found[offset] = np.full(self.record.time.size - 1, -1.0)
         return found
 
-    def response(self, point: Point, run: Trajectory) -> Response:
+    def compute_response(self, point: ParameterVector, run: Trajectory) -> LinearResponse:
         """Compute the linear response to disturbances of the inputs around `run`."""
-        return response_of(self.structure.model(point), run, self.record)
+        return linearise_run(self.structure.build_model(point), run, self.record)
 
-    def answer_to(
-        self, point: Point, run: Trajectory, disturbance: dict[str, FloatArray]
+    def respond_to_inputs(
+        self, point: ParameterVector, run: Trajectory, disturbance: dict[str, FloatArray]
     ) -> FloatArray:
         """Compute the change (n,) of the simulated samples by disturbances (N-1,) of inputs, by
         name."""
-        return self.seen(point, self.response(point, run).to(disturbance))
+        return self.observe(point, self.compute_response(point, run).propagate_inputs(disturbance))
 
-    def answer_to_force(self, point: Point, run: Trajectory, force: FloatArray) -> FloatArray:
+    def respond_to_forces(
+        self, point: ParameterVector, run: Trajectory, force: FloatArray
+    ) -> FloatArray:
         """Compute the change (n,) of the simulated samples by torques (N-1, 4) on the speeds of
         engine, output and wheel."""
-        return self.seen(point, self.response(point, run).forced(force))
+        return self.observe(point, self.compute_response(point, run).propagate_forces(force))
 
-    def seen(self, point: Point, z: FloatArray) -> FloatArray:
+    def observe(self, point: ParameterVector, z: FloatArray) -> FloatArray:
         """Project disturbances z (N, 4) of the state onto the compared samples (n,)."""
-        model = self.structure.model(point)
+        model = self.structure.build_model(point)
         with np.errstate(over="ignore", invalid="ignore"):
             return np.concatenate(
-                [z[out.centre] @ observed(model, out.name) for out in self.record.outputs]
+                [z[out.centre] @ build_output_row(model, out.name) for out in self.record.outputs]
             )
 
-    def weighted_by(self, point: Point) -> Part:
+    def update_weighting(self, point: ParameterVector) -> ShiftTerm:
         """Form the covariance of output and input noise at `point`.
 
         Returns the part unchanged if the simulation fails there or has no finite response.
         """
-        return self._weighted(point) or self
+        return self._update_weighting(point) or self
 
-    def with_expected_inputs(self, point: Point) -> Part:
+    def update_inputs(self, point: ParameterVector) -> ShiftTerm:
         """Subtract the expected input noise at `point` from the inputs, and form the weighting
         there.
 
         Returns the part unchanged if the simulation fails with the new inputs.
         """
-        run = self.run(point)
-        noise = {} if run is None else self.weighting.input_noise(self.residual(run))
+        run = self.simulate(point)
+        noise = (
+            {} if run is None else self.weighting.estimate_input_noise(self.compute_residual(run))
+        )
         if not noise:
             return self
-        age = self.structure.value(point, "te_delay")
-        return replace(self, record=self.record.less(noise, age))._weighted(point) or self
+        age = self.structure.get_value(point, "te_delay")
+        return (
+            replace(self, record=self.record.subtract_noise(noise, age))._update_weighting(point)
+            or self
+        )
 
-    def _weighted(self, point: Point) -> Part | None:
+    def _update_weighting(self, point: ParameterVector) -> ShiftTerm | None:
         """Form weighting and the effect of the held-back inputs at `point`; None if no run."""
-        run = self.run(point)
+        run = self.simulate(point)
         if run is None:
             return None
-        model = self.structure.model(point)
-        response = response_of(model, run, self.record)
+        model = self.structure.build_model(point)
+        response = linearise_run(model, run, self.record)
         if not response.finite:
             return None
         try:
-            weighting = with_input_noise(model, self.record, response)
+            weighting = add_input_noise(model, self.record, response)
         except np.linalg.LinAlgError:
             return None
-        held_back = self.record.held_back_over(self.structure.value(point, "te_delay"))
-        returned = self.seen(point, response.to(held_back))
+        held_back = self.record.interpolate_held_back(self.structure.get_value(point, "te_delay"))
+        returned = self.observe(point, response.propagate_inputs(held_back))
         return replace(self, weighting=weighting, returned=returned)
 
-    def _pressures(self) -> dict[str, Signal]:
+    def _get_pressures(self) -> dict[str, Signal]:
         """Return the pressures of all elements of the model; zero for those that stay open."""
         ends = self.record.time[[0, -1]]
         idle = {one.name: Signal(ends, np.zeros(2)) for one in self.structure.spinning}
         return {**self.record.pressures, **idle}
 
-    def _torque(self, point: Point) -> Signal:
+    def _get_torque(self, point: ParameterVector) -> Signal:
         """Return the engine torque as it acts: measured, less its mean error, advanced by its
         delay."""
         signal = self.record.engine_torque
         values = signal.values
-        offset = self.structure.unknown(TE_OFFSET)
+        offset = self.structure.get_unknown(TE_OFFSET)
         if offset in point.names:
             values = values - point[offset]
-        delay = self.structure.value(point, "te_delay")
+        delay = self.structure.get_value(point, "te_delay")
         return Signal(signal.time, values, -delay)
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class LikelihoodObjective:
     """All parts with the prior and bounds of their unknowns; `lower`, `upper` (p,)."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[ShiftTerm, ...]
     prior: Prior
     lower: FloatArray
     upper: FloatArray
@@ -239,57 +250,63 @@ class Problem:
         """Names of the signals that are of another kind than read, as in `Record.kinds`."""
         return frozenset[str]().union(*(part.record.kinds for part in self.parts))
 
-    def of_kinds(self, names: Collection[str]) -> Problem:
+    def select_modes(self, names: Collection[str]) -> LikelihoodObjective:
         """Set the sampling modes of all signals to those of `names`; all must be as read."""
-        parts = [Part.unweighted(p.structure, p.record.of_kinds(names)) for p in self.parts]
+        parts = [
+            ShiftTerm.from_sensor_noise(p.structure, p.record.select_modes(names))
+            for p in self.parts
+        ]
         return replace(self, parts=tuple(parts))
 
-    def until(self, ends: Sequence[float]) -> Problem:
+    def cut(self, ends: Sequence[float]) -> LikelihoodObjective:
         """Cut each part at its end [s]; weighted by sensor noise."""
         cut = [
-            Part.unweighted(part.structure, part.record.until(end))
+            ShiftTerm.from_sensor_noise(part.structure, part.record.cut(end))
             for part, end in zip(self.parts, ends, strict=True)
         ]
         return replace(self, parts=tuple(cut))
 
-    def weighted_by(self, point: Point) -> Problem:
+    def update_weighting(self, point: ParameterVector) -> LikelihoodObjective:
         """Form the covariance with input noise at `point`."""
-        spend(WEIGHTING)
-        return replace(self, parts=tuple(part.weighted_by(point) for part in self.parts))
+        charge(WEIGHTING)
+        return replace(self, parts=tuple(part.update_weighting(point) for part in self.parts))
 
-    def with_expected_inputs(self, point: Point) -> Problem:
+    def update_inputs(self, point: ParameterVector) -> LikelihoodObjective:
         """Drive the problem by the expected inputs at `point`, weighted there."""
-        return replace(self, parts=tuple(part.with_expected_inputs(point) for part in self.parts))
+        return replace(self, parts=tuple(part.update_inputs(point) for part in self.parts))
 
-    def cost(self, point: Point) -> float:
+    def cost(self, point: ParameterVector) -> float:
         """Compute Q; infinite if a simulation fails or Q is not a sum of squares."""
-        spend(RUN)
-        total = self.prior.cost(point.values)
+        charge(RUN)
+        total = self.prior.compute_prior_cost(point.values)
         for part in self.parts:
-            run = part.run(point)
+            run = part.simulate(point)
             if run is None:
                 return float("inf")
-            residual = part.residual(run)
+            residual = part.compute_residual(run)
             with np.errstate(over="ignore", invalid="ignore"):
-                square = float(residual @ part.weighting.weighted(residual))
+                square = float(residual @ part.weighting.apply_inverse(residual))
             if not _is_square(square):
                 return float("inf")
             total += square
         return total
 
-    def retract(self, point: Point, step: FloatArray) -> FloatArray:
+    def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
         """Compute the values (p,) after a `step` (p,); friction laws move along their valley."""
         return retract(point, step)
 
-    def normal(self, point: Point) -> Normal | None:
+    def normal(self, point: ParameterVector) -> NormalEquations | None:
         """Compute the expansion of Q at `point`; None if a simulation fails."""
-        spend(EXPANSION)
+        charge(EXPANSION)
         size = len(point.names)
-        cost, gradient = self.prior.cost(point.values), self.prior.pull(point.values)
+        cost, gradient = (
+            self.prior.compute_prior_cost(point.values),
+            self.prior.compute_gradient(point.values),
+        )
         data = np.zeros((size, size))
         residuals, regressors = [], []
         for part in self.parts:
-            found = part.linearised(point)
+            found = part.linearise(point)
             if found is None:
                 return None
             residual, slopes = found
@@ -297,7 +314,7 @@ class Problem:
             own = slopes[:, acting]
             regressor = np.zeros_like(slopes)
             with np.errstate(over="ignore", invalid="ignore"):
-                weighted = part.weighting.weighted(np.column_stack([residual, own]))
+                weighted = part.weighting.apply_inverse(np.column_stack([residual, own]))
                 regressor[:, acting] = weighted[:, 1:]
                 square = float(residual @ weighted[:, 0])
                 gradient[acting] -= own.T @ weighted[:, 0]
@@ -308,10 +325,12 @@ class Problem:
             residuals.append(residual)
             regressors.append(regressor)
         data = 0.5 * (data + data.T)
-        if not (np.all(np.isfinite(data)) and _are_products(data)):
+        if not (np.all(np.isfinite(data)) and _is_semidefinite(data)):
             return None
         information = data + self.prior.precision
-        return Normal(cost, gradient, information, data, tuple(residuals), tuple(regressors))
+        return NormalEquations(
+            cost, gradient, information, data, tuple(residuals), tuple(regressors)
+        )
 
 
 def _is_square(value: float) -> bool:
@@ -323,7 +342,7 @@ def _is_square(value: float) -> bool:
     return bool(np.isfinite(value)) and value >= 0.0
 
 
-def _are_products(data: FloatArray) -> bool:
+def _is_semidefinite(data: FloatArray) -> bool:
     """Return whether a matrix can be one of weighted scalar products of slopes.
 
     A weighting that has lost its digits gives some directions a negative length.
@@ -332,4 +351,4 @@ def _are_products(data: FloatArray) -> bool:
     if np.any(squares < 0.0):
         return False
     length = np.sqrt(np.where(squares > 0.0, squares, 1.0))
-    return bool(np.linalg.eigvalsh(data / np.outer(length, length))[0] > -ROUND_OFF)
+    return bool(np.linalg.eigvalsh(data / np.outer(length, length))[0] > -SQUARE_RTOL)

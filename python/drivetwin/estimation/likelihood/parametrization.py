@@ -18,10 +18,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import Coupling, Driveline
-from drivetwin.estimation.linear.friction_points import stribeck
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftElementKinematics
+from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.load_balance import AERO
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     LossLaw,
@@ -35,28 +35,28 @@ COMMON = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_de
 """Unknowns of the driveline, the same in all shifts."""
 TE_OFFSET = "te_offset"
 """Mean rounding error of the engine torque [N m]: what is read is the truth plus this."""
-OWN = ("Tv_over_if", "te_delay", TE_OFFSET)
+LOG_SPECIFIC = ("Tv_over_if", "te_delay", TE_OFFSET)
 """Unknowns that each of several logs has of its own: road, logger and rounding differ."""
 LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
 NO_LAW = (0.1, 0.1, 1.0, 0.0)
 """Any friction law, for an element without pressure."""
 START = ("speed", "wheel_speed", "twist")
 """Unknowns of the start of each shift's run: ω_out and ω_w [rad/s], shaft twist [rad]."""
-DEPARTURE = "load"
+LOAD_DEVIATION = "load"
 """Unknown of each shift but the first of a log on a hilly road: d, its load at the output shaft
 less the mean over the shifts of the log [N m]."""
 RETRACTION_SLIPS = np.array([2.0, 25.0, 80.0])
 """Slips [rad/s] at which a law takes its step: near lock-up, in the middle, at the start."""
-OF_RUN = (*START, DEPARTURE)
+RUN_SPECIFIC = (*START, LOAD_DEVIATION)
 """All unknowns that belong to the run of one shift, by what follows its label and the dot."""
 
 
-def own_of(log: int) -> dict[str, str]:
+def map_log_names(log: int) -> dict[str, str]:
     """Map the log-specific names `OWN` to their unknowns in one of several logs, numbered from 1.
 
     Empty for log 0, the only one.
     """
-    return {name: f"log{log}.{name}" for name in OWN} if log else {}
+    return {name: f"log{log}.{name}" for name in LOG_SPECIFIC} if log else {}
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Tie:
 
 
 @dataclass(frozen=True)
-class Structure:
+class ShiftModel:
     """Fixed description of one shift: its elements and every value that is not estimated.
 
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
@@ -79,7 +79,7 @@ class Structure:
     not.
     """
 
-    driveline: Driveline
+    driveline: KnownDriveline
     loss_law: LossLaw
     label: str
     fixed: Mapping[str, float]
@@ -89,104 +89,110 @@ class Structure:
     departure: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def elements(self) -> tuple[Coupling, Coupling]:
+    def elements(self) -> tuple[ShiftElementKinematics, ShiftElementKinematics]:
         """Off-going and on-coming element."""
         return (self.driveline.offgoing, self.driveline.oncoming)
 
     @property
-    def spinning(self) -> tuple[Coupling, ...]:
+    def spinning(self) -> tuple[ShiftElementKinematics, ...]:
         """Elements open throughout whose drums turn with their slip all the same."""
         taking_part = [one.name for one in self.elements]
         return tuple(one for one in self.driveline.drums if one.name not in taking_part)
 
-    def value(self, point: Point, name: str) -> float:
+    def get_value(self, point: ParameterVector, name: str) -> float:
         """Return the value of an unknown, free, fixed or tied."""
         if name == "J_e" and self.tie is not None:
-            return self.tie.inertia - self.value(point, "J_out") / self.tie.ratio**2
-        free = self.unknown(name)
+            return self.tie.inertia - self.get_value(point, "J_out") / self.tie.ratio**2
+        free = self.get_unknown(name)
         return point[free] if free in point.names else self.fixed[name]
 
-    def unknown(self, name: str) -> str:
+    def get_unknown(self, name: str) -> str:
         """Return the name of the unknown that stands for `name` in this shift's log."""
-        return own_of(self.log).get(name, name)
+        return map_log_names(self.log).get(name, name)
 
-    def model(self, point: Point) -> DualClutch:
+    def build_model(self, point: ParameterVector) -> DualClutch:
         """Build the model to be simulated at `point`."""
-        eta = self.value(point, "eta")
+        eta = self.get_value(point, "eta")
         return DualClutch(
-            J1=self.value(point, "J_e") / eta,
+            J1=self.get_value(point, "J_e") / eta,
             J2e=0.0,
             eta=eta,
             loss_law=self.loss_law,
             i_in=1.0,
-            J_out=self.value(point, "J_out"),
+            J_out=self.get_value(point, "J_out"),
             i_f=self.driveline.i_f,
-            J_v=self.value(point, "J_vehicle"),
-            k_o=self.value(point, "k_o"),
-            c_o=self.value(point, "c_o"),
-            load=self._load(point),
+            J_v=self.get_value(point, "J_vehicle"),
+            k_o=self.get_value(point, "k_o"),
+            c_o=self.get_value(point, "c_o"),
+            load=self._build_load(point),
             elements=(
-                *(self._element(point, one) for one in self.elements),
-                *(self._drum(point, one) for one in self.spinning),
+                *(self._build_element(point, one) for one in self.elements),
+                *(self._build_drum(point, one) for one in self.spinning),
             ),
         )
 
-    def _load(self, point: Point) -> RoadLoad:
-        aero = self.value(point, AERO)
-        mean = self.load(point) * self.driveline.i_f
+    def _build_load(self, point: ParameterVector) -> RoadLoad:
+        aero = self.get_value(point, AERO)
+        mean = self.compute_load(point) * self.driveline.i_f
         return RoadLoad(constant=mean - aero * self.mean_speed**2, aero=aero)
 
-    def load(self, point: Point) -> float:
+    def compute_load(self, point: ParameterVector) -> float:
         """Compute the load of this shift at the output shaft [N m], at the mean speed of its
         log."""
         departure = sum(factor * point[name] for name, factor in self.departure.items())
-        return self.value(point, "Tv_over_if") + departure
+        return self.get_value(point, "Tv_over_if") + departure
 
-    def _element(self, point: Point, one: Coupling) -> ShiftElement:
-        c, drop, v, ln_v_s = (self.value(point, f"{one.name}.{key}") for key in LAW)
+    def _build_element(self, point: ParameterVector, one: ShiftElementKinematics) -> ShiftElement:
+        c, drop, v, ln_v_s = (self.get_value(point, f"{one.name}.{key}") for key in LAW)
         return ShiftElement(
             name=one.name,
             i_c=1.0 / one.a,
             i_out=one.b,
             gain=one.gain,
-            P0=self.value(point, f"{one.name}.P0"),
+            P0=self.get_value(point, f"{one.name}.P0"),
             friction=Stribeck(c, c + drop, float(np.exp(ln_v_s)), v),
             peak=one.peak,
-            drum_inertia=self.value(point, f"{one.name}.drum"),
+            drum_inertia=self.get_value(point, f"{one.name}.drum"),
         )
 
-    def _drum(self, point: Point, one: Coupling) -> ShiftElement:
+    def _build_drum(self, point: ParameterVector, one: ShiftElementKinematics) -> ShiftElement:
         """Build an element of which only the drum acts."""
-        drum = self.value(point, f"{one.name}.drum")
+        drum = self.get_value(point, f"{one.name}.drum")
         law = Stribeck(*NO_LAW)
         return ShiftElement(one.name, 1.0 / one.a, one.b, one.gain, one.P0.value, law, 1.0, drum)
 
-    def start(self, point: Point) -> State:
+    def build_start(self, point: ParameterVector) -> State:
         """Build the initial state of the run at `point`: the off-going element is locked."""
         speed, wheel, twist = (point[f"{self.label}.{key}"] for key in START)
         ratio = self.driveline.i_before
         return State(ratio * speed, speed, wheel, twist, (self.driveline.offgoing.name,))
 
-    def slopes(self, point: Point) -> tuple[tuple[str, ...], FloatArray]:
+    def compute_jacobian(self, point: ParameterVector) -> tuple[tuple[str, ...], FloatArray]:
         """Compute the core's names (m,) and the derivative of their values by `point` (m, p)."""
-        entries = [entry for name in point.names for entry in self._entries(point, name)]
+        entries = [entry for name in point.names for entry in self._iterate_entries(point, name)]
         core = tuple(dict.fromkeys(entry[0] for entry in entries))
         matrix = np.zeros((len(core), len(point.names)))
         for known, name, slope in entries:
             matrix[core.index(known), point.names.index(name)] = slope
         return core, matrix
 
-    def _entries(self, point: Point, name: str) -> Iterator[tuple[str, str, float]]:
+    def _iterate_entries(
+        self, point: ParameterVector, name: str
+    ) -> Iterator[tuple[str, str, float]]:
         """Yield (name in the core, unknown, derivative) of one unknown; nothing for foreign
         ones."""
-        i_f, eta, J_e = self.driveline.i_f, self.value(point, "eta"), self.value(point, "J_e")
+        i_f, eta, J_e = (
+            self.driveline.i_f,
+            self.get_value(point, "eta"),
+            self.get_value(point, "J_e"),
+        )
         by_tie = 0.0 if self.tie is None else -1.0 / (self.tie.ratio**2 * eta)
         table: dict[str, Sequence[tuple[str, float]]] = {
             "eta": (("eta", 1.0), ("J1", -J_e / eta**2)),
             "J_e": (("J1", 1.0 / eta),),
             "J_out": (("J_out", 1.0), ("J1", by_tie)),
             "J_vehicle": (("J_v", 1.0),),
-            self.unknown("Tv_over_if"): (("load.constant", i_f),),
+            self.get_unknown("Tv_over_if"): (("load.constant", i_f),),
             AERO: (("load.aero", 1.0), ("load.constant", -(self.mean_speed**2))),
             "k_o": (("k_o", 1.0),),
             "c_o": (("c_o", 1.0),),
@@ -200,7 +206,7 @@ class Structure:
         for own, factor in self.departure.items():
             table[own] = (("load.constant", factor * i_f),)
         for one in self.elements:
-            v_s = float(np.exp(self.value(point, f"{one.name}.ln_v_s")))
+            v_s = float(np.exp(self.get_value(point, f"{one.name}.ln_v_s")))
             fields = {
                 "P0": (("P0", 1.0),),
                 "mu_c": (("mu_c", 1.0), ("mu_s", 1.0)),
@@ -217,7 +223,7 @@ class Structure:
             yield known, name, slope
 
 
-def retract(point: Point, step: FloatArray) -> FloatArray:
+def retract(point: ParameterVector, step: FloatArray) -> FloatArray:
     """Compute the values (p,) after a `step` (p,), straight in the friction laws' own values.
 
     The four coefficients of a Stribeck law nearly compensate each other if v_s is as large as the
@@ -230,15 +236,15 @@ def retract(point: Point, step: FloatArray) -> FloatArray:
         if key != LAW[-1]:
             continue
         index = [point.names.index(f"{element}.{coefficient}") for coefficient in LAW]
-        mu, slopes = stribeck(point.values[index], RETRACTION_SLIPS)
+        mu, slopes = evaluate_stribeck(point.values[index], RETRACTION_SLIPS)
         target = mu + slopes.T @ step[index]
-        _, linear = stribeck(values[index], RETRACTION_SLIPS)
+        _, linear = evaluate_stribeck(values[index], RETRACTION_SLIPS)
         values[index[:-1]] = np.linalg.solve(linear[:-1].T, target)
     return values
 
 
-def departures_of(loads: Sequence[float]) -> dict[str, float]:
+def build_load_deviations(loads: Sequence[float]) -> dict[str, float]:
     """Start values of T_v/i_f and of the departures of all shifts of one log with `loads` [N m]."""
     mean = float(np.mean(loads))
-    own = {f"start{k}.{DEPARTURE}": load - mean for k, load in enumerate(loads)}
+    own = {f"start{k}.{LOAD_DEVIATION}": load - mean for k, load in enumerate(loads)}
     return {"Tv_over_if": mean, **own}

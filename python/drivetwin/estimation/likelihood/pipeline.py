@@ -8,19 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.display_units import in_units
-from drivetwin.estimation.data.shift_data import DesignData, Driveline, ShiftSignals
-from drivetwin.estimation.likelihood.estimates import conclude
+from drivetwin._util.display_units import format_with_unit
+from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
+from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.initial_guess import guess_of
+from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque import (
-    guess_without_torque,
+    estimate_without_torque,
 )
-from drivetwin.estimation.likelihood.parametrization import DEPARTURE, departures_of
-from drivetwin.estimation.likelihood.selection.select_model import choose
+from drivetwin.estimation.likelihood.parametrization import LOAD_DEVIATION, build_load_deviations
+from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.linear.pipeline import IntegralShift
-from drivetwin.estimation.result.estimate_set import Conclusions
+from drivetwin.estimation.result.estimate_set import EstimateSet
 
 DISAGREE = 5.0
 """Difference of the two methods in its standard deviations from which a warning is due."""
@@ -33,37 +33,37 @@ OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
 """What a method reads off a load that it takes as constant."""
 
 
-def likelihood_alone(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], design: DesignData
-) -> tuple[Conclusions, LikelihoodFit]:
+def estimate_without_linear(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline], design: DesignData
+) -> tuple[EstimateSet, LikelihoodFit]:
     """Fit without the linear method.
 
     For a log without an output torque, which gives ratios over η and no absolute values, and for a
     log without an equation for the linear method. Raises IdentificationError if the fit does not
     reach a plausible minimum.
     """
-    guess = _own_guess(signals, drivelines, design)
-    best, notes = choose(signals, drivelines, design.loss_law, guess)
-    told = conclude(best, signals, drivelines, {}, design.sensors)
+    guess = _compute_own_guess(signals, drivelines, design)
+    best, notes = select_model(signals, drivelines, design.loss_law, guess)
+    told = build_estimates(best, signals, drivelines, {}, design.sensors)
     return replace(told, warnings=(*told.warnings, *notes)), best
 
 
-def _own_guess(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], design: DesignData
+def _compute_own_guess(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline], design: DesignData
 ) -> dict[str, float]:
     """Compute an initial value of every unknown without the linear method."""
     guess: dict[str, float] = {}
     loads = []
     for s, d in zip(signals, drivelines, strict=True):
-        found = guess_without_torque(s, d, design)
+        found = estimate_without_torque(s, d, design)
         loads.append(found["Tv_over_if"])
         guess = found | guess
-    return guess | departures_of(loads)
+    return guess | build_load_deviations(loads)
 
 
-def _guess(
+def _compute_guess(
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     shifts: Sequence[IntegralShift],
     design: DesignData,
 ) -> dict[str, float]:
@@ -73,34 +73,34 @@ def _guess(
     Without a wheel speed that method takes the output speed for it, and where the shaft is soft
     its swing hides how little the vehicle's speed changes.
     """
-    found = guess_of(shifts, drivelines)
+    found = estimate_initial_values(shifts, drivelines)
     low, high = design.J_vehicle_range
     if low / OUTSIDE < found["J_vehicle"] < high * OUTSIDE:
         return found
-    own = _own_guess(signals, drivelines, design)
-    behind = {n: own[n] for n in own if n in BEHIND_GEARBOX or n.endswith(f".{DEPARTURE}")}
+    own = _compute_own_guess(signals, drivelines, design)
+    behind = {n: own[n] for n in own if n in BEHIND_GEARBOX or n.endswith(f".{LOAD_DEVIATION}")}
     return {name: value for name, value in found.items() if name != AERO} | behind
 
 
-def likelihood(
+def estimate_likelihood(
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
-    linear: tuple[Conclusions, Sequence[IntegralShift]],
+    drivelines: Sequence[KnownDriveline],
+    linear: tuple[EstimateSet, Sequence[IntegralShift]],
     design: DesignData,
-) -> tuple[Conclusions, LikelihoodFit]:
+) -> tuple[EstimateSet, LikelihoodFit]:
     """Fit all shifts together and assess the result; `linear` is the result of the linear method.
 
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
     found, shifts = linear
-    guess = _guess(signals, drivelines, shifts, design)
-    best, notes = choose(signals, drivelines, design.loss_law, guess)
-    told = conclude(best, signals, drivelines, found.friction, design.sensors)
-    warnings = (*told.warnings, *notes, *_disagreements(told, found))
+    guess = _compute_guess(signals, drivelines, shifts, design)
+    best, notes = select_model(signals, drivelines, design.loss_law, guess)
+    told = build_estimates(best, signals, drivelines, found.friction, design.sensors)
+    warnings = (*told.warnings, *notes, *_list_disagreements(told, found))
     return replace(told, warnings=warnings), best
 
 
-def _disagreements(told: Conclusions, linear: Conclusions) -> list[str]:
+def _list_disagreements(told: EstimateSet, linear: EstimateSet) -> list[str]:
     """Return a warning for each parameter on which both methods differ by more than their noise.
 
     Where one of them alone has a load that grows with speed, which is told, the other must differ
@@ -115,7 +115,9 @@ def _disagreements(told: Conclusions, linear: Conclusions) -> list[str]:
             continue
         spread = float(np.hypot(estimate.std_noise or 0.0, other.std_noise or 0.0))
         if spread > 0.0 and abs(estimate.value - other.value) > DISAGREE * spread:
-            a, b = (in_units(value, estimate.unit) for value in (estimate.value, other.value))
+            a, b = (
+                format_with_unit(value, estimate.unit) for value in (estimate.value, other.value)
+            )
             texts.append(
                 f"{name}: the likelihood gives {a}, the linear method {b}; "
                 "their noise does not explain the difference"

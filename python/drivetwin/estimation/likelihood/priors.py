@@ -16,33 +16,33 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import InputError
 from drivetwin.estimation.data.segments import MomentumSettings
-from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
-from drivetwin.estimation.likelihood.data.input_smoothing import local_mean
-from drivetwin.estimation.likelihood.data.shift_record import LATEST, record_of
-from drivetwin.estimation.likelihood.data.slipping_elements import all_carriers
-from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
+from drivetwin.estimation.likelihood.data.shift_record import MAX_DELAY_S, build_record
+from drivetwin.estimation.likelihood.data.slipping_elements import find_all_slipping_elements
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
-    DEPARTURE,
     LAW,
+    LOAD_DEVIATION,
     START,
     TE_OFFSET,
-    Structure,
+    ShiftModel,
     Tie,
-    own_of,
+    map_log_names,
 )
 from drivetwin.estimation.linear.friction_points import LAW_PRIOR
-from drivetwin.estimation.linear.load_balance import AERO, AERO_SPREAD, mean_speed_of
-from drivetwin.estimation.linear.momentum_balance import DELAY_STD_MAX, rounding_error
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.linear.load_balance import AERO, AERO_SPREAD, compute_mean_speed
+from drivetwin.estimation.linear.momentum_balance import DELAY_STD_MAX, estimate_rounding_error
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS
-from drivetwin.shifts.split_gears import divided
+from drivetwin.shifts.split_gears import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
-    "te_delay": (-0.5 * LATEST, LATEST),
+    "te_delay": (-0.5 * MAX_DELAY_S, MAX_DELAY_S),
     "J_e": (1e-3, SPECS["J_prime"].upper),
     "J_out": (1e-3, SPECS["J_out"].upper),
     "J_vehicle": (1.0, SPECS["J_vehicle"].upper),
@@ -56,21 +56,21 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
 }
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
 _GEAR_INERTIA = "J_prime_"
-OFF_DESIGN = 10.0
+DESIGN_FACTOR = 10.0
 """Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
 small that, with the shaft's damping, one run takes as long as a whole fit."""
-OFF_GOING = {"mu_c": 0.03, "mu_drop": 0.02}
+OFFGOING_STD = {"mu_c": 0.03, "mu_drop": 0.02}
 """Prior standard deviation of the friction of an element that only disengages, about that of the
 engaging one: the log shows the break-away pressure and the decrease of its torque with slip."""
 
 
-def problem_of(
+def build_problem(
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     loss_law: LossLaw,
     guess: Mapping[str, float],
     hilly: bool = False,
-) -> tuple[Problem, Point]:
+) -> tuple[LikelihoodObjective, ParameterVector]:
     """Build the fit of all shifts of one or several logs, and its initial point.
 
     `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
@@ -80,57 +80,65 @@ def problem_of(
     holds too little.
     """
     logs = tuple(dict.fromkeys(s.log for s in signals))
-    guess = _with_own(guess, logs)
-    priors = _priors(signals, drivelines, guess)
-    every = (*_of_each(COMMON, logs), *_laws(signals, drivelines), *_fills(drivelines))
-    names = [n for n in every if not _is_known(priors.get(n))]
-    inertias = gear_inertias(signals, drivelines)
-    tie = tie_of(inertias)
-    still = [s for s in signals if not shows_age(s.engine_torque)]
-    ages = {own_of(s.log).get("te_delay", "te_delay") for s in still}
+    guess = _add_log_values(guess, logs)
+    priors = _collect_priors(signals, drivelines, guess)
+    every = (
+        *_expand_logs(COMMON, logs),
+        *_list_law_coefficients(signals, drivelines),
+        *_list_fill_unknowns(drivelines),
+    )
+    names = [n for n in every if not _is_fixed(priors.get(n))]
+    inertias = list_gear_inertias(signals, drivelines)
+    tie = build_tie(inertias)
+    still = [s for s in signals if not is_delay_identifiable(s.engine_torque)]
+    ages = {map_log_names(s.log).get("te_delay", "te_delay") for s in still}
     untold = {"eta": not signals[0].scale_known, "J_e": tie is not None}
     names = [n for n in names if not untold.get(n, n in ages)]
-    names += [n for n in _of_each((TE_OFFSET, AERO), logs) if n in priors]
-    fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_known(p)}
-    departures = _departures(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
+    names += [n for n in _expand_logs((TE_OFFSET, AERO), logs) if n in priors]
+    fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_fixed(p)}
+    departures = (
+        _build_load_factors(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
+    )
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
-    for k, (s, d, span) in enumerate(zip(signals, drivelines, spans(signals), strict=True)):
+    for k, (s, d, span) in enumerate(zip(signals, drivelines, split_spans(signals), strict=True)):
         label = f"start{k}"
-        record = record_of(s, span, {e.name: e.P0 for e in (d.offgoing, d.oncoming)})
+        record = build_record(s, span, {e.name: e.P0 for e in (d.offgoing, d.oncoming)})
         same = [one for one in signals if one.log == s.log]
-        own = {name: fixed[n] for name, n in own_of(s.log).items() if n in fixed}
-        speed = mean_speed_of(same, d.i_f)
+        own = {name: fixed[n] for name, n in map_log_names(s.log).items() if n in fixed}
+        speed = compute_mean_speed(same, d.i_f)
         departure = departures.get(k, {})
-        structure = Structure(d, loss_law, label, fixed | own, speed, tie, s.log, departure)
-        parts.append(Part.unweighted(structure, record))
+        structure = ShiftModel(d, loss_law, label, fixed | own, speed, tie, s.log, departure)
+        parts.append(ShiftTerm.from_sensor_noise(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
         torque = first.get("output_torque", guess["Tv_over_if"])
         values = (first["output_speed"], wheel, torque / guess["k_o"])
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
     start |= {n: guess.get(n, 0.0) for each in departures.values() for n in each}
-    lower, upper = _about_design(bounds_of(tuple(start)), tuple(start), priors)
-    point = Point(tuple(start), np.clip(list(start.values()), lower, upper))
+    lower, upper = _restrict_to_design(get_bounds(tuple(start)), tuple(start), priors)
+    point = ParameterVector(tuple(start), np.clip(list(start.values()), lower, upper))
     entries = {
         k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
     }
-    prior = Prior.independent(len(point.names), entries)
-    prior = with_gear_inertias(prior, point, fixed, inertias)
-    return Problem(tuple(parts), prior, lower, upper), point
+    prior = Prior.from_independent(len(point.names), entries)
+    prior = add_gear_inertia_priors(prior, point, fixed, inertias)
+    return LikelihoodObjective(tuple(parts), prior, lower, upper), point
 
 
-def _of_each(names: Sequence[str], logs: Sequence[int]) -> list[str]:
+def _expand_logs(names: Sequence[str], logs: Sequence[int]) -> list[str]:
     """Expand the names: those that each log has of its own once for each log."""
-    return list(dict.fromkeys(own_of(log).get(name, name) for name in names for log in logs))
+    return list(dict.fromkeys(map_log_names(log).get(name, name) for name in names for log in logs))
 
 
-def _with_own(guess: Mapping[str, float], logs: Sequence[int]) -> dict[str, float]:
+def _add_log_values(guess: Mapping[str, float], logs: Sequence[int]) -> dict[str, float]:
     """Add values for the log-specific unknowns to the guess; given ones stay."""
-    own = {n: guess[name] for log in logs for name, n in own_of(log).items() if name in guess}
+    own = {
+        n: guess[name] for log in logs for name, n in map_log_names(log).items() if name in guess
+    }
     return own | dict(guess)
 
 
-def _departures(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, float]]:
+def _build_load_factors(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, float]]:
     """Compute by shift number the deviation of its load from the log's mean: factors of unknowns.
 
     Nothing of a shift that is the only one of its log.
@@ -138,32 +146,34 @@ def _departures(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, float]]:
     found: dict[int, dict[str, float]] = {}
     for log in dict.fromkeys(s.log for s in signals):
         first, *others = [k for k, s in enumerate(signals) if s.log == log]
-        own = {k: f"start{k}.{DEPARTURE}" for k in others}
+        own = {k: f"start{k}.{LOAD_DEVIATION}" for k in others}
         if others:
             found[first] = dict.fromkeys(own.values(), -1.0)
             found |= {k: {name: 1.0} for k, name in own.items()}
     return found
 
 
-def shows_age(torque: Sampled) -> bool:
+def is_delay_identifiable(torque: MeasuredSignal) -> bool:
     """Return whether the engine torque varies enough, relative to its noise, to identify its
     delay."""
     if torque.sigma == 0.0:
         return bool(np.ptp(torque.values) > 0.0)
-    rate = np.diff(local_mean(torque)) / np.diff(torque.time)
+    rate = np.diff(smooth_adaptive(torque)) / np.diff(torque.time)
     return bool(np.sum((rate / torque.sigma) ** 2) > DELAY_STD_MAX**-2)
 
 
-def spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
+def split_spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
     """Divide the log into one span [s] per shift; no sample is counted twice.
 
     A gear between two shifts is divided in its middle. Each log stands by itself.
     """
     groups = groupby(signals, key=lambda s: s.log)
-    return tuple(span for _, group in groups for span in divided([s.shift for s in group]))
+    return tuple(
+        span for _, group in groups for span in compute_exclusive_spans([s.shift for s in group])
+    )
 
 
-def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+def get_bounds(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds (p,) of unknowns."""
     pairs = []
     for name in names:
@@ -178,54 +188,58 @@ def bounds_of(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     return lower, upper
 
 
-def _about_design(
+def _restrict_to_design(
     bounds: tuple[FloatArray, FloatArray], names: Sequence[str], priors: Mapping[str, PriorValue]
 ) -> tuple[FloatArray, FloatArray]:
     """Restrict the bounds of Jo′ to a factor about its design value, if the card has one."""
     lower, upper = bounds
     if "J_out" in names and "J_out" in priors:
         k, design = names.index("J_out"), priors["J_out"].value
-        lower[k] = max(lower[k], design / OFF_DESIGN)
-        upper[k] = min(upper[k], design * OFF_DESIGN)
+        lower[k] = max(lower[k], design / DESIGN_FACTOR)
+        upper[k] = min(upper[k], design * DESIGN_FACTOR)
     return lower, upper
 
 
-def _laws(signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]) -> list[str]:
+def _list_law_coefficients(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline]
+) -> list[str]:
     """Return the free coefficients of the friction laws."""
-    shown = all_carriers(signals, drivelines)
+    shown = find_all_slipping_elements(signals, drivelines)
     leaving = [d.offgoing.name for d in drivelines if d.offgoing.name not in shown]
     free = [f"{e}.{key}" for e in shown for key in LAW]
-    return free + [f"{e}.{key}" for e in leaving for key in OFF_GOING]
+    return free + [f"{e}.{key}" for e in leaving for key in OFFGOING_STD]
 
 
-def _fills(drivelines: Sequence[Driveline]) -> list[str]:
+def _list_fill_unknowns(drivelines: Sequence[KnownDriveline]) -> list[str]:
     """Return P0 of the elements of the shifts, and the drums of all elements that have one."""
     elements = dict.fromkeys(e.name for d in drivelines for e in (d.oncoming, d.offgoing))
     drums = dict.fromkeys((*elements, *(e.name for d in drivelines for e in d.drums)))
     return [*(f"{e}.P0" for e in elements), *(f"{e}.drum" for e in drums)]
 
 
-def _priors(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], guess: Mapping[str, float]
+def _collect_priors(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[KnownDriveline],
+    guess: Mapping[str, float],
 ) -> dict[str, PriorValue]:
     """Collect the priors by unknown."""
     found = {"te_delay": MomentumSettings().delay_prior}
     if drivelines[0].J_out is not None:
         known = drivelines[0].J_out
         found["J_out"] = known if signals[0].scale_known else drivelines[0].divide_by_eta(known)
-    found |= known_unknowns(drivelines[0], signals[0].scale_known)
+    found |= collect_direct_priors(drivelines[0], signals[0].scale_known)
     for s in signals:
-        own = own_of(s.log)
+        own = map_log_names(s.log)
         found |= {own[name]: found[name] for name in own if name in found}
-        rounding = rounding_error(s.engine_torque, s.torque_resolution)
+        rounding = estimate_rounding_error(s.engine_torque, s.torque_resolution)
         if rounding > 0.0:
             found.setdefault(own.get(TE_OFFSET, TE_OFFSET), PriorValue(0.0, rounding))
     if AERO in guess:
         found[AERO] = PriorValue(0.0, AERO_SPREAD)
     law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)}
-    for name in _laws(signals, drivelines):
+    for name in _list_law_coefficients(signals, drivelines):
         found[name] = law[name.split(".")[-1]]
-    shown = all_carriers(signals, drivelines)
+    shown = find_all_slipping_elements(signals, drivelines)
     for d in drivelines:
         for e in (d.offgoing, d.oncoming):
             found[f"{e.name}.P0"] = e.P0
@@ -233,16 +247,16 @@ def _priors(
             drum = e.drum if signals[0].scale_known else d.divide_by_eta(e.drum)
             found[f"{e.name}.drum"] = drum
         if d.offgoing.name not in shown:
-            names = {f"{d.offgoing.name}.{key}": std for key, std in OFF_GOING.items()}
+            names = {f"{d.offgoing.name}.{key}": std for key, std in OFFGOING_STD.items()}
             found |= {name: PriorValue(guess[name], std) for name, std in names.items()}
     return found
 
 
-def _is_known(prior: PriorValue | None) -> bool:
+def _is_fixed(prior: PriorValue | None) -> bool:
     return prior is not None and prior.std == 0.0
 
 
-def known_unknowns(driveline: Driveline, scale_known: bool) -> dict[str, PriorValue]:
+def collect_direct_priors(driveline: KnownDriveline, scale_known: bool) -> dict[str, PriorValue]:
     """Collect the priors of unknowns that are parameters themselves; `std` 0: fixed.
 
     Without an output torque the unknowns are the quantities over η, and only what is known of
@@ -257,8 +271,8 @@ def known_unknowns(driveline: Driveline, scale_known: bool) -> dict[str, PriorVa
     return found
 
 
-def gear_inertias(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
+def list_gear_inertias(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline]
 ) -> list[tuple[float, PriorValue]]:
     """Return the overall ratio of each gear whose J′ is known, with the prior [kg m^2]."""
     ending = "" if signals[0].scale_known else OVER_ETA
@@ -273,7 +287,7 @@ def gear_inertias(
     ]
 
 
-def tie_of(inertias: Sequence[tuple[float, PriorValue]]) -> Tie | None:
+def build_tie(inertias: Sequence[tuple[float, PriorValue]]) -> Tie | None:
     """Build the tie of Je to Jo′ by a J′ that is exactly known; None without one.
 
     Raises InputError for two: between them Jo′ would follow, which has an entry of its own.
@@ -287,9 +301,9 @@ def tie_of(inertias: Sequence[tuple[float, PriorValue]]) -> Tie | None:
     return exact[0] if exact else None
 
 
-def with_gear_inertias(
+def add_gear_inertia_priors(
     prior: Prior,
-    point: Point,
+    point: ParameterVector,
     fixed: Mapping[str, float],
     inertias: Sequence[tuple[float, PriorValue]],
 ) -> Prior:

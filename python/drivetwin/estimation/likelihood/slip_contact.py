@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.noise.linear_response import direction
-from drivetwin.estimation.likelihood.objective import Part
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.noise.linear_response import build_slip_row
+from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Trajectory
 
 SLIPPING = 1e-6
@@ -33,15 +33,17 @@ class Contact:
     per_mu: FloatArray
     row: FloatArray
 
-    def forces(self, torques: FloatArray) -> FloatArray:
+    def compute_forces(self, torques: FloatArray) -> FloatArray:
         """Forces (N-1, 4) on the speeds by torques (N-1,) that act against slip."""
         return -torques[:, None] * self.row
 
 
-def contact_of(part: Part, point: Point, run: Trajectory, name: str) -> Contact:
+def evaluate_contact(
+    part: ShiftTerm, point: ParameterVector, run: Trajectory, name: str
+) -> Contact:
     """Evaluate element `name` along `run`, the simulation of the part at `point`."""
     middle = 0.5 * (run.time[1:] + run.time[:-1])
-    model = part.structure.model(point)
+    model = part.structure.build_model(point)
     one = next((e for e in model.elements if e.name == name), None)
     if one is None or name not in part.record.pressures:
         nothing = np.zeros(middle.size)
@@ -52,15 +54,17 @@ def contact_of(part: Part, point: Point, run: Trajectory, name: str) -> Contact:
     above = np.maximum(np.interp(middle, signal.time, signal.values) - one.P0, 0.0)
     slipping = np.minimum(np.abs(slips[1:]), np.abs(slips[:-1])) > SLIPPING
     per_mu = np.where(slipping, np.sign(slip) * one.gain * above, 0.0)
-    return Contact(middle, slip, above, one.friction.at(slip), per_mu, direction(model, one))
+    return Contact(
+        middle, slip, above, one.friction.evaluate(slip), per_mu, build_slip_row(model, one)
+    )
 
 
-def carried_slip(part: Part, point: Point, name: str) -> FloatArray:
+def find_loaded_slips(part: ShiftTerm, point: ParameterVector, name: str) -> FloatArray:
     """Sizes of the slip (n,) [rad/s] over the steps in which element `name` slips under pressure.
 
     Empty where the part does not have it. `point` is one that can be simulated.
     """
-    run = part.run(point)
+    run = part.simulate(point)
     assert run is not None, "a fit can be simulated"
-    contact = contact_of(part, point, run, name)
+    contact = evaluate_contact(part, point, run, name)
     return np.asarray(np.abs(contact.slip[contact.per_mu != 0.0]))

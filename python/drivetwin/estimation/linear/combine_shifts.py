@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.linear.load_balance import are_one
+from drivetwin.estimation.linear.load_balance import is_common_load
 from drivetwin.estimation.linear.pipeline import NUISANCES, IntegralShift
 
 LOAD = "Tv_over_if"
@@ -30,7 +30,7 @@ AGREE = 1e-3
 """Probability of the shifts' scatter about a value below which its interval is widened to it."""
 
 
-def combine(
+def merge_shifts(
     shifts: Sequence[IntegralShift],
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Generalised least squares over the shifts' estimates: ids, values (q,), covariance (q, q).
@@ -38,16 +38,16 @@ def combine(
     A prior is in the estimate of every shift with its parameter but counts once: its information
     is taken out for all of them but the first. Nuisances that the shifts share are eliminated last.
     """
-    ids, values, covariance = _with_own_loads(shifts) or _joined(shifts)
+    ids, values, covariance = _merge_separate_loads(shifts) or _join_shifts(shifts)
     kept = [k for k, name in enumerate(ids) if name.split(".")[0] not in NUISANCES]
     ids, values = tuple(ids[k] for k in kept), values[kept]
     wider = np.array(
-        [_scatter(name, value, shifts) for name, value in zip(ids, values, strict=True)]
+        [_estimate_scatter(name, value, shifts) for name, value in zip(ids, values, strict=True)]
     )
     return ids, values, covariance[np.ix_(kept, kept)] * np.outer(wider, wider)
 
 
-def _scatter(name: str, value: float, shifts: Sequence[IntegralShift]) -> float:
+def _estimate_scatter(name: str, value: float, shifts: Sequence[IntegralShift]) -> float:
     """Factor by which the shifts lie further about a value than their noise explains; 1 if it does.
 
     What a shift alone has, and the load, which may be a shift's own, have none.
@@ -64,12 +64,12 @@ def _scatter(name: str, value: float, shifts: Sequence[IntegralShift]) -> float:
     return float(np.sqrt(square / freedom))
 
 
-def loads_of(shifts: Sequence[IntegralShift]) -> tuple[float, ...]:
+def collect_different_loads(shifts: Sequence[IntegralShift]) -> tuple[float, ...]:
     """Load of each shift at the output shaft [N m] where they differ; else empty."""
-    return tuple(shift.load.load for shift in shifts) if _with_own_loads(shifts) else ()
+    return tuple(shift.load.load for shift in shifts) if _merge_separate_loads(shifts) else ()
 
 
-def _with_own_loads(
+def _merge_separate_loads(
     shifts: Sequence[IntegralShift],
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray] | None:
     """Combine the shifts with one load each and report the mean load; None if one load suffices."""
@@ -79,11 +79,11 @@ def _with_own_loads(
         replace(shift, ids=tuple(f"{n}@{k}" if n == LOAD else n for n in shift.ids))
         for k, shift in enumerate(shifts)
     ]
-    ids, values, covariance = _joined(own)
+    ids, values, covariance = _join_shifts(own)
     first, *others = [ids.index(f"{LOAD}@{k}") for k in range(len(shifts))]
     rows = np.eye(len(ids))
     differences = rows[others] - rows[first]
-    if are_one(differences @ values, differences @ covariance @ differences.T):
+    if is_common_load(differences @ values, differences @ covariance @ differences.T):
         return None
     rows[first, [first, *others]] = 1.0 / len(shifts)
     kept = [k for k in range(len(ids)) if k not in others]
@@ -92,14 +92,14 @@ def _with_own_loads(
     return told, rows @ values, rows @ covariance @ rows.T
 
 
-def _loose(shift: IntegralShift) -> FloatArray:
+def _compute_loose_variances(shift: IntegralShift) -> FloatArray:
     """Variances (q,) by which its parameters may leave the equations between them, as shares."""
     bent = [name.startswith(SHAFT) for name in shift.ids]
     relative = np.diag(shift.covariance) / np.square(shift.values)
     return np.where(bent, np.maximum(relative, NUGGET), NUGGET)
 
 
-def _joined(
+def _join_shifts(
     shifts: Sequence[IntegralShift],
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     if len(shifts) == 1:
@@ -114,7 +114,9 @@ def _joined(
     for shift in shifts:
         place = [ids.index(name) for name in shift.ids]
         unit = scale[place]
-        weight = np.linalg.inv(shift.covariance / np.outer(unit, unit) + np.diag(_loose(shift)))
+        weight = np.linalg.inv(
+            shift.covariance / np.outer(unit, unit) + np.diag(_compute_loose_variances(shift))
+        )
         information[np.ix_(place, place)] += weight
         pull[place] += weight @ (shift.values / unit)
     for name, prior in {n: p for shift in shifts for n, p in shift.priors.items()}.items():

@@ -8,32 +8,29 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
-from drivetwin.estimation.linear.combine_shifts import combine, loads_of
-from drivetwin.estimation.linear.load_balance import AERO, LoadFit, different_loads
+from drivetwin._util.display_units import format_with_unit
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.linear.combine_shifts import collect_different_loads, merge_shifts
+from drivetwin.estimation.linear.load_balance import AERO, LoadFit, describe_different_loads
 from drivetwin.estimation.linear.pipeline import IntegralShift
-from drivetwin.estimation.result.assessment import (
-    FittedParameters,
-    fill_from_card,
-)
+from drivetwin.estimation.result.assessment import FittedParameters, collect_fill_pressures
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.estimate_set import (
-    Conclusions,
-    growth_told,
-    labels_of,
-    low_gear_notes,
+    EstimateSet,
+    collect_low_gear_notes,
+    collect_shift_labels,
+    describe_growth,
 )
-from drivetwin.estimation.result.prior_update import with_known
+from drivetwin.estimation.result.prior_update import add_priors
 from drivetwin.estimation.result.verdict import (
     KNOWN,
     SENSORS_TELL_LESS,
-    correlation,
-    designed,
-    doubted,
-    refused,
+    compute_correlation,
+    from_prior,
+    refuse_parameter,
+    reject_identified,
 )
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 
 METHOD = "integral"
 CHI2_WARN = 1.6
@@ -53,21 +50,21 @@ RESTS_ON = {
 """Stems of the parameters that rest on each regression."""
 
 
-def conclude(
+def assess_shifts(
     shifts: Sequence[IntegralShift],
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     systematic: dict[str, float],
-) -> Conclusions:
+) -> EstimateSet:
     """Judge every parameter of one or several shifts.
 
     `systematic` holds standard deviations from sensor tolerances by parameter id; empty where the
     card states none.
     """
-    ids, values, covariance = combine(shifts)
+    ids, values, covariance = merge_shifts(shifts)
     beforehand = drivelines[0].known
-    values, covariance, doubts = with_known(ids, values, covariance, beforehand)
-    law = _load_law(shifts, ids, values, covariance, systematic)
+    values, covariance, doubts = add_priors(ids, values, covariance, beforehand)
+    law = _estimate_load_law(shifts, ids, values, covariance, systematic)
     kept = [k for k, name in enumerate(ids) if name != AERO]
     ids, values, covariance = (
         tuple(ids[k] for k in kept),
@@ -81,44 +78,44 @@ def conclude(
         std=np.sqrt(np.diag(covariance)),
         driveline=drivelines[0],
         systematic=systematic,
-        notes=low_gear_notes(signals),
+        notes=collect_low_gear_notes(signals),
         method=METHOD,
         prior_method=METHOD,
     )
     estimates = fit.assess()
     estimates |= _replace_impossible(fit)
-    estimates |= _better_by_design(estimates, fit)
+    estimates |= _select_design_values(estimates, fit)
     estimates = fit.downgrade_conflicts(estimates)
-    loads = loads_of(shifts)
-    for name, why in _misfits(shifts, signals, ids).items():
-        estimates[name] = doubted(estimates[name], why)
-    estimates |= _card_values(estimates, drivelines)
-    estimates |= _refusals(shifts, signals, estimates)
-    return Conclusions(
+    loads = collect_different_loads(shifts)
+    for name, why in _find_misfits(shifts, signals, ids).items():
+        estimates[name] = reject_identified(estimates[name], why)
+    estimates |= _collect_card_values(estimates, drivelines)
+    estimates |= _collect_refusals(shifts, signals, estimates)
+    return EstimateSet(
         estimates,
-        _curves(shifts),
+        _select_curves(shifts),
         ids,
-        correlation(covariance),
+        compute_correlation(covariance),
         (
             *doubts,
             *(one.text for one in fit.conflicts),
-            *_warnings(shifts, signals, fit.notes),
-            *(() if law is None else (growth_told(law.aero, law.std, law.mean_speed),)),
-            *different_loads(loads),
+            *_collect_warnings(shifts, signals, fit.notes),
+            *(() if law is None else (describe_growth(law.aero, law.std, law.mean_speed),)),
+            *describe_different_loads(loads),
         ),
         law,
         loads,
     )
 
 
-def _load_law(
+def _estimate_load_law(
     shifts: Sequence[IntegralShift],
     ids: Sequence[str],
     values: FloatArray,
     covariance: FloatArray,
     systematic: Mapping[str, float],
 ) -> LoadLaw | None:
-    """How the load grows with speed; None where it does not."""
+    """Return the growth of the load with speed; None for a constant load."""
     if AERO not in ids:
         return None
     k, mean_speed = ids.index(AERO), shifts[0].load.holds_at
@@ -127,7 +124,7 @@ def _load_law(
     return LoadLaw(float(values[k]), std, mean_speed)
 
 
-def _better_by_design(
+def _select_design_values(
     estimates: Mapping[str, Estimate], fit: FittedParameters
 ) -> dict[str, Estimate]:
     """Return the card's own values where they are more certain than the log with its sensors.
@@ -136,7 +133,7 @@ def _better_by_design(
     """
     contradicted = {one.id for one in fit.conflicts}
     return {
-        name: designed(name, prior, SENSORS_TELL_LESS)
+        name: from_prior(name, prior, SENSORS_TELL_LESS)
         for name, prior in fit.priors.items()
         if name not in contradicted and (estimates[name].std_total or 0.0) > prior.std > 0.0
     }
@@ -149,32 +146,29 @@ def _replace_impossible(fit: FittedParameters) -> dict[str, Estimate]:
     """
     found: dict[str, Estimate] = {}
     for name, value in zip(fit.ids, fit.values.tolist(), strict=True):
-        spec, prior = spec_of(name), fit.priors.get(name)
+        spec, prior = get_parameter_spec(name), fit.priors.get(name)
         if spec.lower <= value <= spec.upper:
             continue
-        text = f"the linear fit gives {in_units(value, spec.unit, digits=3)}, which is impossible"
+        shown = format_with_unit(value, spec.unit, digits=3)
+        text = f"the linear fit gives {shown}, which is impossible"
         if prior is None:
-            found[name] = refused(name, METHOD, text)
+            found[name] = refuse_parameter(name, METHOD, text)
         else:
-            found[name] = designed(name, prior, f"design value of the card: {text}")
+            found[name] = from_prior(name, prior, f"design value of the card: {text}")
     return found
 
 
-def _card_values(
-    known: Mapping[str, Estimate], drivelines: Sequence[Driveline]
+def _collect_card_values(
+    known: Mapping[str, Estimate], drivelines: Sequence[KnownDriveline]
 ) -> dict[str, Estimate]:
     """Return design values of parameters that no shift shows: P0 of elements that never engage."""
-    found = {
-        name: designed(name, prior, KNOWN)
-        for name, prior in drivelines[0].known.items()
-        if name not in known
-    }
     note = "design value of the card; the log does not show this element filling"
-    elements = fill_from_card(drivelines, note)
-    return found | {name: one for name, one in elements.items() if name not in known}
+    found = {name: from_prior(name, one, KNOWN) for name, one in drivelines[0].known.items()}
+    found |= collect_fill_pressures(drivelines, note)
+    return {name: one for name, one in found.items() if name not in known}
 
 
-def _refusals(
+def _collect_refusals(
     shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], known: dict[str, Estimate]
 ) -> dict[str, Estimate]:
     """Estimates without a value for what no shift could tell."""
@@ -188,11 +182,11 @@ def _refusals(
         for stage, why in shift.refusals.items():
             for name in concerned.get(stage, ()):
                 if name not in known:
-                    found[name] = refused(name, METHOD, why)
+                    found[name] = refuse_parameter(name, METHOD, why)
     return found
 
 
-def _residual_powers(shift: IntegralShift) -> dict[str, float]:
+def _compute_residual_powers(shift: IntegralShift) -> dict[str, float]:
     """Residual power over stated noise by regression."""
     found = {"momentum balance": shift.momentum.fit.chi2, "load": shift.load.fit.chi2}
     if shift.friction is not None:
@@ -200,24 +194,28 @@ def _residual_powers(shift: IntegralShift) -> dict[str, float]:
     return found
 
 
-def _misfits(
+def _find_misfits(
     shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], ids: Sequence[str]
 ) -> dict[str, str]:
     """By parameter of `ids` the regression behind it in which the model does not hold."""
     found: dict[str, str] = {}
-    for shift, label in zip(shifts, labels_of(signals), strict=True):
-        for name, chi2 in _residual_powers(shift).items():
+    for shift, label in zip(shifts, collect_shift_labels(signals), strict=True):
+        for name, chi2 in _compute_residual_powers(shift).items():
             if chi2 > MISFIT:
                 text = (
                     f"the {name} of {label} leaves {chi2:.0f} times the noise power: some effect "
                     "is not in the model"
                 )
-                concerned = [i for i in ids if i in shift.ids and spec_of(i).stem in RESTS_ON[name]]
+                concerned = [
+                    i
+                    for i in ids
+                    if i in shift.ids and get_parameter_spec(i).stem in RESTS_ON[name]
+                ]
                 found |= dict.fromkeys(concerned, text)
     return found
 
 
-def _curves(shifts: Sequence[IntegralShift]) -> dict[str, FrictionCurve]:
+def _select_curves(shifts: Sequence[IntegralShift]) -> dict[str, FrictionCurve]:
     """One curve per element: of several shifts onto it, the one with the narrowest band."""
     best: dict[str, FrictionCurve] = {}
     for shift in shifts:
@@ -233,16 +231,16 @@ def _width(curve: FrictionCurve) -> float:
     return float(np.mean(curve.mu_hi - curve.mu_lo))
 
 
-def _warnings(
+def _collect_warnings(
     shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: Mapping[str, str]
 ) -> tuple[str, ...]:
     """Collect the warnings: general ones first, then those of each shift, then shared ones."""
-    labels = labels_of(signals)
+    labels = collect_shift_labels(signals)
     noisy: dict[str, dict[str, float]] = {}
     trends: dict[str, LoadFit] = {}
     refused: dict[str, list[str]] = {}
     for shift, label in zip(shifts, labels, strict=True):
-        for name, chi2 in _residual_powers(shift).items():
+        for name, chi2 in _compute_residual_powers(shift).items():
             if chi2 > CHI2_WARN:
                 noisy.setdefault(name, {})[label] = chi2
         if abs(shift.load.speed_trend) > TREND_WARN:
@@ -253,27 +251,29 @@ def _warnings(
     texts = list(dict.fromkeys(notes.values()))
     texts += [text for s in signals for text in s.shift.warnings]
     texts += [
-        f"{_named(found)}: the {name} leaves {_from_to(found.values(), '.1f')} times the noise "
+        f"{_describe_shifts(found)}: the {name} leaves {_format_range(found.values(), '.1f')} times the noise "
         "power; intervals are widened"
         for name, found in noisy.items()
     ]
     if trends:
-        significance = _from_to((load.speed_trend for load in trends.values()), ".1f")
-        speeds = _from_to((load.mean_speed for load in trends.values()), ".3g")
+        significance = _format_range((load.speed_trend for load in trends.values()), ".1f")
+        speeds = _format_range((load.mean_speed for load in trends.values()), ".3g")
         texts.append(
-            f"{_named(trends)}: the load torque changes with speed (t = {significance}); "
+            f"{_describe_shifts(trends)}: the load torque changes with speed (t = {significance}); "
             f"T_v/i_f holds at {speeds} rad/s of the wheel"
         )
-    texts += [f"{_named(found)}: no friction curve, {why}" for why, found in refused.items()]
+    texts += [
+        f"{_describe_shifts(found)}: no friction curve, {why}" for why, found in refused.items()
+    ]
     return tuple(texts)
 
 
-def _named(labels: Collection[str]) -> str:
+def _describe_shifts(labels: Collection[str]) -> str:
     """The shifts by name, or how many they are."""
     return ", ".join(labels) if len(labels) <= NAMED else f"{len(labels)} shifts"
 
 
-def _from_to(values: Iterable[float], style: str) -> str:
+def _format_range(values: Iterable[float], style: str) -> str:
     """The least and the largest value, or the only one."""
     known = sorted(values)
     low, high = format(known[0], style), format(known[-1], style)

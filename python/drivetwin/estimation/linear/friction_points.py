@@ -17,18 +17,18 @@ from scipy.sparse import csr_array
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
-from drivetwin.estimation.linear.momentum_balance import FIRST_DRUM, MomentumFit, known
+from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.linear.momentum_balance import FIRST_DRUM, MomentumFit, compute_prior_std
 from drivetwin.estimation.regression.errors_in_variables import Fit, Prior, Term, solve
 from drivetwin.estimation.regression.modulating_functions import (
     Quadrature,
     Windows,
-    hann_kernels,
-    join,
-    windows_in,
+    build_hann_kernels,
+    build_windows,
+    join_windows,
 )
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
-from drivetwin.shifts.coverage import parts_between
+from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.simulation.dual_clutch import Stribeck
 
 MU_C, MU_DROP, MU_V, LOG_V, P0 = range(5)
@@ -72,22 +72,24 @@ class FrictionFit:
         return float(self.fit.std[P0])
 
 
-def stribeck(theta: FloatArray, slip: FloatArray) -> tuple[FloatArray, FloatArray]:
+def evaluate_stribeck(theta: FloatArray, slip: FloatArray) -> tuple[FloatArray, FloatArray]:
     """μ (n,) over |slip| (n,) and its derivatives (4, n) by (mu_c, mu_drop, mu_v, ln v_s)."""
     mu_c, drop, mu_v, ln_v_s = (float(theta[k]) for k in (MU_C, MU_DROP, MU_V, LOG_V))
     law = Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v)
-    return law.at(slip), law.slopes(slip)
+    return law.evaluate(slip), law.compute_slopes(slip)
 
 
-def stribeck_at(fit: FrictionFit, slip: FloatArray) -> FloatArray:
+def evaluate_fitted_stribeck(fit: FrictionFit, slip: FloatArray) -> FloatArray:
     """μ (n,) of a fitted law over |slip| (n,)."""
-    return stribeck(fit.fit.theta, slip)[0]
+    return evaluate_stribeck(fit.fit.theta, slip)[0]
 
 
-def slip_of(signals: ShiftSignals, driveline: Driveline, time: FloatArray) -> FloatArray:
+def compute_mean_slip(
+    signals: ShiftSignals, driveline: KnownDriveline, time: FloatArray
+) -> FloatArray:
     """Slip of the on-coming element (eq. 15) [rad/s] at `time` (n,), over 11 samples' mean."""
 
-    def smooth(signal: Sampled) -> FloatArray:
+    def smooth(signal: MeasuredSignal) -> FloatArray:
         return np.interp(time, signal.time, compute_moving_mean(signal.values, 11))
 
     element = driveline.oncoming
@@ -95,7 +97,9 @@ def slip_of(signals: ShiftSignals, driveline: Driveline, time: FloatArray) -> Fl
     return element.a * engine - element.b * output
 
 
-def _filled(signals: ShiftSignals, driveline: Driveline, settings: FrictionSettings) -> float:
+def _find_fill_end(
+    signals: ShiftSignals, driveline: KnownDriveline, settings: FrictionSettings
+) -> float:
     """Instant of the shift from which the on-coming element is surely filled [s].
 
     It comes after break-away where that element only takes hold at the other gear's speed.
@@ -110,23 +114,25 @@ def _filled(signals: ShiftSignals, driveline: Driveline, settings: FrictionSetti
     return float(below[-1]) if below.size else start
 
 
-def _spans(
-    signals: ShiftSignals, driveline: Driveline, free: float, settings: FrictionSettings
+def _find_friction_spans(
+    signals: ShiftSignals, driveline: KnownDriveline, free: float, settings: FrictionSettings
 ) -> tuple[Span, Span]:
     """Spans of the torque phase and of the inertia phase that carry an equation."""
     shift = signals.shift
     sigma = shift.sigma
     clear = settings.margin + 3.0 * sigma.get("inertia_start", 0.0)
-    filled = _filled(signals, driveline, settings)
+    filled = _find_fill_end(signals, driveline, settings)
     torque = (filled, shift.inertia_phase[0] - clear)
     lockup = shift.lockup_time - settings.margin - 3.0 * sigma.get("lockup", 0.0)
     return torque, (max(free, filled, shift.inertia_phase[0] + clear), lockup)
 
 
-def _windows(signals: ShiftSignals, span: Span, settings: FrictionSettings) -> Windows:
+def _build_gapless_windows(
+    signals: ShiftSignals, span: Span, settings: FrictionSettings
+) -> Windows:
     """Windows in a span that touch no gap of the outputs."""
-    parts = parts_between(span, signals.output_gaps)
-    return join([windows_in(part, settings.width, settings.step) for part in parts])
+    parts = split_at_gaps(span, signals.output_gaps)
+    return join_windows([build_windows(part, settings.width, settings.step) for part in parts])
 
 
 class _Equations:
@@ -135,34 +141,34 @@ class _Equations:
     def __init__(
         self,
         signals: ShiftSignals,
-        driveline: Driveline,
+        driveline: KnownDriveline,
         momentum: MomentumFit,
         spans: tuple[Span, Span],
         settings: FrictionSettings,
     ) -> None:
-        parts = [_windows(signals, span, settings) for span in spans]
+        parts = [_build_gapless_windows(signals, span, settings) for span in spans]
         if parts[1].count < 5:
             raise IdentificationError(
                 f"the inertia phase leaves {parts[1].count} windows of {settings.width:g} s",
                 "log a slower shift, or one with the off-going element vented earlier",
             )
-        self.windows: Windows = join(parts)
+        self.windows: Windows = join_windows(parts)
         self.in_torque_phase = np.repeat([True, False], [p.count for p in parts])
         self.signals, self.element = signals, driveline.oncoming
         pressure = signals.pressures[self.element.name]
         self.pressure = pressure
-        self.kernel = hann_kernels(pressure.time, self.windows).psi
-        self.slip = slip_of(signals, driveline, pressure.time)
+        self.kernel = build_hann_kernels(pressure.time, self.windows).psi
+        self.slip = compute_mean_slip(signals, driveline, pressure.time)
         te, to = signals.engine_torque, signals.output_torque
         we, wo = signals.engine_speed, signals.output_speed
-        delay = momentum.value("te_delay")
-        self.te = hann_kernels(te.time, self.windows, delay).psi
-        self.to = hann_kernels(to.time, self.windows).psi
-        self.we = hann_kernels(we.time, self.windows).slope
-        self.wo = hann_kernels(wo.time, self.windows).slope
+        delay = momentum.get_value("te_delay")
+        self.te = build_hann_kernels(te.time, self.windows, delay).psi
+        self.to = build_hann_kernels(to.time, self.windows).psi
+        self.we = build_hann_kernels(we.time, self.windows).slope
+        self.wo = build_hann_kernels(wo.time, self.windows).slope
         self._coefficients(driveline)
 
-    def _coefficients(self, driveline: Driveline) -> None:
+    def _coefficients(self, driveline: KnownDriveline) -> None:
         """Coefficients (m,) of each measured integral in T_c, by parameter of the momentum fit."""
         a, b, i = self.element.a, self.element.b, driveline.i_before
         share = a - b / i
@@ -213,7 +219,7 @@ class _Equations:
 
     def terms(self, theta: FloatArray) -> list[Term]:
         """T_c measured minus μ(s)·gain·(P - P0)."""
-        mu, slopes = stribeck(theta, self.slip)
+        mu, slopes = evaluate_stribeck(theta, self.slip)
         law = self.weighted(mu)
         by_law = {p: self.weighted(slope) for p, slope in enumerate(slopes)}
         one = np.ones_like(self.by_eta)
@@ -234,11 +240,11 @@ class _Equations:
         return [*self.measured(theta[NUISANCE:]), pressure, fill]
 
 
-def _prior(driveline: Driveline, momentum: MomentumFit) -> Prior:
+def _build_prior(driveline: KnownDriveline, momentum: MomentumFit) -> Prior:
     """Wide law priors, the design P0, and the momentum fit with its covariance."""
     size = NUISANCE + len(momentum.names)
     fill = driveline.oncoming.P0
-    prior = Prior.independent(size, {**LAW_PRIOR, P0: (fill.value, known(fill))})
+    prior = Prior.from_independent(size, {**LAW_PRIOR, P0: (fill.value, compute_prior_std(fill))})
     prior.mean[NUISANCE:] = momentum.fit.theta
     cov = momentum.fit.covariance
     scale = np.sqrt(np.diag(cov))
@@ -248,9 +254,9 @@ def _prior(driveline: Driveline, momentum: MomentumFit) -> Prior:
     return prior
 
 
-def momentum_friction(
+def fit_momentum_friction(
     signals: ShiftSignals,
-    driveline: Driveline,
+    driveline: KnownDriveline,
     momentum: MomentumFit,
     free: float,
     settings: FrictionSettings,
@@ -259,19 +265,19 @@ def momentum_friction(
 
     Raises IdentificationError where the inertia phase is too short, or friction comes out negative.
     """
-    spans = _spans(signals, driveline, free, settings)
+    spans = _find_friction_spans(signals, driveline, free, settings)
     equations = _Equations(signals, driveline, momentum, spans, settings)
-    prior = _prior(driveline, momentum)
+    prior = _build_prior(driveline, momentum)
     fits = []
     for scale in (4.0, 12.0, 36.0):
         start = prior.mean.copy()
         start[LOG_V] = np.log(scale)
         fits.append(solve(equations.terms, start, prior, tolerance=0.02))
-    fit = min(fits, key=lambda f: f.q + prior.cost(f.theta))
-    return _described(equations, fit)
+    fit = min(fits, key=lambda f: f.q + prior.compute_prior_cost(f.theta))
+    return _describe_fit(equations, fit)
 
 
-def _described(equations: _Equations, fit: Fit) -> FrictionFit:
+def _describe_fit(equations: _Equations, fit: Fit) -> FrictionFit:
     kernel = equations.kernel.matrix
     area = 0.5 * equations.windows.width
     slip = np.abs(kernel @ equations.slip) / area
@@ -286,7 +292,7 @@ def _described(equations: _Equations, fit: Fit) -> FrictionFit:
     sign = np.sign(kernel @ equations.slip)
     mu_points = sign * torque / (equations.element.gain * above)
     grid = np.linspace(float(slip.min()), float(slip.max()), 60)
-    mu, slopes = stribeck(fit.theta, grid)
+    mu, slopes = evaluate_stribeck(fit.theta, grid)
     std = np.sqrt(np.einsum("pn,pq,qn->n", slopes, fit.covariance[:4, :4], slopes))
     v_s = float(np.exp(fit.theta[LOG_V]))
     law = Stribeck(

@@ -18,16 +18,16 @@ import numpy as np
 from scipy.stats import t as student
 
 from drivetwin._util.arrays import FloatArray, Span
-from drivetwin._util.display_units import in_units
-from drivetwin.estimation.data.shift_data import GearData, Sampled
+from drivetwin._util.display_units import format_with_unit
+from drivetwin.estimation.data.shift_data import GearData, MeasuredSignal
 from drivetwin.estimation.regression.modulating_functions import (
     Windows,
-    hann_kernels,
-    join,
-    windows_in,
+    build_hann_kernels,
+    build_windows,
+    join_windows,
 )
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.shifts.coverage import parts_between
+from drivetwin.shifts.coverage import split_at_gaps
 
 WIDTH = 1.6
 """Width of a window [s]: a Hann window so long passes a millionth of a 4 Hz oscillation's power."""
@@ -59,39 +59,43 @@ class HeldGear:
     reason: str = ""
 
 
-def held_gears(gears: Sequence[GearData]) -> tuple[HeldGear, ...]:
+def estimate_gear_inertias(gears: Sequence[GearData]) -> tuple[HeldGear, ...]:
     """Estimate the total inertia from each engaged gear."""
     return tuple(
-        held_gear(one.gear, one.ratio, one.span, one.engine_torque, one.output_speed)
+        estimate_gear_inertia(one.gear, one.ratio, one.span, one.engine_torque, one.output_speed)
         for one in gears
     )
 
 
-def held_gear(gear: str, ratio: float, span: Span, torque: Sampled, speed: Sampled) -> HeldGear:
+def estimate_gear_inertia(
+    gear: str, ratio: float, span: Span, torque: MeasuredSignal, speed: MeasuredSignal
+) -> HeldGear:
     """Balance of the gear of overall `ratio` held over `span`; `torque` is the engine's [N m].
 
     `speed` is that of the output shaft [rad/s]. Its verdict says what the value is worth.
     """
-    parts = parts_between(span, (*torque.unrecorded, *speed.unrecorded))
-    windows = join([windows_in(part, WIDTH, WIDTH / STEPS) for part in parts])
+    parts = split_at_gaps(span, (*torque.unrecorded, *speed.unrecorded))
+    windows = join_windows([build_windows(part, WIDTH, WIDTH / STEPS) for part in parts])
     recorded = sum(high - low for low, high in parts if high - low >= WIDTH)
     freedom = 2.0 * recorded / WIDTH - 3.0
     if freedom < LEAST_FREEDOM:
-        return _refused(gear, span, f"only {recorded:.1f} s of the gear are recorded without a gap")
-    drive, rate, growth = _means(windows, ratio, torque, speed)
+        return _refuse_gear(
+            gear, span, f"only {recorded:.1f} s of the gear are recorded without a gap"
+        )
+    drive, rate, growth = _compute_window_means(windows, ratio, torque, speed)
     one = np.ones_like(rate)
     columns = np.column_stack([rate, one, growth])
     grown: FloatArray = np.linalg.lstsq(columns, drive, rcond=None)[0].astype(np.float64)
     plain = np.linalg.lstsq(columns[:, :2], drive, rcond=None)[0]
     value = float(grown[0])
-    spread = float(np.hypot(_jackknife(columns, drive), 0.5 * (plain[0] - value)))
+    spread = float(np.hypot(_estimate_jackknife_std(columns, drive), 0.5 * (plain[0] - value)))
     half = float(student.ppf(0.975, BLOCKS - 1)) * spread
     if value <= 0.0 or half > WEAK * value:
-        return _refused(
+        return _refuse_gear(
             gear,
             span,
-            f"{in_units(value, 'kg*m^2', half)} (95 %) says nothing: the vehicle's "
-            f"acceleration varies by {in_units(float(rate.std()), 'rad/s^2', digits=2)} only",
+            f"{format_with_unit(value, 'kg*m^2', half)} (95 %) says nothing: the vehicle's "
+            f"acceleration varies by {format_with_unit(float(rate.std()), 'rad/s^2', digits=2)} only",
         )
     verdict = Verdict.IDENTIFIED if half < IDENTIFIED * value else Verdict.WEAK
     left = drive - columns @ grown
@@ -99,24 +103,24 @@ def held_gear(gear: str, ratio: float, span: Span, torque: Sampled, speed: Sampl
     return HeldGear(gear, span, verdict, value, half, float(grown[1]), explained)
 
 
-def _refused(gear: str, span: Span, why: str) -> HeldGear:
+def _refuse_gear(gear: str, span: Span, why: str) -> HeldGear:
     text = f"{why}; hold the gear for ten seconds while the vehicle speeds up and slows down"
     return HeldGear(gear, span, Verdict.NOT_IDENTIFIABLE, reason=text)
 
 
-def _means(
-    windows: Windows, ratio: float, torque: Sampled, speed: Sampled
+def _compute_window_means(
+    windows: Windows, ratio: float, torque: MeasuredSignal, speed: MeasuredSignal
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """i·T_e, ω_out' and ω_out² less its mean, each the mean over every window (m,)."""
     area = 0.5 * windows.width
-    drive = ratio * (hann_kernels(torque.time, windows).psi.matrix @ torque.values) / area
-    kernels = hann_kernels(speed.time, windows)
+    drive = ratio * (build_hann_kernels(torque.time, windows).psi.matrix @ torque.values) / area
+    kernels = build_hann_kernels(speed.time, windows)
     rate = (kernels.slope.matrix @ speed.values) / area
     square = (kernels.psi.matrix @ speed.values**2) / area
     return drive, rate, square - square.mean()
 
 
-def _jackknife(columns: FloatArray, target: FloatArray) -> float:
+def _estimate_jackknife_std(columns: FloatArray, target: FloatArray) -> float:
     """Standard deviation of the first coefficient, by leaving out one of BLOCKS blocks in turn."""
     blocks = np.array_split(np.arange(len(target)), BLOCKS)
     values = []

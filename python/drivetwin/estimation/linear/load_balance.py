@@ -23,7 +23,7 @@ from drivetwin.estimation.data.vehicle_balance import (
     LOAD,
     WIDTH,
     VehicleBalance,
-    recorded_windows,
+    build_recorded_windows,
 )
 from drivetwin.estimation.regression.errors_in_variables import Fit, Prior
 
@@ -69,7 +69,7 @@ class LoadFit:
         return float(self.fit.theta[INERTIA])
 
 
-def are_one(differences: FloatArray, covariance: FloatArray) -> bool:
+def is_common_load(differences: FloatArray, covariance: FloatArray) -> bool:
     """Test if loads with the `differences` (m,) of covariance (m, m) fit one load."""
     scale = np.sqrt(np.diag(covariance))
     inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
@@ -77,7 +77,7 @@ def are_one(differences: FloatArray, covariance: FloatArray) -> bool:
     return bool(unit @ inverse @ unit < chi2.isf(ONE_LOAD, differences.size))
 
 
-def different_loads(loads: Sequence[float]) -> list[str]:
+def describe_different_loads(loads: Sequence[float]) -> list[str]:
     """Describe the loads of the shifts [N m]; an empty text for a single common load."""
     if not loads:
         return []
@@ -87,7 +87,7 @@ def different_loads(loads: Sequence[float]) -> list[str]:
     ]
 
 
-def load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
+def select_load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
     """Return the spans for eq. 11: all with a wheel speed, else those away from the shift."""
     shift = signals.shift
     if signals.wheel_speed is not None:
@@ -95,20 +95,20 @@ def load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
     return (shift.before, (shift.lockup_time + SETTLING, shift.after[1]))
 
 
-def growing_from(signals: Sequence[ShiftSignals], i_f: float) -> float | None:
+def find_growth_reference(signals: Sequence[ShiftSignals], i_f: float) -> float | None:
     """Mean wheel speed of the log [rad/s] where the load of its shifts grows with speed, else None.
 
     Each shift tells by itself, so that hills between them say nothing. Raises IdentificationError
     where torque and speed of a shift do not determine its load.
     """
-    speed = mean_speed_of(signals, i_f)
-    fits = [momentum_load(s, i_f, load_spans(s), speed).fit for s in signals]
+    speed = compute_mean_speed(signals, i_f)
+    fits = [estimate_momentum_load(s, i_f, select_load_spans(s), speed).fit for s in signals]
     growth = np.array([fit.theta[GROWTH] for fit in fits])
     weight = np.array([fit.std[GROWTH] ** -2 for fit in fits])
     return speed if growth @ weight > SIGNIFICANT * np.sqrt(np.sum(weight)) else None
 
 
-def mean_speed_of(signals: Sequence[ShiftSignals], i_f: float) -> float:
+def compute_mean_speed(signals: Sequence[ShiftSignals], i_f: float) -> float:
     """Mean wheel speed over the log [rad/s]."""
     means = [
         float(np.mean(s.output_speed.values)) / i_f
@@ -119,7 +119,7 @@ def mean_speed_of(signals: Sequence[ShiftSignals], i_f: float) -> float:
     return float(np.mean(means))
 
 
-def momentum_load(
+def estimate_momentum_load(
     signals: ShiftSignals,
     i_f: float,
     spans: tuple[Span, ...],
@@ -135,23 +135,23 @@ def momentum_load(
     wheel = signals.wheel_speed
     speed, ratio = (signals.output_speed, 1.0 / i_f) if wheel is None else (wheel, 1.0)
     torque, step = signals.output_torque, width / 16.0
-    windows = recorded_windows(torque, speed, spans, step, width)
+    windows = build_recorded_windows(torque, speed, spans, step, width)
     if not windows.count:
         raise IdentificationError(
             f"no {width:g} s of held gear without a gap for the balance of the vehicle",
             "record at least a second before and after the shift",
         )
-    balance = VehicleBalance.over(torque, speed, (ratio, i_f), windows)
+    balance = VehicleBalance.from_torque(torque, speed, (ratio, i_f), windows)
     start = np.array([float(np.mean(torque.values)), 1.0])
     if holds_at is None:
-        fit = balance.fit(None, start, Prior.independent(2, {}))
+        fit = balance.solve_load(None, start, Prior.from_independent(2, {}))
         load = np.full(windows.count, fit.theta[LOAD])
     else:
         grown = (balance.square - holds_at**2) / i_f
-        prior = Prior.independent(3, {GROWTH: (0.0, AERO_SPREAD)})
-        fit = balance.fit(grown, np.append(start, 0.0), prior)
+        prior = Prior.from_independent(3, {GROWTH: (0.0, AERO_SPREAD)})
+        fit = balance.solve_load(grown, np.append(start, 0.0), prior)
         load = fit.theta[LOAD] + fit.theta[GROWTH] * grown
-    local = speed.at(windows.centre) * ratio
+    local = speed.interpolate_at_times(windows.centre) * ratio
     centred = local - local.mean()
     z = fit.residual / fit.residual_std
     spread = float(np.sqrt(np.sum(centred**2)))

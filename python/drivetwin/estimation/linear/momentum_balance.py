@@ -23,21 +23,21 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.segments import MomentumSettings, Stretch, stretches
-from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
+from drivetwin.estimation.data.segments import MomentumSettings, Segment, find_segments
+from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
 from drivetwin.estimation.regression.errors_in_variables import (
     Fit,
     Prior,
     Term,
-    regressors,
+    build_whitening,
+    compute_regressors,
     solve,
-    whitening,
 )
 from drivetwin.estimation.regression.modulating_functions import (
     Kernels,
     Quadrature,
-    hann_kernels,
-    join,
+    build_hann_kernels,
+    join_windows,
 )
 from drivetwin.vehicle.spec import PriorValue
 
@@ -61,7 +61,7 @@ class DelayScan:
     q: FloatArray
     best: float | None
 
-    def tells(self, std: float) -> bool:
+    def can_estimate_delay(self, std: float) -> bool:
         """Return True if the engine torque varies enough to estimate its delay to `std` [s]."""
         return std < DELAY_STD_MAX and float(np.ptp(self.q)) > DELAY_Q_MIN
 
@@ -86,20 +86,20 @@ class MomentumFit:
     acceleration: FloatArray
     inertia_torque: FloatArray
 
-    def index(self, name: str) -> int:
+    def find_index(self, name: str) -> int:
         """Position of a parameter in `fit.theta`."""
         return self.names.index(name)
 
-    def value(self, name: str) -> float:
+    def get_value(self, name: str) -> float:
         """Estimate of one parameter."""
-        return float(self.fit.theta[self.index(name)])
+        return float(self.fit.theta[self.find_index(name)])
 
-    def std(self, name: str) -> float:
+    def get_std(self, name: str) -> float:
         """Standard error of one parameter."""
-        return float(self.fit.std[self.index(name)])
+        return float(self.fit.std[self.find_index(name)])
 
 
-def momentum_names(driveline: Driveline) -> tuple[str, ...]:
+def list_momentum_names(driveline: KnownDriveline) -> tuple[str, ...]:
     """Parameters of the regression: η, Je, Jo′, age and mean rounding error of T_e, drums."""
     return (
         "eta",
@@ -125,18 +125,18 @@ class _Equations:
     """
 
     def __init__(
-        self, signals: ShiftSignals, driveline: Driveline, found: tuple[Stretch, ...]
+        self, signals: ShiftSignals, driveline: KnownDriveline, found: tuple[Segment, ...]
     ) -> None:
         self.signals = signals
-        self.windows = join([s.windows for s in found])
+        self.windows = join_windows([s.windows for s in found])
         counts = [s.windows.count for s in found]
         self.ratio = np.repeat([s.ratio for s in found], counts)
         self.stretch = tuple(np.repeat([s.name for s in found], counts).tolist())
         tied = np.repeat([s.tied for s in found], counts)
         self.constant = Quadrature(csr_array(0.5 * self.windows.width[:, None]))
-        self.torque = hann_kernels(signals.output_torque.time, self.windows).psi
-        self.engine = hann_kernels(signals.engine_speed.time, self.windows).slope
-        self.output = hann_kernels(signals.output_speed.time, self.windows).slope
+        self.torque = build_hann_kernels(signals.output_torque.time, self.windows).psi
+        self.engine = build_hann_kernels(signals.engine_speed.time, self.windows).slope
+        self.output = build_hann_kernels(signals.output_speed.time, self.windows).slope
         one, zero = np.ones_like(self.ratio), np.zeros_like(self.ratio)
         raw = {1: (one, zero), 2: (zero, 1.0 / self.ratio)}
         for k, c in enumerate(driveline.drums):
@@ -153,7 +153,7 @@ class _Equations:
     def engine_torque(self, theta: FloatArray, kernels: Kernels | None = None) -> Term:
         """The part η·T_e, its stamps taken θ[3] seconds after the instant they show."""
         torque = self.signals.engine_torque
-        kernels = kernels or hann_kernels(torque.time, self.windows, theta[3])
+        kernels = kernels or build_hann_kernels(torque.time, self.windows, theta[3])
         factor = np.full_like(self.ratio, theta[0])
         slopes = {0: (np.ones_like(self.ratio), kernels.psi), 3: (factor, kernels.slope)}
         return Term(torque.values, torque.sigma, kernels.psi, factor, slopes)
@@ -194,7 +194,7 @@ class _Equations:
         return [self.engine_torque(theta), *self.others(theta), self.rounding(theta)]
 
 
-def rounding_error(torque: Sampled, step: float) -> float:
+def estimate_rounding_error(torque: MeasuredSignal, step: float) -> float:
     """Standard deviation [N m] of the mean error that rounding to `step` leaves.
 
     Noise of standard deviation σ dithers the rounding; what stays of its mean error is periodic
@@ -208,23 +208,23 @@ def rounding_error(torque: Sampled, step: float) -> float:
     return left if left > NO_ROUNDING * torque.sigma else 0.0
 
 
-def _priors(
-    signals: ShiftSignals, driveline: Driveline, settings: MomentumSettings
+def _build_priors(
+    signals: ShiftSignals, driveline: KnownDriveline, settings: MomentumSettings
 ) -> dict[str, PriorValue]:
     """Build the priors of the parameters, by name."""
-    rounding = rounding_error(signals.engine_torque, signals.torque_resolution)
+    rounding = estimate_rounding_error(signals.engine_torque, signals.torque_resolution)
     found = {"te_delay": settings.delay_prior, "te_rounding": PriorValue(0.0, rounding)}
     if driveline.J_out is not None:
         found["J_out"] = driveline.J_out
     return found | {f"drum.{one.name}": one.drum for one in driveline.drums}
 
 
-def known(prior: PriorValue) -> float:
+def compute_prior_std(prior: PriorValue) -> float:
     """Standard deviation of a prior; a known value gets one too small to matter."""
     return prior.std if prior.std > 0.0 else 1e-6 * max(abs(prior.value), 1e-6)
 
 
-def _scan(
+def _scan_delays(
     equations: _Equations, theta: FloatArray, prior: Prior, delays: tuple[float, ...]
 ) -> DelayScan:
     """Q over the age of the engine torque, the other parameters fitted at each age.
@@ -232,13 +232,13 @@ def _scan(
     The weighting is that at `theta`; the equations are then linear in the rest.
     """
     terms = equations.terms(theta)
-    whiten = whitening(terms)
+    whiten = build_whitening(terms)
     free = [p for p in range(theta.size) if p not in (0, 3)]
     fixed = terms[1].factor * (terms[1].quadrature.matrix @ terms[1].values)
-    rest = whiten(np.column_stack([fixed, regressors(terms[1:], theta.size)[:, free]]))
+    rest = whiten(np.column_stack([fixed, compute_regressors(terms[1:], theta.size)[:, free]]))
     torque = equations.signals.engine_torque
     drives = [
-        hann_kernels(torque.time, equations.windows, delay).psi.matrix @ torque.values
+        build_hann_kernels(torque.time, equations.windows, delay).psi.matrix @ torque.values
         for delay in delays
     ]
     weight = np.sqrt(np.diag(prior.precision))[free]
@@ -251,10 +251,10 @@ def _scan(
         solution = np.linalg.lstsq(design, -rows[:, 0], rcond=None)[0]
         q.append(float(np.sum((design @ solution + rows[:, 0]) ** 2)))
     ages, values = np.asarray(delays), np.asarray(q)
-    return DelayScan(ages, values, parabola_minimum(ages, values))
+    return DelayScan(ages, values, interpolate_parabola_minimum(ages, values))
 
 
-def parabola_minimum(x: FloatArray, y: FloatArray) -> float:
+def interpolate_parabola_minimum(x: FloatArray, y: FloatArray) -> float:
     """Abscissa of the minimum of y (n,) over equidistant x (n,), by a parabola through three."""
     k = int(np.argmin(y))
     if k in (0, x.size - 1):
@@ -264,9 +264,9 @@ def parabola_minimum(x: FloatArray, y: FloatArray) -> float:
     return float(x[k] + 0.5 * (x[k + 1] - x[k]) * (left - right) / bend)
 
 
-def momentum_inertia(
+def estimate_momentum_inertia(
     signals: ShiftSignals,
-    driveline: Driveline,
+    driveline: KnownDriveline,
     settings: MomentumSettings,
     start_inertia: float,
 ) -> MomentumFit:
@@ -274,26 +274,28 @@ def momentum_inertia(
 
     `start_inertia` [kg m^2] is any value within the plausible range of J′.
     """
-    found = stretches(signals, driveline, settings)
+    found = find_segments(signals, driveline, settings)
     equations = _Equations(signals, driveline, found)
-    names = momentum_names(driveline)
-    priors = _priors(signals, driveline, settings)
-    entries = {names.index(name): (one.value, known(one)) for name, one in priors.items()}
-    prior = Prior.independent(len(names), entries)
+    names = list_momentum_names(driveline)
+    priors = _build_priors(signals, driveline, settings)
+    entries = {
+        names.index(name): (one.value, compute_prior_std(one)) for name, one in priors.items()
+    }
+    prior = Prior.from_independent(len(names), entries)
     start = prior.mean.copy()
     start[:2] = 0.9, start_inertia
-    first = solve(equations.terms, start, prior.held(3, start[3]), tolerance=0.1)
-    scan = _scan(equations, first.theta, prior, settings.delay_grid)
+    first = solve(equations.terms, start, prior.fix_parameter(3, start[3]), tolerance=0.1)
+    scan = _scan_delays(equations, first.theta, prior, settings.delay_grid)
     theta = first.theta.copy()
     theta[3] = scan.best
     fit = solve(equations.terms, theta, prior)
-    if not scan.tells(fit.std[3]):
-        fit = solve(equations.terms, first.theta, prior.held(3, start[3]))
+    if not scan.can_estimate_delay(fit.std[3]):
+        fit = solve(equations.terms, first.theta, prior.fix_parameter(3, start[3]))
         scan = replace(scan, best=None)
-    return _with_evidence(equations, names, priors, fit, scan)
+    return _attach_fit_results(equations, names, priors, fit, scan)
 
 
-def _with_evidence(
+def _attach_fit_results(
     equations: _Equations,
     names: tuple[str, ...],
     priors: Mapping[str, PriorValue],

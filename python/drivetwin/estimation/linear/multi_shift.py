@@ -9,18 +9,23 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import tell
-from drivetwin.channels.pressure_roles import pressed_element
-from drivetwin.estimation.data.shift_data import DesignData, Driveline, Sampled, ShiftSignals
-from drivetwin.estimation.linear.estimates import conclude
-from drivetwin.estimation.linear.friction_points import stribeck_at
-from drivetwin.estimation.linear.load_balance import growing_from
+from drivetwin._util.progress import notify_progress
+from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.estimation.data.shift_data import (
+    DesignData,
+    KnownDriveline,
+    MeasuredSignal,
+    ShiftSignals,
+)
+from drivetwin.estimation.linear.estimates import assess_shifts
+from drivetwin.estimation.linear.friction_points import evaluate_fitted_stribeck
+from drivetwin.estimation.linear.load_balance import find_growth_reference
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
-from drivetwin.estimation.result.estimate_set import Conclusions, with_systematic_band
-from drivetwin.vehicle.spec import SensorTolerance, middle_of
+from drivetwin.estimation.result.estimate_set import EstimateSet, add_systematic_band
+from drivetwin.vehicle.spec import SensorTolerance, compute_middle
 
 
-def systematic_std(
+def estimate_systematic_std(
     values: Callable[[ShiftSignals], FloatArray],
     signals: ShiftSignals,
     tolerances: Mapping[str, SensorTolerance],
@@ -35,18 +40,18 @@ def systematic_std(
         for kind, size in asdict(tolerance).items():
             if size:
                 error = SensorTolerance(**{kind: size})
-                total += (values(disturbed(signals, role, error)) - base) ** 2
+                total += (values(apply_sensor_error(signals, role, error)) - base) ** 2
     return np.asarray(np.sqrt(total), dtype=float)
 
 
-def disturbed(signals: ShiftSignals, role: str, error: SensorTolerance) -> ShiftSignals:
+def apply_sensor_error(signals: ShiftSignals, role: str, error: SensorTolerance) -> ShiftSignals:
     """Copy the signals with the gain, offset or delay `error` applied to one sensor."""
 
-    def changed(s: Sampled) -> Sampled:
+    def changed(s: MeasuredSignal) -> MeasuredSignal:
         values = s.values * (1.0 + error.gain) + error.offset
         return replace(s, time=s.time + error.age, values=values)
 
-    name = pressed_element(role)
+    name = get_pressure_element(role)
     if name is not None:
         if name not in signals.pressures:
             return signals
@@ -67,44 +72,44 @@ def disturbed(signals: ShiftSignals, role: str, error: SensorTolerance) -> Shift
             return signals
 
 
-def integral_method(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline], design: DesignData
-) -> tuple[Conclusions, tuple[IntegralShift, ...]]:
+def estimate_integral(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline], design: DesignData
+) -> tuple[EstimateSet, tuple[IntegralShift, ...]]:
     """Estimate the parameters by the integral method, with the stages of each shift.
 
     Raises IdentificationError if a shift does not support the method.
     """
-    start, shifts = middle_of(design.J_prime_range), []
-    load_at = growing_from(signals, design.final_drive)
+    start, shifts = compute_middle(design.J_prime_range), []
+    load_at = find_growth_reference(signals, design.final_drive)
     for k, (s, d) in enumerate(zip(signals, drivelines, strict=True)):
-        tell(k / len(signals))
+        notify_progress(k / len(signals))
         shifts.append(identify_shift(s, d, start, load_at))
-    return conclude(shifts, signals, drivelines, {}), tuple(shifts)
+    return assess_shifts(shifts, signals, drivelines, {}), tuple(shifts)
 
 
-def with_tolerances(
+def add_tolerances(
     shifts: Sequence[IntegralShift],
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     design: DesignData,
-) -> Conclusions:
+) -> EstimateSet:
     """The conclusions with the card's sensor tolerances counted.
 
     Each tolerance takes the whole method again on each shift, so this is left to those who show
     the outcome.
     """
-    parameters, bands = _systematic(signals, drivelines, shifts, design)
-    found = conclude(shifts, signals, drivelines, parameters)
+    parameters, bands = _estimate_systematic(signals, drivelines, shifts, design)
+    found = assess_shifts(shifts, signals, drivelines, parameters)
     friction = {
-        name: with_systematic_band(curve, bands[name]) if name in bands else curve
+        name: add_systematic_band(curve, bands[name]) if name in bands else curve
         for name, curve in found.friction.items()
     }
     return replace(found, friction=friction)
 
 
-def _systematic(
+def _estimate_systematic(
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     shifts: Sequence[IntegralShift],
     design: DesignData,
 ) -> tuple[dict[str, float], Mapping[str, FloatArray]]:
@@ -117,20 +122,22 @@ def _systematic(
     bands: dict[str, FloatArray] = {}
     if not design.sensors:
         return parameters, bands
-    start = middle_of(design.J_prime_range)
+    start = compute_middle(design.J_prime_range)
     for k, (s, d, base) in enumerate(zip(signals, drivelines, shifts, strict=True)):
-        tell(k / len(signals))
+        notify_progress(k / len(signals))
 
-        def values(x: ShiftSignals, d: Driveline = d, base: IntegralShift = base) -> FloatArray:
+        def values(
+            x: ShiftSignals, d: KnownDriveline = d, base: IntegralShift = base
+        ) -> FloatArray:
             run = identify_shift(x, d, start, base.load.holds_at)
             found = dict(zip(run.ids, run.values, strict=True))
             told = [found.get(k, v) for k, v in zip(base.ids, base.values, strict=True)]
             if base.friction is None:
                 return np.array(told)
             fit = base.friction if run.friction is None else run.friction
-            return np.append(told, stribeck_at(fit, base.friction.curve.slip))
+            return np.append(told, evaluate_fitted_stribeck(fit, base.friction.curve.slip))
 
-        std = systematic_std(values, s, design.sensors)
+        std = estimate_systematic_std(values, s, design.sensors)
         for name, value in zip(base.ids, std[: len(base.ids)], strict=True):
             parameters[name] = max(parameters.get(name, 0.0), float(value))
         if base.friction is not None:

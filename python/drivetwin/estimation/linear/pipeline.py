@@ -10,29 +10,29 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.segments import MomentumSettings, off_going_free
-from drivetwin.estimation.data.shift_data import Driveline, Sampled, ShiftSignals
+from drivetwin.estimation.data.segments import MomentumSettings, find_off_going_release
+from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
 from drivetwin.estimation.linear.friction_points import (
     FrictionFit,
     FrictionSettings,
-    momentum_friction,
+    fit_momentum_friction,
 )
 from drivetwin.estimation.linear.load_balance import (
     AERO,
     AERO_SPREAD,
     LoadFit,
-    load_spans,
-    momentum_load,
+    estimate_momentum_load,
+    select_load_spans,
 )
-from drivetwin.estimation.linear.momentum_balance import MomentumFit, momentum_inertia
+from drivetwin.estimation.linear.momentum_balance import MomentumFit, estimate_momentum_inertia
 from drivetwin.estimation.linear.ringdown import (
     START_AFTER_LOCKUP,
     Drive,
     RingDown,
+    compute_shaft_parameters,
     fit_ringdown,
-    stiffness_and_damping,
 )
-from drivetwin.estimation.result.verdict import independent, propagate
+from drivetwin.estimation.result.verdict import build_block_covariance, propagate
 from drivetwin.vehicle.spec import PriorValue
 
 NUISANCES = ("te_rounding", "drum")
@@ -59,30 +59,32 @@ class IntegralShift:
     refusals: dict[str, str]
 
 
-def _gear_inertia(driveline: Driveline, momentum: MomentumFit, ratio: float) -> FloatArray:
+def _compute_gear_inertia(
+    driveline: KnownDriveline, momentum: MomentumFit, ratio: float
+) -> FloatArray:
     """Row (p,) that gives the inertia at the engine with all couplings locked at `ratio`.
 
     Drums of open elements included: they swing with the rest.
     """
     row = np.zeros(len(momentum.names))
-    row[momentum.index("J_e")] = 1.0
-    row[momentum.index("J_out")] = ratio**-2
+    row[momentum.find_index("J_e")] = 1.0
+    row[momentum.find_index("J_out")] = ratio**-2
     for element in driveline.drums:
-        row[momentum.index(f"drum.{element.name}")] = (element.a - element.b / ratio) ** 2
+        row[momentum.find_index(f"drum.{element.name}")] = (element.a - element.b / ratio) ** 2
     return row
 
 
-def _ring(
-    signals: ShiftSignals, driveline: Driveline, momentum: MomentumFit, load: LoadFit
+def _fit_ring(
+    signals: ShiftSignals, driveline: KnownDriveline, momentum: MomentumFit, load: LoadFit
 ) -> RingDown:
     """Ring-down fit, with the engine torque's own motion put in."""
     ratio = driveline.i_after
-    J4 = float(_gear_inertia(driveline, momentum, ratio) @ momentum.fit.theta) * ratio**2
+    J4 = float(_compute_gear_inertia(driveline, momentum, ratio) @ momentum.fit.theta) * ratio**2
     J5 = load.J_vehicle / driveline.i_f**2
-    gain = momentum.value("eta") * ratio * J5 / (J4 + J5)
-    shift, measured, age = signals.shift, signals.engine_torque, momentum.value("te_delay")
-    after = min(START_AFTER_LOCKUP, MomentumSettings().guard("lockup", shift))
-    acting = Sampled(measured.time - age, measured.values, measured.sigma)
+    gain = momentum.get_value("eta") * ratio * J5 / (J4 + J5)
+    shift, measured, age = signals.shift, signals.engine_torque, momentum.get_value("te_delay")
+    after = min(START_AFTER_LOCKUP, MomentumSettings().compute_guard("lockup", shift))
+    acting = MeasuredSignal(measured.time - age, measured.values, measured.sigma)
     return fit_ringdown(
         signals.output_torque,
         shift.lockup_time,
@@ -92,8 +94,12 @@ def _ring(
     )
 
 
-def _derived(
-    driveline: Driveline, momentum: MomentumFit, load: LoadFit, ring: RingDown | None, gear: str
+def _compute_derived(
+    driveline: KnownDriveline,
+    momentum: MomentumFit,
+    load: LoadFit,
+    ring: RingDown | None,
+    gear: str,
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Shaft parameters, nuisances and AERO with all that they share: ids, values, covariance.
 
@@ -102,8 +108,8 @@ def _derived(
     size = len(momentum.names)
     unknown = [name for name, one in momentum.priors.items() if one.std > 0.0]
     nuisances = tuple(name for name in unknown if name.split(".")[0] in NUISANCES)
-    kept = [momentum.index(name) for name in nuisances]
-    after = _gear_inertia(driveline, momentum, driveline.i_after) * driveline.i_after**2
+    kept = [momentum.find_index(name) for name in nuisances]
+    after = _compute_gear_inertia(driveline, momentum, driveline.i_after) * driveline.i_after**2
     parts = [momentum.fit.theta, load.fit.theta]
     blocks = [momentum.fit.covariance, load.fit.covariance]
     ids: tuple[str, ...] = ()
@@ -120,18 +126,18 @@ def _derived(
         if ring is None:
             return np.array([*common, *theta[kept], *aero])
         rate, omega = x[end:]
-        shaft = stiffness_and_damping(rate, omega, float(after @ theta), J3 / driveline.i_f**2)
+        shaft = compute_shaft_parameters(rate, omega, float(after @ theta), J3 / driveline.i_f**2)
         zeta = rate / np.hypot(rate, omega)
         return np.array([*common, *shaft, omega / (2.0 * np.pi), zeta, *theta[kept], *aero])
 
-    found, covariance = propagate(values, np.concatenate(parts), independent(*blocks))
+    found, covariance = propagate(values, np.concatenate(parts), build_block_covariance(*blocks))
     grown = () if load.holds_at is None else (AERO,)
     return (*ids, *nuisances, *grown), found, covariance
 
 
 def identify_shift(
     signals: ShiftSignals,
-    driveline: Driveline,
+    driveline: KnownDriveline,
     start_inertia: float,
     load_at: float | None = None,
 ) -> IntegralShift:
@@ -143,25 +149,29 @@ def identify_shift(
     """
     settings = MomentumSettings()
     shift = signals.shift
-    momentum = momentum_inertia(signals, driveline, settings, start_inertia)
-    load = momentum_load(signals, driveline.i_f, load_spans(signals), load_at)
+    momentum = estimate_momentum_inertia(signals, driveline, settings, start_inertia)
+    load = estimate_momentum_load(signals, driveline.i_f, select_load_spans(signals), load_at)
     refusals: dict[str, str] = {}
     ring: RingDown | None = None
     friction: FrictionFit | None = None
     try:
-        ring = _ring(signals, driveline, momentum, load)
+        ring = _fit_ring(signals, driveline, momentum, load)
     except IdentificationError as error:
         refusals["shaft"] = error.what
     try:
-        free = off_going_free(signals, driveline, settings)
-        friction = momentum_friction(signals, driveline, momentum, free, FrictionSettings())
+        free = find_off_going_release(signals, driveline, settings)
+        friction = fit_momentum_friction(signals, driveline, momentum, free, FrictionSettings())
     except IdentificationError as error:
         refusals["friction"] = error.what
     try:
-        further, values, covariance = _derived(driveline, momentum, load, ring, shift.end_gear)
+        further, values, covariance = _compute_derived(
+            driveline, momentum, load, ring, shift.end_gear
+        )
     except IdentificationError as error:
         ring, refusals["shaft"] = None, error.what
-        further, values, covariance = _derived(driveline, momentum, load, None, shift.end_gear)
+        further, values, covariance = _compute_derived(
+            driveline, momentum, load, None, shift.end_gear
+        )
     gears = (f"J_prime_{shift.start_gear}", f"J_prime_{shift.end_gear}")
     ids: tuple[str, ...] = ("eta", *gears, "J_out", "te_delay", "J_vehicle", "Tv_over_if")
     ids = (*ids, *further)
@@ -177,5 +187,5 @@ def identify_shift(
         ids = (*ids, f"P0.{friction.element}")
         priors[ids[-1]] = driveline.oncoming.P0
         values = np.append(values, friction.P0)
-        covariance = independent(covariance, np.array([[friction.P0_std**2]]))
+        covariance = build_block_covariance(covariance, np.array([[friction.P0_std**2]]))
     return IntegralShift(momentum, load, ring, friction, ids, values, covariance, priors, refusals)

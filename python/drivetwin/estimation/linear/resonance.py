@@ -15,9 +15,9 @@ from scipy.optimize import least_squares
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.linear.ringdown import BAND, FASTEST
-from drivetwin.shifts.coverage import parts_between
+from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.shift import Shift
 
 FIRST, LAST = 0.02, 0.42
@@ -84,18 +84,18 @@ class _Decay:
         )
 
 
-def after_shift(speed: Sampled, shift: Shift) -> Resonance | str:
+def find_shift_resonance(speed: MeasuredSignal, shift: Shift) -> Resonance | str:
     """Estimate the resonance in the gear that a shift ends in from the input speed [rad/s].
 
     Returns the reason if there is none.
     """
     try:
-        return resonance(speed, shift.lockup_time, shift.after[1])
+        return fit_resonance(speed, shift.lockup_time, shift.after[1])
     except IdentificationError as refusal:
         return refusal.what
 
 
-def resonance(speed: Sampled, lockup: float, end: float) -> Resonance:
+def fit_resonance(speed: MeasuredSignal, lockup: float, end: float) -> Resonance:
     """Decay of a shaft speed [rad/s] in the gear held from `lockup` to `end` [s].
 
     The standard deviations hold the spread between the windows. Raises IdentificationError where
@@ -105,8 +105,8 @@ def resonance(speed: Sampled, lockup: float, end: float) -> Resonance:
     for start in np.arange(lockup + FIRST, lockup + LAST, STEP):
         for length in LENGTHS:
             span = (float(start), float(start + length))
-            if span[1] <= end and parts_between(span, speed.gaps) == (span,):
-                decay = _fit(speed.within(span))
+            if span[1] <= end and split_at_gaps(span, speed.gaps) == (span,):
+                decay = _fit_window(speed.select_span(span))
                 if decay is not None and decay.clean:
                     found.append(decay)
     if len({decay.span[0] for decay in found}) < AGREEING:
@@ -128,9 +128,9 @@ def resonance(speed: Sampled, lockup: float, end: float) -> Resonance:
     )
 
 
-def _fit(part: Sampled) -> _Decay | None:
+def _fit_window(part: MeasuredSignal) -> _Decay | None:
     """Best decaying sine on a quadratic in one window; None with too few samples."""
-    time, values = _thinned(part)
+    time, values = _reduce_samples(part)
     if time.size < 12:
         return None
     trend = np.vander(time / time[-1], 3)
@@ -165,7 +165,7 @@ def _fit(part: Sampled) -> _Decay | None:
     )
 
 
-def _thinned(part: Sampled) -> tuple[FloatArray, FloatArray]:
+def _reduce_samples(part: MeasuredSignal) -> tuple[FloatArray, FloatArray]:
     """Time from the first sample [s] and value, means over FINEST where sampling is finer."""
     if part.time.size < 2:
         return part.time, part.values

@@ -18,12 +18,12 @@ from scipy.signal import cont2discrete, lfilter
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.shifts.coverage import parts_between
-from drivetwin.simulation.dual_clutch import in_series
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.shifts.coverage import split_at_gaps
+from drivetwin.simulation.dual_clutch import compute_series_inertia
 
 
-def stiffness_and_damping(decay_rate: float, omega_d: float, J4: float, J5: float) -> FloatArray:
+def compute_shaft_parameters(decay_rate: float, omega_d: float, J4: float, J5: float) -> FloatArray:
     """(k_o [N m/rad], c_o [N m s/rad]) from the oscillation and the inertias it swings between.
 
     `decay_rate` σ = ζ·ω_n [1/s], `omega_d` [rad/s], so ω_n² = σ² + ω_d². `J4`, `J5` [kg m^2] are
@@ -34,7 +34,7 @@ def stiffness_and_damping(decay_rate: float, omega_d: float, J4: float, J5: floa
             f"inertias {J4:.4g} and {J5:.4g} kg·m² on the two sides of the output shaft",
             "check the inertia and load fits of this log: both must be positive",
         )
-    J = in_series(J4, J5)
+    J = compute_series_inertia(J4, J5)
     return np.array([J * (decay_rate**2 + omega_d**2), 2.0 * decay_rate * J])
 
 
@@ -58,7 +58,7 @@ RATIOS = np.logspace(-3.0, 8.0, 45)
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class FitResidual:
     """Residual of a least-squares fit.
 
     `residual` (n,) is orthogonal to `explained` (n, p). `sigma` [N m] is the smallest white noise
@@ -73,20 +73,20 @@ class Left:
     known: FloatArray
 
 
-def knots_of(time: FloatArray, omega: float) -> FloatArray:
+def place_knots(time: FloatArray, omega: float) -> FloatArray:
     """Knots (m,) [s] between which an unknown torque runs straight, for a ring of ω [rad/s]."""
     span = float(time[-1] - time[0])
     step = max(2.0 * np.pi / omega / PER_PERIOD, span / MOST_KNOTS, span / (time.size - 1))
     return np.linspace(time[0], time[-1], int(span / step + 1e-9) + 1)
 
 
-def hats(time: FloatArray, knots: FloatArray) -> FloatArray:
+def compute_hat_weights(time: FloatArray, knots: FloatArray) -> FloatArray:
     """Weights (n, m) of the knots (m,) in a torque at `time` (n,) that runs straight between."""
     distance = np.abs(time[:, None] - knots) / (knots[1] - knots[0])
     return np.asarray(np.maximum(1.0 - distance, 0.0))
 
 
-def variances(left: Left) -> tuple[float, FloatArray]:
+def estimate_variances(left: FitResidual) -> tuple[float, FloatArray]:
     """Variance of the sensor's noise, and of the torque at each knot (m,), as expected of `left`.
 
     Each ratio of the two powers weighs by its likelihood, all standard deviations of the torque
@@ -114,9 +114,9 @@ def variances(left: Left) -> tuple[float, FloatArray]:
     return float(weight @ noise), float(weight @ (ratios * noise)) + left.known
 
 
-def covariance(left: Left, slopes: FloatArray) -> FloatArray:
+def estimate_slope_covariance(left: FitResidual, slopes: FloatArray) -> FloatArray:
     """Covariance (p, p) of least squares with the residual's derivatives `slopes` (n, p)."""
-    noise, torque = variances(left)
+    noise, torque = estimate_variances(left)
     inverse = np.linalg.inv(slopes.T @ slopes)
     acting = inverse @ (slopes.T @ left.response)
     return np.asarray(noise * inverse + (acting * torque) @ acting.T)
@@ -185,7 +185,7 @@ class RingDown:
 class Drive:
     """Engine torque [N m] as measured, at the instants it acts, and its static gain on T_o."""
 
-    torque: Sampled
+    torque: MeasuredSignal
     gain: float
 
 
@@ -203,12 +203,12 @@ class _Push:
     density: FloatArray
 
 
-def _push(drive: Drive | None, time: FloatArray) -> _Push:
+def _compute_push(drive: Drive | None, time: FloatArray) -> _Push:
     if drive is None:
         return _Push(np.zeros_like(time), np.empty((time.size, 0)), np.zeros_like(time))
-    measured, calm = drive.torque, quiet(drive.torque)
-    sure = drive.gain * calm.at(time)
-    jitter = drive.gain * measured.at(time) - sure
+    measured, calm = drive.torque, remove_jitter(drive.torque)
+    sure = drive.gain * calm.interpolate_at_times(time)
+    jitter = drive.gain * measured.interpolate_at_times(time) - sure
     jumps = np.ptp(jitter) > 1e-3 * drive.gain * measured.sigma
     as_measured = np.interp(time, calm.time, (calm.values == measured.values).astype(float))
     period = float(np.median(np.diff(measured.time)))
@@ -223,21 +223,25 @@ def _refuse(what: str) -> IdentificationError:
     )
 
 
-def _stretch(torque: Sampled, lockup: float, end: float, after: float) -> Sampled:
+def _select_ring_samples(
+    torque: MeasuredSignal, lockup: float, end: float, after: float
+) -> MeasuredSignal:
     span = (lockup + after, min(end, lockup + LONGEST))
-    for whole in parts_between(span, torque.gaps):
-        part = torque.within(whole)
+    for whole in split_at_gaps(span, torque.gaps):
+        part = torque.select_span(whole)
         if part.time.size >= FEWEST and part.time[-1] - part.time[0] >= SHORTEST:
             return part
     raise _refuse(f"less than {SHORTEST:g} s of the new gear are left after lock-up")
 
 
-def _quadratic(time: FloatArray) -> FloatArray:
+def _build_quadratic(time: FloatArray) -> FloatArray:
     u = (time - time[0]) / (time[-1] - time[0])
     return np.column_stack([np.ones_like(u), u, u * u])
 
 
-def pencil_start(time: FloatArray, values: FloatArray, order: int = 6) -> tuple[float, float]:
+def estimate_pencil_start(
+    time: FloatArray, values: FloatArray, order: int = 6
+) -> tuple[float, float]:
     """Decay rate [1/s] and frequency [rad/s] of the strongest mode in `BAND`, by matrix pencil.
 
     `values` (n,) over equidistant `time` (n,), trend removed; it is thinned to about 200 samples.
@@ -261,7 +265,7 @@ def pencil_start(time: FloatArray, values: FloatArray, order: int = 6) -> tuple[
     return float(-rates[best].real), float(rates[best].imag)
 
 
-def _starts(time: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
+def _list_pencil_starts(time: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
     """Decay rates [1/s] and frequencies [rad/s] that a matrix pencil finds in the whole stretch and
     in its first parts: of a ring that dies away soon the rest is noise.
 
@@ -273,7 +277,7 @@ def _starts(time: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
         if count < FEWEST:
             break
         try:
-            found.append(pencil_start(time[:count], values[:count]))
+            found.append(estimate_pencil_start(time[:count], values[:count]))
         except IdentificationError:
             continue
     if not found:
@@ -281,7 +285,9 @@ def _starts(time: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
     return found
 
 
-def forced_response(rate: float, omega: float, time: FloatArray, drive: FloatArray) -> FloatArray:
+def compute_forced_response(
+    rate: float, omega: float, time: FloatArray, drive: FloatArray
+) -> FloatArray:
     """Response of the shaft torque, static gain 1, to each column of `drive` (n,) or (n, m).
 
     `time` (n,) is equidistant. The two-mass shaft passes a torque on the one mass as
@@ -294,7 +300,7 @@ def forced_response(rate: float, omega: float, time: FloatArray, drive: FloatArr
     return np.asarray(lfilter(np.ravel(top), bottom, drive, axis=0), dtype=float)
 
 
-def quiet(torque: Sampled, block: int = 4, still: int = 12) -> Sampled:
+def remove_jitter(torque: MeasuredSignal, block: int = 4, still: int = 12) -> MeasuredSignal:
     """Engine torque without jitter: where it stands still, a straight line replaces the samples.
 
     It moves where the means of the `block` values before and after differ by more than four
@@ -315,11 +321,11 @@ def quiet(torque: Sampled, block: int = 4, still: int = 12) -> Sampled:
         if last - first >= still:
             t = torque.time[first:last] - torque.time[first]
             smooth[first:last] = np.polyval(np.polyfit(t, v[first:last], 1), t)
-    return Sampled(torque.time, smooth, torque.sigma)
+    return MeasuredSignal(torque.time, smooth, torque.sigma)
 
 
 def fit_ringdown(
-    torque: Sampled,
+    torque: MeasuredSignal,
     lockup: float,
     end: float,
     drive: Drive | None,
@@ -333,14 +339,14 @@ def fit_ringdown(
     decay shows, or none that stands out of the noise: the best fit to noise alone has an interval
     too, as narrow as any.
     """
-    part = _stretch(torque, lockup, end, after)
+    part = _select_ring_samples(torque, lockup, end, after)
     time = np.linspace(part.time[0], part.time[-1], part.time.size)
-    values = part.at(time)
-    local, trend = time - time[0], _quadratic(time)
-    push = _push(drive, time)
+    values = part.interpolate_at_times(time)
+    local, trend = time - time[0], _build_quadratic(time)
+    push = _compute_push(drive, time)
 
     def beside(p: FloatArray) -> FloatArray:
-        return np.column_stack([trend, forced_response(p[0], p[1], time, push.jitter)])
+        return np.column_stack([trend, compute_forced_response(p[0], p[1], time, push.jitter)])
 
     def basis(p: FloatArray) -> FloatArray:
         decay = np.exp(-p[0] * local)
@@ -348,35 +354,37 @@ def fit_ringdown(
         return np.column_stack([*swing, beside(p)])
 
     def unforced(p: FloatArray) -> FloatArray:
-        return values - forced_response(p[0], p[1], time, push.sure)
+        return values - compute_forced_response(p[0], p[1], time, push.sure)
 
     def projected(p: FloatArray) -> FloatArray:
-        return _without(basis(p), unforced(p))
+        return _remove_explained(basis(p), unforced(p))
 
-    starts = _starts(time, _without(trend, values - push.sure))
+    starts = _list_pencil_starts(time, _remove_explained(trend, values - push.sure))
     start = min(starts, key=lambda p: float(np.sum(projected(np.array(p)) ** 2)))
     found = least_squares(projected, start, x_scale=(5.0, 5.0), method="lm")
     rate, omega = (float(v) for v in found.x)
     if not 0.0 < rate < omega < FASTEST * np.pi / (time[1] - time[0]):
         raise _refuse(f"the fit ends at decay rate {rate:.3g} 1/s, {omega / (2 * np.pi):.3g} Hz")
     residual = projected(found.x)
-    still = _without(beside(found.x), unforced(found.x))
-    noise = _power_near(residual, omega, time[1] - time[0], torque.sigma)
+    still = _remove_explained(beside(found.x), unforced(found.x))
+    noise = _estimate_adjacent_power(residual, omega, time[1] - time[0], torque.sigma)
     _require_more_than_chance(float(still @ still - residual @ residual) / noise, time.size)
     slopes, span = np.asarray(found.jac, dtype=float), basis(found.x)
-    knots = knots_of(time, omega)
-    density = (1.0 - _share(span, unforced(found.x))) * np.interp(knots, time, push.density)
-    left = Left(
+    knots = place_knots(time, omega)
+    density = (1.0 - _estimate_jitter_share(span, unforced(found.x))) * np.interp(
+        knots, time, push.density
+    )
+    left = FitResidual(
         residual,
         np.column_stack([span, slopes]),
         torque.sigma,
-        forced_response(rate, omega, time, hats(time, knots)),
+        compute_forced_response(rate, omega, time, compute_hat_weights(time, knots)),
         density / (knots[1] - knots[0]),
     )
     return RingDown(
         rate,
         omega,
-        covariance(left, slopes),
+        estimate_slope_covariance(left, slopes),
         time,
         values,
         values - residual,
@@ -385,7 +393,7 @@ def fit_ringdown(
     )
 
 
-def _share(basis: FloatArray, values: FloatArray) -> float:
+def _estimate_jitter_share(basis: FloatArray, values: FloatArray) -> float:
     """Share of the jitter, the last column of `basis` where there is any, that shows in `values`.
 
     Between 0, also without jitter, and 1.
@@ -395,7 +403,7 @@ def _share(basis: FloatArray, values: FloatArray) -> float:
     return float(np.clip(np.linalg.lstsq(basis, values, rcond=None)[0][-1], 0.0, 1.0))
 
 
-def _without(basis: FloatArray, values: FloatArray) -> FloatArray:
+def _remove_explained(basis: FloatArray, values: FloatArray) -> FloatArray:
     """Residual of `values` (n,) after projection on the columns of `basis` (n, m)."""
     q, _ = np.linalg.qr(basis)
     return np.asarray(values - q @ (q.T @ values), dtype=float)
@@ -415,7 +423,9 @@ def _require_more_than_chance(explained: float, count: int) -> None:
         )
 
 
-def _power_near(residual: FloatArray, omega: float, step: float, sigma: float) -> float:
+def _estimate_adjacent_power(
+    residual: FloatArray, omega: float, step: float, sigma: float
+) -> float:
     """Noise variance per sample beside a ring at ω: the residual's power from ω/2 to 2ω.
 
     Never less than the power over all frequencies or the sensor's own noise; these alone where a

@@ -25,22 +25,29 @@ from scipy.stats import chi2
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.likelihood.diagnostics.identifiability import reduced
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of, noise_power
-from drivetwin.estimation.likelihood.parametrization import LAW, OF_RUN, own_of
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters, slopes
-from drivetwin.estimation.linear.friction_points import stribeck
+from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
+from drivetwin.estimation.likelihood.fit import (
+    LikelihoodFit,
+    compute_variance_inflation,
+    invert_information,
+)
+from drivetwin.estimation.likelihood.parametrization import LAW, RUN_SPECIFIC, map_log_names
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
+    compute_jacobian,
+    compute_parameters,
+)
+from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import FrictionCurve
-from drivetwin.estimation.result.multi_log import Consistency, Move
-from drivetwin.estimation.result.verdict import root_of
+from drivetwin.estimation.result.multi_log import Consistency, LogPull
+from drivetwin.estimation.result.verdict import compute_covariance_root
 
 TOLD = 0.02
 """Share of the joint information on a direction below which a log is uninformative."""
 
 
 @dataclass(frozen=True, eq=False)
-class Pull:
+class LogScore:
     """One log in the coordinates of the joint covariance: information (s, s) and pull (s,)."""
 
     log: int
@@ -48,33 +55,35 @@ class Pull:
     pull: FloatArray
 
 
-def consistency(
+def check_consistency(
     fit: LikelihoodFit, signals: Sequence[ShiftSignals], friction: Mapping[str, FrictionCurve]
 ) -> Consistency:
     """Test the logs of `fit` against each other; `signals` as fitted, in the order of its parts."""
     logs = tuple(dict.fromkeys(s.log for s in signals))
-    shared = shared_of(fit)
-    covariance = covariance_of(fit.normal.information)
-    root = root_of(covariance[np.ix_(shared, shared)])
-    pulls = [_pull(fit, log, shared, root) for log in logs]
-    square, freedom = homogeneity(pulls)
-    power = noise_power(fit, np.eye(len(covariance))[shared])
+    shared = find_shared(fit)
+    covariance = invert_information(fit.normal.information)
+    root = compute_covariance_root(covariance[np.ix_(shared, shared)])
+    pulls = [_compute_score(fit, log, shared, root) for log in logs]
+    square, freedom = compute_homogeneity(pulls)
+    power = compute_variance_inflation(fit, np.eye(len(covariance))[shared])
     square /= power
-    rows = _rows(fit, signals, friction)
+    rows = _compute_rows(fit, signals, friction)
     told = {name: row[shared] @ root for name, row in rows.items()}
     p = float(chi2.sf(square, freedom)) if freedom else 1.0
-    return Consistency(square, freedom, p, _moves(pulls, told, power))
+    return Consistency(square, freedom, p, _find_discrepancies(pulls, told, power))
 
 
-def shared_of(fit: LikelihoodFit) -> list[int]:
+def find_shared(fit: LikelihoodFit) -> list[int]:
     """Return the indices of the unknowns that all logs share."""
     structures = [part.structure for part in fit.problem.parts]
-    own = {name for one in structures for name in own_of(one.log).values()}
-    starts = {f"{one.label}.{key}" for one in structures for key in OF_RUN}
+    own = {name for one in structures for name in map_log_names(one.log).values()}
+    starts = {f"{one.label}.{key}" for one in structures for key in RUN_SPECIFIC}
     return [k for k, name in enumerate(fit.point.names) if name not in own | starts]
 
 
-def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray) -> Pull:
+def _compute_score(
+    fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray
+) -> LogScore:
     """Compute information and gradient of one log on the shared unknowns at the common minimum.
 
     Raises IdentificationError where a simulation that the fit had made does not run again.
@@ -82,7 +91,7 @@ def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray)
     size = len(fit.point.names)
     parts = tuple(part for part in fit.problem.parts if part.structure.log == log)
     prior = fit.problem.prior
-    own = [k for k, name in enumerate(fit.point.names) if name in own_of(log).values()]
+    own = [k for k, name in enumerate(fit.point.names) if name in map_log_names(log).values()]
     precision = np.zeros((size, size))
     precision[np.ix_(own, own)] = prior.precision[np.ix_(own, own)]
     alone = replace(fit.problem, parts=parts, prior=Prior(prior.mean, precision))
@@ -92,11 +101,11 @@ def _pull(fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray)
             f"the simulation of log {log} fails at the common minimum", "identify it by itself"
         )
     rest = [k for k in range(size) if k not in shared and normal.information[k, k] > 0.0]
-    told = root.T @ reduced(normal.information, list(shared), rest) @ root
-    return Pull(log, 0.5 * (told + told.T), root.T @ normal.gradient[list(shared)])
+    told = root.T @ reduce_information(normal.information, list(shared), rest) @ root
+    return LogScore(log, 0.5 * (told + told.T), root.T @ normal.gradient[list(shared)])
 
 
-def homogeneity(pulls: Sequence[Pull]) -> tuple[float, int]:
+def compute_homogeneity(pulls: Sequence[LogScore]) -> tuple[float, int]:
     """Compute χ² and its degrees of freedom over the directions that each log identifies."""
     rows, targets = [], []
     for one in pulls:
@@ -111,11 +120,11 @@ def homogeneity(pulls: Sequence[Pull]) -> tuple[float, int]:
     return float(left @ left), int(matrix.shape[0] - rank)
 
 
-def _moves(
-    pulls: Sequence[Pull], told: Mapping[str, FloatArray], widened: float
-) -> tuple[Move, ...]:
+def _find_discrepancies(
+    pulls: Sequence[LogScore], told: Mapping[str, FloatArray], widened: float
+) -> tuple[LogPull, ...]:
     """Find the largest discrepancy of every parameter over the logs."""
-    largest: dict[str, Move] = {}
+    largest: dict[str, LogPull] = {}
     for one in pulls:
         power, directions = np.linalg.eigh(one.information)
         share = np.clip(power, 0.0, 1.0 - TOLD)
@@ -125,17 +134,17 @@ def _moves(
             std = np.sqrt(widened * along**2 @ (share / (1.0 - share)))
             z = float(move / std) if std > TOLD * np.linalg.norm(row) else 0.0
             if name not in largest or abs(z) > abs(largest[name].z):
-                largest[name] = Move(name, one.log, z)
+                largest[name] = LogPull(name, one.log, z)
     return tuple(largest.values())
 
 
-def _rows(
+def _compute_rows(
     fit: LikelihoodFit, signals: Sequence[ShiftSignals], friction: Mapping[str, FrictionCurve]
 ) -> dict[str, FloatArray]:
     """Compute the derivative (p,) by the unknowns of every shared parameter, and of friction."""
-    names = list(parameters(fit.problem, fit.point, signals))
-    matrix = slopes(fit.problem, fit.point, np.sqrt(np.diag(fit.covariance)), signals)
-    own = np.setdiff1d(np.arange(len(fit.point.names)), shared_of(fit))
+    names = list(compute_parameters(fit.problem, fit.point, signals))
+    matrix = compute_jacobian(fit.problem, fit.point, np.sqrt(np.diag(fit.covariance)), signals)
+    own = np.setdiff1d(np.arange(len(fit.point.names)), find_shared(fit))
     rows = {
         name: row
         for name, row in zip(names, matrix, strict=True)
@@ -145,6 +154,6 @@ def _rows(
         index = [fit.point.names.index(f"{element}.{key}") for key in LAW]
         middle = np.array([np.mean(curve.slip[[0, -1]])])
         row = np.zeros(len(fit.point.names))
-        row[index] = stribeck(fit.point.values[index], middle)[1][:, 0]
+        row[index] = evaluate_stribeck(fit.point.values[index], middle)[1][:, 0]
         rows[f"mu.{element}"] = row
     return rows

@@ -19,28 +19,32 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
-from drivetwin._util.progress import part
+from drivetwin._util.display_units import format_with_unit
+from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError, Where
-from drivetwin.estimation.analysis.profile_likelihood import likelihood_of
-from drivetwin.estimation.artifacts import Evidence
-from drivetwin.estimation.data.select_shifts import balanced
+from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
+from drivetwin.estimation.artifacts import StageResults
+from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify
-from drivetwin.estimation.likelihood.estimates import conclude
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of
+from drivetwin.estimation.likelihood.estimates import build_estimates
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START
-from drivetwin.estimation.likelihood.parametrization import OF_RUN, OWN, own_of
-from drivetwin.estimation.likelihood.selection.select_model import choose
+from drivetwin.estimation.likelihood.parametrization import (
+    LOG_SPECIFIC,
+    RUN_SPECIFIC,
+    map_log_names,
+)
+from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
-from drivetwin.estimation.multi_log.consistency import consistency
-from drivetwin.estimation.multi_log.verdicts import judged, pooled_curves
-from drivetwin.estimation.result.estimate_set import Conclusions
+from drivetwin.estimation.multi_log.consistency import check_consistency
+from drivetwin.estimation.multi_log.verdicts import apply_consistency, pool_curves
+from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.multi_log import FAR, LogShare, Several
-from drivetwin.estimation.result.prior_conflict import outside_ranges, without_gain
-from drivetwin.parameters import log_of
+from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
+from drivetwin.parameters import split_log_number
 from drivetwin.vehicle.spec import SensorTolerance
 
 ALONE = 0.6
@@ -49,7 +53,7 @@ NAMED = 3
 """How many differences an error names at most."""
 
 
-def identify_several(logs: Sequence[PreparedLog]) -> Identification:
+def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
     """Identify one driveline from two or more logs, by the likelihood of all their shifts.
 
     `evidence.several` holds the logs; ids of what a log has of its own end in its number.
@@ -57,35 +61,38 @@ def identify_several(logs: Sequence[PreparedLog]) -> Identification:
     """
     alone, fitted = [], []
     for k, log in enumerate(logs):
-        with part(ALONE * k / len(logs), ALONE * (k + 1) / len(logs), f"log {k + 1} alone"):
-            fitted.append(balanced(log) if log.scale_known else log)
-            alone.append(_by_itself(fitted[-1]))
+        with scale_progress(
+            ALONE * k / len(logs), ALONE * (k + 1) / len(logs), f"log {k + 1} alone"
+        ):
+            fitted.append(drop_unbalanced(log) if log.scale_known else log)
+            alone.append(_identify_single(fitted[-1]))
     design = logs[0].design
     signals = [replace(s, log=k) for k, log in enumerate(fitted, 1) for s in log.signals]
     drivelines = [driveline for log in fitted for driveline in log.drivelines]
-    with part(ALONE, 0.95, "all logs together"):
+    with scale_progress(ALONE, 0.95, "all logs together"):
         try:
-            _refuse_apart(alone)
-            fit, notes = choose(signals, drivelines, design.loss_law, start_of(alone))
+            _require_agreement(alone)
+            fit, notes = select_model(signals, drivelines, design.loss_law, compute_start(alone))
         except IdentificationError as fault:
             raise IdentificationError(
                 f"each of {len(logs)} logs can be explained, but not all by one set of parameters: "
-                f"alone they tell {'; '.join(farthest(alone)) or fault.what}",
+                f"alone they tell {'; '.join(find_largest_differences(alone)) or fault.what}",
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
-    told = conclude(fit, signals, drivelines, pooled_curves(alone), common_tolerances(logs))
-    tested = consistency(fit, signals, told.friction)
+    told = build_estimates(fit, signals, drivelines, pool_curves(alone), merge_tolerances(logs))
+    tested = check_consistency(fit, signals, told.friction)
     shares = tuple(
-        _share(k, log, one, fit) for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)
+        _build_log_share(k, log, one, fit)
+        for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)
     )
     read = [f"{Path(log.source).name}: {text}" for log in logs for text in log.warnings]
     is_open = any(s.torque_of_speeds is not None for s in signals)
-    ranges = () if is_open else outside_ranges(told.estimates, design)
-    estimates, gains = without_gain(told.estimates, design.loss_law)
+    ranges = () if is_open else check_design_ranges(told.estimates, design)
+    estimates, gains = check_efficiency_limit(told.estimates, design.loss_law)
     warnings = (*read, *told.warnings, *notes, *gains, *ranges)
     told = replace(told, estimates=estimates, warnings=warnings)
     several = Several(shares, tested)
-    evidence = Evidence(
+    evidence = StageResults(
         signals=tuple(signals),
         paper=tuple(one for each in alone for one in each.evidence.paper),
         integral=tuple(one for each in alone for one in each.evidence.integral),
@@ -93,10 +100,10 @@ def identify_several(logs: Sequence[PreparedLog]) -> Identification:
         loads=told.loads,
         several=several,
     )
-    return replace(_joined(alone, told, several), evidence=evidence)
+    return replace(_join_results(alone, told, several), evidence=evidence)
 
 
-def common_tolerances(logs: Sequence[PreparedLog]) -> dict[str, SensorTolerance]:
+def merge_tolerances(logs: Sequence[PreparedLog]) -> dict[str, SensorTolerance]:
     """Return the tolerances by role; all logs have the same sensors, the largest age counts."""
     found: dict[str, SensorTolerance] = {}
     for log in logs:
@@ -106,7 +113,7 @@ def common_tolerances(logs: Sequence[PreparedLog]) -> dict[str, SensorTolerance]
     return found
 
 
-def _by_itself(log: PreparedLog) -> Identification:
+def _identify_single(log: PreparedLog) -> Identification:
     """Identify a log alone. Raises IdentificationError if the likelihood does not carry it."""
     found = identify(log)
     if found.method is not Method.LIKELIHOOD:
@@ -118,34 +125,34 @@ def _by_itself(log: PreparedLog) -> Identification:
     return found
 
 
-def start_of(alone: Sequence[Identification]) -> dict[str, float]:
+def compute_start(alone: Sequence[Identification]) -> dict[str, float]:
     """A value for every unknown of the common fit: the mean of the logs, weighted by information.
 
     What a log has of its own stands under its number, and what no log left free is as fixed in the
     first that has it.
     """
-    fits = [likelihood_of(one)[0] for one in alone]
+    fits = [get_likelihood_fit(one)[0] for one in alone]
     values: dict[str, float] = {}
     for k, fit in enumerate(fits, 1):
         structures = [part.structure for part in fit.problem.parts]
         told = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
         told = {**structures[0].fixed, **told}
-        own = {name: told.pop(name) for name in OWN if name in told}
-        values |= {own_of(k)[name]: value for name, value in own.items()}
+        own = {name: told.pop(name) for name in LOG_SPECIFIC if name in told}
+        values |= {map_log_names(k)[name]: value for name, value in own.items()}
         values = own | told | values
-    values |= _mean([_shared(fit) for fit in fits])
-    starts = {f"start{k}.{key}" for k in range(len(values)) for key in OF_RUN}
+    values |= _compute_weighted_mean([_compute_shared_mean(fit) for fit in fits])
+    starts = {f"start{k}.{key}" for k in range(len(values)) for key in RUN_SPECIFIC}
     return {name: value for name, value in values.items() if name not in starts | {AERO}}
 
 
-def _refuse_apart(alone: Sequence[Identification]) -> None:
+def _require_agreement(alone: Sequence[Identification]) -> None:
     """Raise IdentificationError where no common minimum can be plausible.
 
     To first order the common Q exceeds that of the logs alone by Σ (θ_k - θ)ᵀ F_k (θ_k - θ).
     """
-    fits = [likelihood_of(one)[0] for one in alone]
-    told = [_shared(fit) for fit in fits]
-    mean, excess = _mean(told), 0.0
+    fits = [get_likelihood_fit(one)[0] for one in alone]
+    told = [_compute_shared_mean(fit) for fit in fits]
+    mean, excess = _compute_weighted_mean(told), 0.0
     for names, values, information in told:
         away = values - np.array([mean[name] for name in names])
         excess += float(away @ information @ away)
@@ -156,15 +163,17 @@ def _refuse_apart(alone: Sequence[Identification]) -> None:
 _Told = tuple[list[str], FloatArray, FloatArray]
 
 
-def _shared(fit: LikelihoodFit) -> _Told:
+def _compute_shared_mean(fit: LikelihoodFit) -> _Told:
     """Names, values (s,) and information (s, s) of what a log shares with others."""
-    starts = {f"{part.structure.label}.{key}" for part in fit.problem.parts for key in OF_RUN}
-    keep = [k for k, name in enumerate(fit.point.names) if name not in {*starts, *OWN, AERO}]
+    starts = {f"{part.structure.label}.{key}" for part in fit.problem.parts for key in RUN_SPECIFIC}
+    keep = [
+        k for k, name in enumerate(fit.point.names) if name not in {*starts, *LOG_SPECIFIC, AERO}
+    ]
     names = [fit.point.names[k] for k in keep]
-    return names, fit.mean.values[keep], covariance_of(fit.covariance[np.ix_(keep, keep)])
+    return names, fit.mean.values[keep], invert_information(fit.covariance[np.ix_(keep, keep)])
 
 
-def _mean(told: Sequence[_Told]) -> dict[str, float]:
+def _compute_weighted_mean(told: Sequence[_Told]) -> dict[str, float]:
     """Mean of the unknowns of several fits, weighted by information."""
     names = list(dict.fromkeys(name for one in told for name in one[0]))
     information, pull = np.zeros((len(names), len(names))), np.zeros(len(names))
@@ -172,35 +181,39 @@ def _mean(told: Sequence[_Told]) -> dict[str, float]:
         place = [names.index(name) for name in known]
         information[np.ix_(place, place)] += weight
         pull[place] += weight @ values
-    mean = covariance_of(information) @ pull
+    mean = invert_information(information) @ pull
     return dict(zip(names, mean.tolist(), strict=True))
 
 
-def farthest(alone: Sequence[Identification]) -> list[str]:
+def find_largest_differences(alone: Sequence[Identification]) -> list[str]:
     """The shared parameters on which logs taken alone differ most, in words; at most `NAMED`."""
     found: list[tuple[float, str]] = []
     for one, other in combinations(alone, 2):
         for name, a in one.estimates.items():
             b = other.estimates.get(name)
-            if b is None or a.value is None or b.value is None or name in OWN:
+            if b is None or a.value is None or b.value is None or name in LOG_SPECIFIC:
                 continue
             spread = float(np.hypot(a.std_noise or 0.0, b.std_noise or 0.0))
             if spread > 0.0 and abs(a.value - b.value) > FAR * spread:
-                text = f"{name} {in_units(a.value, a.unit)} and {in_units(b.value, b.unit)}"
+                text = f"{name} {format_with_unit(a.value, a.unit)} and {format_with_unit(b.value, b.unit)}"
                 found.append((abs(a.value - b.value) / spread, text))
     return [text for _, text in sorted(found, reverse=True)[:NAMED]]
 
 
-def _share(number: int, log: PreparedLog, alone: Identification, fit: LikelihoodFit) -> LogShare:
+def _build_log_share(
+    number: int, log: PreparedLog, alone: Identification, fit: LikelihoodFit
+) -> LogShare:
     mine = next(part for part in fit.problem.parts if part.structure.log == number)
     return LogShare(
         number, log.source, log.sha256, alone.shifts, alone.estimates, mine.structure.mean_speed
     )
 
 
-def _joined(alone: Sequence[Identification], told: Conclusions, several: Several) -> Identification:
+def _join_results(
+    alone: Sequence[Identification], told: EstimateSet, several: Several
+) -> Identification:
     """Build one identification of all logs, without its evidence."""
-    told = judged(told, several.consistency)
+    told = apply_consistency(told, several.consistency)
     names = [Path(share.source).name for share in several.logs]
     agreed = (several.consistency.text,) if several.consistency.agree else ()
     first = alone[0]
@@ -210,7 +223,7 @@ def _joined(alone: Sequence[Identification], told: Conclusions, several: Several
         friction=told.friction,
         shifts=tuple(shift for one in alone for shift in one.shifts),
         rejected=tuple(one for each in alone for one in each.rejected),
-        validity=_covered(alone),
+        validity=_merge_ranges(alone),
         inputs={name: digest for one in alone for name, digest in one.inputs.items()},
         warnings=told.warnings,
         assumptions=(
@@ -225,7 +238,7 @@ def _joined(alone: Sequence[Identification], told: Conclusions, several: Several
     )
 
 
-def _covered(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
+def _merge_ranges(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
     """Return the union of the ranges that the logs cover."""
     names = dict.fromkeys(name for one in alone for name in one.validity)
     spans = {name: [one.validity[name] for one in alone if name in one.validity] for name in names}
@@ -235,7 +248,7 @@ def _covered(alone: Sequence[Identification]) -> dict[str, tuple[float, float]]:
     }
 
 
-def of_one_log(found: Identification, share: LogShare) -> Identification:
+def extract_log(found: Identification, share: LogShare) -> Identification:
     """Extract one log from a joint identification: its own values under their plain ids.
 
     For a twin that is to simulate this log; of the shifts only its own are in it.
@@ -243,7 +256,7 @@ def of_one_log(found: Identification, share: LogShare) -> Identification:
     mine = {
         name: plain
         for name in dict.fromkeys((*found.estimates, *found.correlation_ids))
-        for plain, log in (log_of(name),)
+        for plain, log in (split_log_number(name),)
         if log in (0, share.number)
     }
     place = [k for k, name in enumerate(found.correlation_ids) if name in mine]

@@ -21,19 +21,19 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Driveline, ShiftData
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of
-from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftData
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW
 from drivetwin.estimation.likelihood.optimize.staged_start import STAGED_START
-from drivetwin.estimation.likelihood.parametrization import LAW, OWN, START, own_of
-from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, START, map_log_names
+from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.gauss_newton import minimise
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.estimation.result.validation import Bound
-from drivetwin.estimation.result.verdict import root_of
+from drivetwin.estimation.result.validation import PredictionInterval
+from drivetwin.estimation.result.verdict import compute_covariance_root
 from drivetwin.simulation.dual_clutch import State
 
 
@@ -51,7 +51,7 @@ PREDICTION = PredictionSettings()
 
 
 @dataclass(frozen=True)
-class Expected:
+class ShiftPrediction:
     """Prediction for one shift held out.
 
     `own` are values and standard deviations of the log-specific unknowns by plain name, if the log
@@ -65,12 +65,12 @@ class Expected:
     mean_speed: float
     time: float
     start: State
-    bounds: Mapping[str, Bound]
+    bounds: Mapping[str, PredictionInterval]
 
 
-def expected(
+def predict_shifts(
     fit: LikelihoodFit, shifts: Sequence[ShiftData], seed: int = 0
-) -> tuple[Expected, ...]:
+) -> tuple[ShiftPrediction, ...]:
     """Predict held-out shifts of one log from `fit`.
 
     The signals' `log` is their number in the fit, or one that it does not have. Raises
@@ -78,41 +78,41 @@ def expected(
     """
     held, drivelines = [one.signals for one in shifts], [one.driveline for one in shifts]
     law = drivelines[0].loss_law
-    problem, point = problem_of(held, drivelines, law, _known(fit, drivelines))
-    problem = problem.of_kinds(fit.problem.kinds)
-    unseen = _unseen(fit, problem, point)
-    before = _before(
+    problem, point = build_problem(held, drivelines, law, _collect_values(fit, drivelines))
+    problem = problem.select_modes(fit.problem.kinds)
+    unseen = _find_new_unknowns(fit, problem, point)
+    before = _fit_gear_before(
         problem, point, unseen, [s.shift.before[1] - STAGED_START.clearance for s in held]
     )
-    point, own = before.point, own_of(held[0].log)
+    point, own = before.point, map_log_names(held[0].log)
     std = np.sqrt(np.diag(before.own))
     told = {
         name: (point[own[name]], float(std[unseen.index(k)]))
-        for name in OWN
+        for name in LOG_SPECIFIC
         if name in own and own[name] in point.names
         for k in (point.names.index(own[name]),)
         if k in unseen
     }
-    moved = _moved(fit, problem, before, unseen)
+    moved = _compute_root(fit, problem, before, unseen)
     rng = np.random.default_rng(seed)
     return tuple(
-        Expected(
+        ShiftPrediction(
             told,
             part.structure.mean_speed,
             float(part.record.time[0]),
-            part.structure.start(point),
-            _bounds(part, point, moved, rng) if _has_law(fit, part) else {},
+            part.structure.build_start(point),
+            _compute_bounds(part, point, moved, rng) if _has_law(fit, part) else {},
         )
         for part in problem.parts
     )
 
 
-def _has_law(fit: LikelihoodFit, part: Part) -> bool:
+def _has_law(fit: LikelihoodFit, part: ShiftTerm) -> bool:
     """Return whether the fit identifies the friction of the on-coming element."""
     return f"{part.structure.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
 
 
-def _known(fit: LikelihoodFit, drivelines: Sequence[Driveline]) -> dict[str, float]:
+def _collect_values(fit: LikelihoodFit, drivelines: Sequence[KnownDriveline]) -> dict[str, float]:
     """Collect a value for every unknown from the fit; an unknown element takes its partner's law.
 
     Where neither has one, that of a usual facing.
@@ -134,27 +134,31 @@ def _known(fit: LikelihoodFit, drivelines: Sequence[Driveline]) -> dict[str, flo
     return known
 
 
-def _unseen(fit: LikelihoodFit, problem: Problem, point: Point) -> list[int]:
+def _find_new_unknowns(
+    fit: LikelihoodFit, problem: LikelihoodObjective, point: ParameterVector
+) -> list[int]:
     """Return the indices of the unknowns that belong to the log or the run and are not in the
     fit."""
     structures = [part.structure for part in problem.parts]
     starts = {f"{one.label}.{key}" for one in structures for key in START}
-    own = {name for one in structures for name in own_of(one.log).values()}
+    own = {name for one in structures for name in map_log_names(one.log).values()}
     mine = starts | (own - set(fit.point.names))
     return [k for k, name in enumerate(point.names) if name in mine]
 
 
 @dataclass(frozen=True, eq=False)
-class _Before:
+class _GearFit:
     """Fit to the gear before the shifts: `point`, covariance `own` (u, u) of the new unknowns,
     and their response `along` (u, k) to a change of the known ones."""
 
-    point: Point
+    point: ParameterVector
     own: FloatArray
     along: FloatArray
 
 
-def _before(problem: Problem, point: Point, unseen: list[int], ends: Sequence[float]) -> _Before:
+def _fit_gear_before(
+    problem: LikelihoodObjective, point: ParameterVector, unseen: list[int], ends: Sequence[float]
+) -> _GearFit:
     """Fit the new unknowns to the stretches before the shifts, all others fixed."""
     known = [k for k in range(len(point.names)) if k not in unseen]
     prior = problem.prior
@@ -163,20 +167,22 @@ def _before(problem: Problem, point: Point, unseen: list[int], ends: Sequence[fl
     free = Prior(prior.mean, precision)
     held = free
     for k in known:
-        held = held.held(k, float(point.values[k]))
-    cut = replace(problem.until(ends), prior=held)
-    found = minimise(cut, point, lambda _, at: cut.weighted_by(at))
+        held = held.fix_parameter(k, float(point.values[k]))
+    cut = replace(problem.cut(ends), prior=held)
+    found = minimise(cut, point, lambda _, at: cut.update_weighting(at))
     if found is None:
         raise IdentificationError(
             "the gear held before the shift cannot be simulated with the parameters of the fit",
             "hold out a shift of the same vehicle, with a second of gear before it",
         )
     information = found.normal.data + precision
-    inner = covariance_of(information[np.ix_(unseen, unseen)])
-    return _Before(found.point, inner, -inner @ information[np.ix_(unseen, known)])
+    inner = invert_information(information[np.ix_(unseen, unseen)])
+    return _GearFit(found.point, inner, -inner @ information[np.ix_(unseen, known)])
 
 
-def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[int]) -> FloatArray:
+def _compute_root(
+    fit: LikelihoodFit, problem: LikelihoodObjective, before: _GearFit, unseen: list[int]
+) -> FloatArray:
     """Compute a root (p, d) of the covariance of all unknowns of the held-out shifts."""
     names = before.point.names
     known = [k for k in range(len(names)) if k not in unseen]
@@ -186,35 +192,35 @@ def _moved(fit: LikelihoodFit, problem: Problem, before: _Before, unseen: list[i
     spread[np.ix_(both, both)] = fit.covariance[np.ix_(place, place)]
     for i, k in enumerate(known):
         if i not in both:
-            spread[i, i] = _inverse(float(problem.prior.precision[k, k]))
-    root = root_of(spread)
+            spread[i, i] = _compute_prior_variance(float(problem.prior.precision[k, k]))
+    root = compute_covariance_root(spread)
     whole = np.zeros((len(names), len(known) + len(unseen)))
     whole[known, : len(known)] = root
     whole[unseen, : len(known)] = before.along @ root
-    whole[unseen, len(known) :] = root_of(before.own)
+    whole[unseen, len(known) :] = compute_covariance_root(before.own)
     return whole
 
 
-def _inverse(precision: float) -> float:
+def _compute_prior_variance(precision: float) -> float:
     """Return the variance of a prior alone; 0 without one, which fixes the value."""
     return 1.0 / precision if precision > 0.0 else 0.0
 
 
-def _bounds(
-    part: Part, point: Point, moved: FloatArray, rng: np.random.Generator
-) -> dict[str, Bound]:
+def _compute_bounds(
+    part: ShiftTerm, point: ParameterVector, moved: FloatArray, rng: np.random.Generator
+) -> dict[str, PredictionInterval]:
     """Compute the error of each output over draws; empty if the shift cannot be simulated."""
-    part = part.weighted_by(point)
-    linear, run, path = part.linearised(point), part.run(point), part.weighting.path
+    part = part.update_weighting(point)
+    linear, run, path = part.linearise(point), part.simulate(point), part.weighting.path
     if linear is None or run is None or path is None:
         return {}
-    columns, response = linear[1] @ moved, part.response(point, run)
+    columns, response = linear[1] @ moved, part.compute_response(point, run)
     rms: dict[str, list[float]] = {out.name: [] for out in part.record.outputs}
     for _ in range(PREDICTION.draws):
         noise = {name: np.sqrt(p) * rng.standard_normal(p.size) for name, p in path.power.items()}
-        error = part.seen(point, response.to(noise)) + columns @ rng.standard_normal(
-            columns.shape[1]
-        )
+        error = part.observe(
+            point, response.propagate_inputs(noise)
+        ) + columns @ rng.standard_normal(columns.shape[1])
         error = error + part.record.sigma * rng.standard_normal(error.size)
         first = 0
         for out in part.record.outputs:
@@ -222,6 +228,8 @@ def _bounds(
             first += out.values.size
             rms[out.name].append(float(np.sqrt(np.mean(piece**2))))
     return {
-        name: Bound(float(np.median(one)), float(np.quantile(one, PREDICTION.upper_quantile)))
+        name: PredictionInterval(
+            float(np.median(one)), float(np.quantile(one, PREDICTION.upper_quantile))
+        )
         for name, one in rms.items()
     }

@@ -10,11 +10,11 @@ import numpy as np
 
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
-from drivetwin.estimation.result.estimate_set import Conclusions
-from drivetwin.estimation.result.multi_log import Consistency, Move
+from drivetwin.estimation.result.estimate_set import EstimateSet
+from drivetwin.estimation.result.multi_log import Consistency, LogPull
 
 
-def judged(told: Conclusions, tested: Consistency) -> Conclusions:
+def apply_consistency(told: EstimateSet, tested: Consistency) -> EstimateSet:
     """Apply the outcome of the homogeneity test; unchanged if the logs agree.
 
     A parameter on which they do not is weak at best, and its interval is as many times wider as
@@ -22,17 +22,17 @@ def judged(told: Conclusions, tested: Consistency) -> Conclusions:
     """
     doubtful = tested.doubtful
     estimates = {
-        name: _doubted(one, doubtful[name]) if name in doubtful else one
+        name: _downgrade(one, doubtful[name]) if name in doubtful else one
         for name, one in told.estimates.items()
     }
     friction = {
-        name: _widened(curve, doubtful.get(f"mu.{name}")) for name, curve in told.friction.items()
+        name: _widen(curve, doubtful.get(f"mu.{name}")) for name, curve in told.friction.items()
     }
     warnings = told.warnings if tested.agree else (tested.text, *told.warnings)
     return replace(told, estimates=estimates, friction=friction, warnings=warnings)
 
 
-def _doubted(one: Estimate, move: Move) -> Estimate:
+def _downgrade(one: Estimate, move: LogPull) -> Estimate:
     """Downgrade an estimate that one log contradicts by more than noise explains."""
     if one.value is None or one.std_noise is None or one.verdict is Verdict.DESIGN:
         return one
@@ -45,23 +45,23 @@ def _doubted(one: Estimate, move: Move) -> Estimate:
     return replace(one, std_noise=factor * one.std_noise, verdict=Verdict.WEAK, reason=text)
 
 
-def _widened(curve: FrictionCurve, move: Move | None) -> FrictionCurve:
+def _widen(curve: FrictionCurve, move: LogPull | None) -> FrictionCurve:
     if move is None:
         return curve
     half = 0.5 * abs(move.z) * (curve.mu_hi - curve.mu_lo)
     return replace(curve, mu_lo=curve.mu - half, mu_hi=curve.mu + half)
 
 
-def pooled_curves(alone: Sequence[Identification]) -> dict[str, FrictionCurve]:
+def pool_curves(alone: Sequence[Identification]) -> dict[str, FrictionCurve]:
     """Merge by element the curves of all logs over the slips that any log covers."""
     found: dict[str, list[FrictionCurve]] = {}
     for one in alone:
         for name, curve in one.friction.items():
             found.setdefault(name, []).append(curve)
-    return {name: _pooled(curves) for name, curves in found.items()}
+    return {name: _pool(curves) for name, curves in found.items()}
 
 
-def _pooled(curves: Sequence[FrictionCurve]) -> FrictionCurve:
+def _pool(curves: Sequence[FrictionCurve]) -> FrictionCurve:
     """Extend the first curve over the slips of all; its μ is filled in by the common fit."""
     ends = np.concatenate([curve.slip[[0, -1]] for curve in curves])
     slip = np.linspace(ends.min(), ends.max(), curves[0].slip.size)

@@ -22,8 +22,8 @@ import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, lsq_linear, minimize
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import tell
-from drivetwin.estimation.optimize.objective import Normal, Objective, Point
+from drivetwin._util.progress import notify_progress
+from drivetwin.estimation.optimize.objective import NormalEquations, Objective, ParameterVector
 
 RCOND = 1e-13
 """Relative singular value below which a direction carries no information [-]."""
@@ -100,17 +100,17 @@ P = TypeVar("P", bound=Objective)
 
 
 @dataclass(frozen=True, eq=False)
-class Found(Generic[P]):
+class OptimizeResult(Generic[P]):
     """Result of a search: final objective and point, expansion of Q there, convergence flag."""
 
     problem: P
-    point: Point
-    normal: Normal
+    point: ParameterVector
+    normal: NormalEquations
     converged: bool
     iterations: int
 
 
-def step_of(matrix: FloatArray, gradient: FloatArray, damping: float = 0.0) -> FloatArray:
+def solve_step(matrix: FloatArray, gradient: FloatArray, damping: float = 0.0) -> FloatArray:
     """Compute -(matrix + damping·diag)⁻¹·gradient (p,), scaled to a unit diagonal.
 
     Directions without information are not moved.
@@ -131,9 +131,9 @@ def _compute_scale(matrix: FloatArray) -> FloatArray:
 class _Weighting(Generic[P]):
     """Iteratively reweighted objective: formed anew at every point until `is_frozen`."""
 
-    refresh: Callable[[P, Point], P] | None
+    refresh: Callable[[P, ParameterVector], P] | None
     patience: int
-    best: tuple[P, Point, Normal] | None = None
+    best: tuple[P, ParameterVector, NormalEquations] | None = None
     deviance: float = np.inf
     worse: int = 0
     """Number of points since the likeliest."""
@@ -142,7 +142,9 @@ class _Weighting(Generic[P]):
         """Freeze a weighting that never changes."""
         self.is_frozen = self.refresh is None
 
-    def form(self, problem: P, point: Point) -> tuple[P, Point, Normal | None]:
+    def form(
+        self, problem: P, point: ParameterVector
+    ) -> tuple[P, ParameterVector, NormalEquations | None]:
         """Form the objective at `point`; return the likeliest one once it has led away."""
         if self.is_frozen or self.refresh is None:
             return problem, point, problem.normal(point)
@@ -161,12 +163,12 @@ class _Weighting(Generic[P]):
 
 def minimise(
     problem: P,
-    start: Point,
-    refresh: Callable[[P, Point], P] | None = None,
+    start: ParameterVector,
+    refresh: Callable[[P, ParameterVector], P] | None = None,
     rough: bool = False,
     limit: float = np.inf,
     settings: GaussNewtonSettings = GAUSS_NEWTON,
-) -> Found[P] | None:
+) -> OptimizeResult[P] | None:
     """Minimise Q from `start`; return None if the model cannot be evaluated there.
 
     `refresh` forms Q anew at every point until the minimum is close (iterative reweighting).
@@ -174,7 +176,7 @@ def minimise(
     `max_iter` iterations, or after `screening_iter` iterations with Q above `limit`; its values
     are then no estimate.
     """
-    point = start.moved(np.clip(start.values, problem.lower, problem.upper))
+    point = start.replace_values(np.clip(start.values, problem.lower, problem.upper))
     damping, first = settings.initial_damping, None
     weighting = _Weighting(refresh, settings.patience)
     max_iter, crawls = settings.rough_max_iter if rough else settings.max_iter, 0
@@ -184,15 +186,15 @@ def minimise(
             return None
         expected = _predict_decrease(problem, point, normal.information, normal.gradient)
         first = first or expected
-        tell(_estimate_progress(first, expected, settings.ftol))
+        notify_progress(_estimate_progress(first, expected, settings.ftol))
         is_local = expected < settings.local_decrease
         weighting.is_frozen |= iteration + 1 >= settings.min_refreshes and is_local
         frozen = weighting.is_frozen
         if expected < settings.ftol and frozen:
-            return Found(problem, point, normal, True, iteration)
+            return OptimizeResult(problem, point, normal, True, iteration)
         trial, fall, damping = _take_damped_step(problem, point, normal, damping, settings)
         if rough and trial is not None and fall < settings.rough_rtol * normal.cost:
-            return Found(problem, trial, normal, True, iteration)
+            return OptimizeResult(problem, trial, normal, True, iteration)
         is_crawling = fall < settings.crawl_ratio * expected
         crawls = crawls + 1 if is_crawling else 0
         weighting.is_frozen |= crawls >= settings.patience
@@ -202,21 +204,21 @@ def minimise(
             if along is not None and lower > fall:
                 trial, fall = along, lower
         if trial is None or (fall < settings.ftol and expected < settings.kink_ftol and frozen):
-            return Found(problem, point, normal, expected < settings.kink_ftol, iteration)
+            return OptimizeResult(problem, point, normal, expected < settings.kink_ftol, iteration)
         point = trial
         if iteration + 1 == settings.screening_iter and normal.cost > limit:
             break
     last = problem.normal(point)
-    return None if last is None else Found(problem, point, last, False, iteration + 1)
+    return None if last is None else OptimizeResult(problem, point, last, False, iteration + 1)
 
 
 def minimise_with_line_search(
     problem: P,
-    start: Point,
+    start: ParameterVector,
     solve: Callable[[FloatArray, FloatArray], FloatArray],
     tolerance: float,
     settings: LineSearchSettings = LINE_SEARCH,
-) -> Found[P]:
+) -> OptimizeResult[P]:
     """Minimise a smooth Q from `start` by Gauss-Newton; stop at `tolerance` standard errors.
 
     `solve` computes information⁻¹·gradient (p,). A step that raises Q is halved. If no halving
@@ -227,29 +229,29 @@ def minimise_with_line_search(
         assert normal is not None
         step = -solve(normal.information, normal.gradient)
         for _ in range(settings.max_halvings):
-            trial = point.moved(point.values + step)
+            trial = point.replace_values(point.values + step)
             if problem.cost(trial) <= normal.cost * (1.0 + settings.rtol):
                 break
             step = 0.5 * step
         else:
-            return Found(problem, point, normal, False, iteration)
+            return OptimizeResult(problem, point, normal, False, iteration)
         length = float(np.sqrt(step @ normal.information @ step))
         point, normal = trial, problem.normal(trial)
         assert normal is not None
         if length < tolerance:
-            return Found(problem, point, normal, True, iteration + 1)
+            return OptimizeResult(problem, point, normal, True, iteration + 1)
     assert normal is not None
-    return Found(problem, point, normal, False, settings.max_iter)
+    return OptimizeResult(problem, point, normal, False, settings.max_iter)
 
 
 def minimise_constrained(
     problem: Objective,
-    start: Point,
-    miss: Callable[[Point], float],
-    slope: Callable[[Point], FloatArray],
+    start: ParameterVector,
+    miss: Callable[[ParameterVector], float],
+    slope: Callable[[ParameterVector], FloatArray],
     tolerance: float,
     settings: ConstrainedSettings = CONSTRAINED,
-) -> tuple[Point, float] | None:
+) -> tuple[ParameterVector, float] | None:
     """Minimise Q under an equality constraint g(θ) = g₀: the point and Q there.
 
     `miss` computes g₀ - g(θ), at most `tolerance` at the result, and `slope` the derivative (p,) of
@@ -266,11 +268,11 @@ def minimise_constrained(
             return point, normal.cost
         cost = normal.cost
         step = _solve_constrained(normal, slope(point), miss(point))
-        point = point.moved(np.clip(point.values + step, problem.lower, problem.upper))
+        point = point.replace_values(np.clip(point.values + step, problem.lower, problem.upper))
     return point, problem.cost(point)
 
 
-def _solve_constrained(normal: Normal, slope: FloatArray, miss: float) -> FloatArray:
+def _solve_constrained(normal: NormalEquations, slope: FloatArray, miss: float) -> FloatArray:
     """Compute the Gauss-Newton step (p,) that changes the constrained function by `miss`."""
     scale = np.sqrt(np.maximum(np.diag(normal.information), 1e-300))
     unit = normal.information / np.outer(scale, scale)
@@ -281,13 +283,17 @@ def _solve_constrained(normal: Normal, slope: FloatArray, miss: float) -> FloatA
 
 
 def _take_damped_step(
-    problem: Objective, point: Point, normal: Normal, damping: float, settings: GaussNewtonSettings
-) -> tuple[Point | None, float, float]:
+    problem: Objective,
+    point: ParameterVector,
+    normal: NormalEquations,
+    damping: float,
+    settings: GaussNewtonSettings,
+) -> tuple[ParameterVector | None, float, float]:
     """Raise the damping until Q decreases: the point, the decrease and the next damping."""
     while damping < settings.max_damping:
         step = _solve_bounded(problem, point, normal.information, normal.gradient, damping)
         values = problem.retract(point, step)
-        trial = point.moved(np.clip(values, problem.lower, problem.upper))
+        trial = point.replace_values(np.clip(values, problem.lower, problem.upper))
         fall = normal.cost - problem.cost(trial)
         if fall > 0.0:
             return trial, fall, damping / 10.0
@@ -296,8 +302,11 @@ def _take_damped_step(
 
 
 def _take_bundle_step(
-    problem: Objective, point: Point, normal: Normal, settings: GaussNewtonSettings
-) -> tuple[Point | None, float, float]:
+    problem: Objective,
+    point: ParameterVector,
+    normal: NormalEquations,
+    settings: GaussNewtonSettings,
+) -> tuple[ParameterVector | None, float, float]:
     """Find a lower point along the kink at `point`: it, the decrease and the predicted decrease.
 
     Collects subgradients until their convex combination predicts a decrease below `ftol`, or their
@@ -312,7 +321,7 @@ def _take_bundle_step(
         step = _solve_bounded(problem, point, normal.information, gradient, 0.0)
         for share in 0.5 ** np.arange(settings.max_halvings):
             values = np.clip(point.values + share * step, problem.lower, problem.upper)
-            trial = point.moved(values)
+            trial = point.replace_values(values)
             fall = normal.cost - problem.cost(trial)
             if fall > settings.crawl_ratio * share * expected:
                 return trial, fall, expected
@@ -331,7 +340,9 @@ class _Subgradient:
     below: float
 
     @classmethod
-    def from_expansion(cls, there: Normal, here: Normal, step: FloatArray) -> _Subgradient:
+    def from_expansion(
+        cls, there: NormalEquations, here: NormalEquations, step: FloatArray
+    ) -> _Subgradient:
         """Continue the expansion `there`, a `step` (p,) away, back to the current point."""
         curved = here.information @ step
         continued = there.cost - 2.0 * there.gradient @ step + step @ curved
@@ -380,7 +391,7 @@ def _estimate_progress(first: float, expected: float, ftol: float) -> float:
 
 def _solve_bounded(
     problem: Objective,
-    point: Point,
+    point: ParameterVector,
     information: FloatArray,
     gradient: FloatArray,
     damping: float,
@@ -391,7 +402,7 @@ def _solve_bounded(
     bounds are part of the least-squares problem (Stark and Parker 1995).
     """
     room = np.array([problem.lower, problem.upper]) - point.values
-    step = step_of(information, gradient, damping)
+    step = solve_step(information, gradient, damping)
     if np.all((step >= room[0]) & (step <= room[1])):
         return step
     scale = _compute_scale(information)
@@ -405,7 +416,7 @@ def _solve_bounded(
 
 
 def _predict_decrease(
-    problem: Objective, point: Point, information: FloatArray, gradient: FloatArray
+    problem: Objective, point: ParameterVector, information: FloatArray, gradient: FloatArray
 ) -> float:
     """Predict the decrease of Q by a full step within the bounds."""
     step = _solve_bounded(problem, point, information, gradient, 0.0)

@@ -10,7 +10,7 @@ from drivetwin._util.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class ParameterVector:
     """Named parameter vector: one value for each free parameter; immutable."""
 
     names: tuple[str, ...]
@@ -19,13 +19,13 @@ class Point:
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
 
-    def moved(self, values: FloatArray) -> Point:
+    def replace_values(self, values: FloatArray) -> ParameterVector:
         """Return a vector of the same parameters with other `values` (p,)."""
-        return Point(self.names, values)
+        return ParameterVector(self.names, values)
 
 
 @dataclass(frozen=True, eq=False)
-class Normal:
+class NormalEquations:
     """Q and its Gauss-Newton expansion at one point: half gradient (p,), information (p, p).
 
     `data` (p, p) is the information of the measurements alone. Per group of residuals: `residuals`
@@ -55,11 +55,11 @@ class Objective(Protocol):
     def log_determinant(self) -> float:
         """log|Σ| of the weighting."""
 
-    def cost(self, point: Point) -> float:
+    def cost(self, point: ParameterVector) -> float:
         """Compute Q; infinite if the model cannot be evaluated."""
 
-    def normal(self, point: Point) -> Normal | None:
+    def normal(self, point: ParameterVector) -> NormalEquations | None:
         """Compute the Gauss-Newton expansion of Q; None if the model cannot be evaluated."""
 
-    def retract(self, point: Point, step: FloatArray) -> FloatArray:
+    def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
         """Compute the values (p,) after a `step` (p,) along the parameter manifold."""

@@ -10,9 +10,13 @@ from scipy.optimize import lsq_linear
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
-from drivetwin.estimation.linear.friction_points import slip_of
-from drivetwin.estimation.paper.wlse import whole, window_edges, window_means
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.linear.friction_points import compute_mean_slip
+from drivetwin.estimation.paper.wlse import (
+    compute_window_edges,
+    compute_window_means,
+    drop_nan_rows,
+)
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
 
@@ -26,7 +30,9 @@ class PaperFriction:
     extremes_time: FloatArray
 
 
-def paper_friction(signals: ShiftSignals, driveline: Driveline, points: int = 40) -> PaperFriction:
+def estimate_paper_friction(
+    signals: ShiftSignals, driveline: KnownDriveline, points: int = 40
+) -> PaperFriction:
     """T_c ≈ T_o/i_out (eq. 16) at the extremes of T_o over the inertia phase, slip by eq. 15.
 
     T_o is averaged over 10 ms windows before its extremes are taken; where it does not oscillate
@@ -34,11 +40,11 @@ def paper_friction(signals: ShiftSignals, driveline: Driveline, points: int = 40
     the Stribeck law is fitted to the points. Raises IdentificationError for a short inertia phase.
     """
     element, span = driveline.oncoming, signals.shift.inertia_phase
-    edges = window_edges((span[0] + 0.01, span[1] - 0.005))
-    torque = window_means(signals.output_torque, edges)
-    pressure = window_means(signals.pressures[element.name], edges)
-    time, torque, pressure = whole(0.5 * (edges[1:] + edges[:-1]), torque, pressure)
-    slip = np.abs(slip_of(signals, driveline, time))
+    edges = compute_window_edges((span[0] + 0.01, span[1] - 0.005))
+    torque = compute_window_means(signals.output_torque, edges)
+    pressure = compute_window_means(signals.pressures[element.name], edges)
+    time, torque, pressure = drop_nan_rows(0.5 * (edges[1:] + edges[:-1]), torque, pressure)
+    slip = np.abs(compute_mean_slip(signals, driveline, time))
     turns = np.flatnonzero(np.diff(np.sign(np.diff(torque))) != 0) + 1
     picked = turns if turns.size >= 8 else np.arange(time.size)
     capacity = element.gain * (pressure[picked] - element.P0.value)
@@ -57,11 +63,11 @@ def paper_friction(signals: ShiftSignals, driveline: Driveline, points: int = 40
     kernel = np.exp(-0.5 * ((grid[:, None] - s) / bandwidth) ** 2)
     smooth = (kernel @ m) / kernel.sum(axis=1)
     nothing = np.full(points, np.nan)
-    curve = FrictionCurve(grid, smooth, nothing, nothing, s, m, fit_law(s, m), "paper")
+    curve = FrictionCurve(grid, smooth, nothing, nothing, s, m, fit_stribeck_law(s, m), "paper")
     return PaperFriction(element.name, curve, time[picked])
 
 
-def fit_law(slip: FloatArray, mu: FloatArray) -> Stribeck:
+def fit_stribeck_law(slip: FloatArray, mu: FloatArray) -> Stribeck:
     """Stribeck law by least squares on μ-slip points (n,): linear in three, v_s on a grid.
 
     v_s is not taken below the least slip seen, where nothing would show the law's rise. mu_c and

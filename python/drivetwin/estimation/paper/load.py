@@ -13,11 +13,11 @@ from drivetwin.estimation.paper.wlse import (
     GridFit,
     GridRow,
     Weighting,
-    central_difference,
-    weighted_inertia,
-    whole,
-    window_edges,
-    window_means,
+    compute_central_difference,
+    compute_window_edges,
+    compute_window_means,
+    drop_nan_rows,
+    fit_weighted_inertia,
 )
 
 
@@ -31,7 +31,7 @@ class PaperLoadSettings:
     fine: float = 100.0
 
 
-def paper_load(
+def estimate_paper_load(
     signals: ShiftSignals, i_f: float, span: Span, settings: PaperLoadSettings
 ) -> GridFit:
     """Search T_v/i_f from 0 to `stop` in coarse steps, then in fine ones around the best.
@@ -39,18 +39,18 @@ def paper_load(
     The RMS error is that of eq. 11 divided by i_f: a torque at the output shaft [N m]. Without a
     wheel-speed channel the output speed divided by i_f stands in for it.
     """
-    edges = window_edges(span)
+    edges = compute_window_edges(span)
     if signals.wheel_speed is not None:
-        speed = window_means(signals.wheel_speed, edges)
+        speed = compute_window_means(signals.wheel_speed, edges)
     else:
-        speed = window_means(signals.output_speed, edges) / i_f
-    acceleration = central_difference(speed)
-    output_torque = window_means(signals.output_torque, edges)[1:-1]
-    acceleration, output_torque = whole(acceleration, output_torque)
+        speed = compute_window_means(signals.output_speed, edges) / i_f
+    acceleration = compute_central_difference(speed)
+    output_torque = compute_window_means(signals.output_torque, edges)[1:-1]
+    acceleration, output_torque = drop_nan_rows(acceleration, output_torque)
 
     def row(load: float) -> GridRow:
         torque = output_torque - load
-        slope, _ = weighted_inertia(torque, acceleration, settings.weighting, scale=i_f)
+        slope, _ = fit_weighted_inertia(torque, acceleration, settings.weighting, scale=i_f)
         residual = torque - slope * acceleration
         return GridRow(float(load), i_f * slope, float(np.sqrt(np.mean(residual**2))))
 
@@ -62,5 +62,5 @@ def paper_load(
     rows = tuple(sorted([*coarse, *fine], key=lambda r: r.value))
     best = min(rows, key=lambda r: r.rmse)
     torque = output_torque - best.value
-    _, weights = weighted_inertia(torque, acceleration, settings.weighting, scale=i_f)
+    _, weights = fit_weighted_inertia(torque, acceleration, settings.weighting, scale=i_f)
     return GridFit(rows, best, acceleration, torque, output_torque - rows[0].value, weights)

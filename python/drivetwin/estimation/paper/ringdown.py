@@ -5,26 +5,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.linear.ringdown import (
     BAND,
     START_AFTER_LOCKUP,
     RingDown,
     _refuse,
-    _stretch,
+    _select_ring_samples,
 )
-from drivetwin.estimation.paper.wlse import window_edges, window_means
+from drivetwin.estimation.paper.wlse import compute_window_edges, compute_window_means
 
 
-def paper_ringdown(torque: Sampled, lockup: float, end: float) -> RingDown:
+def estimate_paper_ringdown(torque: MeasuredSignal, lockup: float, end: float) -> RingDown:
     """Frequency from the spacing of the extremes of T_o, damping from their logarithmic decrement.
 
     T_o is averaged over 10 ms windows; half the difference of neighbouring extremes falls by
     exp(-σ·T/2). Extremes count while they exceed four times the noise of an average.
     """
-    part = _stretch(torque, lockup, end, START_AFTER_LOCKUP)
-    edges = window_edges((part.time[0], part.time[-1]))
-    mean, centre = window_means(part, edges), 0.5 * (edges[1:] + edges[:-1])
+    part = _select_ring_samples(torque, lockup, end, START_AFTER_LOCKUP)
+    edges = compute_window_edges((part.time[0], part.time[-1]))
+    mean, centre = compute_window_means(part, edges), 0.5 * (edges[1:] + edges[:-1])
     count = max(part.time.size / mean.size, 1.0)
     floor = 4.0 * torque.sigma / np.sqrt(count) + 1e-3 * float(np.ptp(mean))
     turn = np.flatnonzero(np.diff(np.sign(np.diff(mean))) != 0) + 1

@@ -14,7 +14,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 
 WINDOW = 0.01
 """Averaging window of speeds and torques in the paper's procedure [s]."""
@@ -55,7 +55,7 @@ class GridFit:
     weights: FloatArray
 
 
-def window_means(signal: Sampled, edges: FloatArray) -> FloatArray:
+def compute_window_means(signal: MeasuredSignal, edges: FloatArray) -> FloatArray:
     """Mean of the samples in each half-open window between `edges` (m+1,); shape (m,).
 
     A window without a sample takes the value interpolated at its start, NaN inside a gap.
@@ -64,10 +64,12 @@ def window_means(signal: Sampled, edges: FloatArray) -> FloatArray:
     inside = (index >= 0) & (index < edges.size - 1)
     count = np.bincount(index[inside], minlength=edges.size - 1)
     total = np.bincount(index[inside], weights=signal.values[inside], minlength=edges.size - 1)
-    return np.where(count > 0, total / np.maximum(count, 1), signal.at(edges[:-1]))
+    return np.where(
+        count > 0, total / np.maximum(count, 1), signal.interpolate_at_times(edges[:-1])
+    )
 
 
-def whole(*columns: FloatArray) -> tuple[FloatArray, ...]:
+def drop_nan_rows(*columns: FloatArray) -> tuple[FloatArray, ...]:
     """The columns (n,) without the rows in which one of them is NaN; shape (m,) each.
 
     Raises IdentificationError where fewer than three rows remain.
@@ -81,7 +83,7 @@ def whole(*columns: FloatArray) -> tuple[FloatArray, ...]:
     return tuple(column[known] for column in columns)
 
 
-def window_edges(span: Span, width: float = WINDOW) -> FloatArray:
+def compute_window_edges(span: Span, width: float = WINDOW) -> FloatArray:
     """Edges of the averaging windows that fit into `span` [s].
 
     Raises IdentificationError where fewer than five windows fit.
@@ -96,12 +98,12 @@ def window_edges(span: Span, width: float = WINDOW) -> FloatArray:
     return np.asarray(span[0] + width * np.arange(count + 1), dtype=float)
 
 
-def central_difference(values: FloatArray, width: float = WINDOW) -> FloatArray:
+def compute_central_difference(values: FloatArray, width: float = WINDOW) -> FloatArray:
     """Slope of window means (n,) from the neighbours of each inner window; shape (n-2,)."""
     return (values[2:] - values[:-2]) / (2.0 * width)
 
 
-def weighted_inertia(
+def fit_weighted_inertia(
     torque: FloatArray, acceleration: FloatArray, weighting: Weighting, scale: float = 1.0
 ) -> tuple[float, FloatArray]:
     """Slope J of torque = J·acceleration by weighted least squares, and the weights (n,).

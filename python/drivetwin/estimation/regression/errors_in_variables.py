@@ -24,7 +24,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded, solve_banded
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.optimize.gauss_newton import minimise_with_line_search
-from drivetwin.estimation.optimize.objective import Normal, Point
+from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.modulating_functions import Quadrature
 
 NUGGET = 1e-9
@@ -54,14 +54,14 @@ class Prior:
     precision: FloatArray
 
     @classmethod
-    def independent(cls, size: int, entries: Mapping[int, tuple[float, float]]) -> Prior:
+    def from_independent(cls, size: int, entries: Mapping[int, tuple[float, float]]) -> Prior:
         """Independent priors by parameter index: (mean, standard deviation > 0)."""
         mean, precision = np.zeros(size), np.zeros((size, size))
         for index, (value, std) in entries.items():
             mean[index], precision[index, index] = value, std**-2
         return cls(mean, precision)
 
-    def held(self, index: int, value: float) -> Prior:
+    def fix_parameter(self, index: int, value: float) -> Prior:
         """Copy the prior with one parameter fixed at `value`."""
         mean, precision = self.mean.copy(), self.precision.copy()
         mean[index] = value
@@ -69,13 +69,13 @@ class Prior:
         precision[index, index] = 1e18
         return Prior(mean, precision)
 
-    def pull(self, theta: FloatArray) -> FloatArray:
+    def compute_gradient(self, theta: FloatArray) -> FloatArray:
         """Precision times (θ - θ₀), shape (p,)."""
         return np.asarray(self.precision @ (theta - self.mean), dtype=float)
 
-    def cost(self, theta: FloatArray) -> float:
+    def compute_prior_cost(self, theta: FloatArray) -> float:
         """(θ - θ₀)ᵀ P⁻¹ (θ - θ₀)."""
-        return float((theta - self.mean) @ self.pull(theta))
+        return float((theta - self.mean) @ self.compute_gradient(theta))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,13 +110,13 @@ class BandedCholesky:
     lower: FloatArray
 
     @classmethod
-    def of(cls, cov: FloatArray) -> BandedCholesky:
+    def from_covariance(cls, cov: FloatArray) -> BandedCholesky:
         """Factor of `cov` (m, m), its bandwidth found from its zeros.
 
         Raises IdentificationError where it is no covariance: the search has left all reason.
         """
         if not np.isfinite(cov).all() or not np.diag(cov).all():
-            raise _unweighable()
+            raise _build_weight_error()
         row, column = np.nonzero(cov)
         width = int(np.max(row - column))
         band = np.zeros((width + 1, cov.shape[0]))
@@ -125,7 +125,7 @@ class BandedCholesky:
         try:
             return cls(cholesky_banded(band, lower=True))
         except np.linalg.LinAlgError:
-            raise _unweighable() from None
+            raise _build_weight_error() from None
 
     def solve(self, x: FloatArray) -> FloatArray:
         """S⁻¹x for x (m,) or (m, r)."""
@@ -136,7 +136,7 @@ class BandedCholesky:
         return np.asarray(solve_banded((self.lower.shape[0] - 1, 0), self.lower, x), dtype=float)
 
 
-def _unweighable() -> IdentificationError:
+def _build_weight_error() -> IdentificationError:
     return IdentificationError(
         "the noise of the channels gives the equations no finite weights",
         "look at the channels with `drivetwin inspect`: one is damaged, or in another unit",
@@ -178,29 +178,29 @@ class _Equations:
             self._last = theta, _evaluate(self.assemble(theta), theta.size)
         return self._last[1]
 
-    def cost(self, point: Point) -> float:
+    def cost(self, point: ParameterVector) -> float:
         """Compute Q(θ)."""
-        return self.evaluate(point.values).q + self.prior.cost(point.values)
+        return self.evaluate(point.values).q + self.prior.compute_prior_cost(point.values)
 
-    def normal(self, point: Point) -> Normal:
+    def normal(self, point: ParameterVector) -> NormalEquations:
         """Compute the Gauss-Newton expansion of Q at θ."""
         result = self.evaluate(point.values)
         data = result.information
-        return Normal(
+        return NormalEquations(
             self.cost(point),
-            result.gradient + self.prior.pull(point.values),
+            result.gradient + self.prior.compute_gradient(point.values),
             data + self.prior.precision,
             data,
             (result.residual,),
             (result.regressors,),
         )
 
-    def retract(self, point: Point, step: FloatArray) -> FloatArray:
+    def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
         """Compute the values (p,) after a straight `step` (p,)."""
         return point.values + step
 
 
-def _covariance(terms: Sequence[Term]) -> FloatArray:
+def _compute_residual_covariance(terms: Sequence[Term]) -> FloatArray:
     """S (m, m): covariance of the residuals from the noise of all channels."""
     cov = np.zeros((terms[0].factor.size,) * 2)
     for t in terms:
@@ -210,12 +210,12 @@ def _covariance(terms: Sequence[Term]) -> FloatArray:
     return cov
 
 
-def whitening(terms: Sequence[Term]) -> Callable[[FloatArray], FloatArray]:
+def build_whitening(terms: Sequence[Term]) -> Callable[[FloatArray], FloatArray]:
     """The map x -> L⁻¹x with S = L·Lᵀ, under which the residuals have unit covariance."""
-    return BandedCholesky.of(_covariance(terms)).whiten
+    return BandedCholesky.from_covariance(_compute_residual_covariance(terms)).whiten
 
 
-def regressors(terms: Sequence[Term], size: int) -> FloatArray:
+def compute_regressors(terms: Sequence[Term], size: int) -> FloatArray:
     """∂r/∂θ (m, size) at the measured signals."""
     columns = np.zeros((terms[0].factor.size, size))
     for t in terms:
@@ -229,9 +229,9 @@ def _evaluate(terms: Sequence[Term], size: int) -> _Evaluation:
     residual = np.zeros(count)
     for t in terms:
         residual += t.factor * (t.quadrature.matrix @ t.values)
-    cov = _covariance(terms)
+    cov = _compute_residual_covariance(terms)
     variance = np.diag(cov).copy()
-    factor = BandedCholesky.of(cov)
+    factor = BandedCholesky.from_covariance(cov)
     multiplier = factor.solve(residual)
     columns = np.zeros((count, size))
     for t in terms:
@@ -244,16 +244,20 @@ def _evaluate(terms: Sequence[Term], size: int) -> _Evaluation:
     return _Evaluation(residual, float(residual @ multiplier), gradient, columns, factor, variance)
 
 
-def _spurious(terms: Sequence[Term], point: _Evaluation, size: int) -> FloatArray:
+def _estimate_spurious_information(
+    terms: Sequence[Term], point: _Evaluation, size: int
+) -> FloatArray:
     """Expected part of the information (p, p) that the noise left in the regressors feigns."""
     inverse = point.factor.solve(np.eye(point.residual.size))
     cross = np.zeros((size, point.residual.size, point.residual.size))
     own = np.zeros((size, size))
     for t in terms:
         for p, (f, k) in t.slopes.items():
-            cross[p] += t.sigma**2 * np.outer(f, t.factor) * k.overlap(t.quadrature)
+            cross[p] += t.sigma**2 * np.outer(f, t.factor) * k.compute_overlap(t.quadrature)
             for q, (g, h) in t.slopes.items():
-                own[p, q] += t.sigma**2 * float(np.sum(inverse * np.outer(f, g) * k.overlap(h)))
+                own[p, q] += t.sigma**2 * float(
+                    np.sum(inverse * np.outer(f, g) * k.compute_overlap(h))
+                )
     shared = np.empty((size, size))
     for p, block in enumerate(cross):
         weighted = inverse @ block @ inverse
@@ -275,13 +279,20 @@ def solve(
     equations = _Equations(assemble, values.size, prior)
     names = tuple(str(k) for k in range(values.size))
     theta = minimise_with_line_search(
-        equations, Point(names, values), lambda m, gradient: _inverse(m) @ gradient, tolerance
+        equations,
+        ParameterVector(names, values),
+        lambda m, gradient: _compute_information_inverse(m) @ gradient,
+        tolerance,
     ).point.values
     point = equations.evaluate(theta)
-    information = point.information - _spurious(assemble(theta), point, theta.size)
+    information = point.information - _estimate_spurious_information(
+        assemble(theta), point, theta.size
+    )
     chi2 = point.q / max(point.residual.size - theta.size, 1)
     # More residual than the stated noise lowers what the data tell, not what the design tells.
-    covariance = _inverse(_positive(information) / max(1.0, chi2) + prior.precision)
+    covariance = _compute_information_inverse(
+        _clip_curvature(information) / max(1.0, chi2) + prior.precision
+    )
     return Fit(
         theta,
         covariance,
@@ -293,7 +304,7 @@ def solve(
     )
 
 
-def _positive(matrix: FloatArray) -> FloatArray:
+def _clip_curvature(matrix: FloatArray) -> FloatArray:
     """The nearest matrix without negative curvature, in units of its own diagonal."""
     scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
@@ -301,7 +312,7 @@ def _positive(matrix: FloatArray) -> FloatArray:
     return np.asarray(lifted * np.outer(scale, scale), dtype=float)
 
 
-def _inverse(information: FloatArray) -> FloatArray:
+def _compute_information_inverse(information: FloatArray) -> FloatArray:
     """Inverse of an information matrix, balanced by its diagonal.
 
     Raises IdentificationError where a direction carries no information.

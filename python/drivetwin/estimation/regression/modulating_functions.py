@@ -36,7 +36,7 @@ class Windows:
         return np.asarray(self.start + 0.5 * self.width, dtype=float)
 
 
-def windows_in(span: Span, width: float, step: float) -> Windows:
+def build_windows(span: Span, width: float, step: float) -> Windows:
     """Windows of `width` every `step` [s] that lie wholly in `span`, spread over all of it."""
     room = span[1] - span[0] - width
     if room < 0.0:
@@ -46,7 +46,7 @@ def windows_in(span: Span, width: float, step: float) -> Windows:
     return Windows(start, np.full(count, width))
 
 
-def join(parts: list[Windows]) -> Windows:
+def join_windows(parts: list[Windows]) -> Windows:
     """All windows of `parts`, one after the other."""
     nothing = np.empty(0)
     return Windows(
@@ -55,7 +55,7 @@ def join(parts: list[Windows]) -> Windows:
     )
 
 
-def _sample_weights(time: FloatArray) -> FloatArray:
+def _compute_sample_weights(time: FloatArray) -> FloatArray:
     """Trapezoidal weight of each sample [s]; exact enough where the kernel vanishes at its ends."""
     gap = np.diff(time)
     weights = np.empty_like(time)
@@ -73,9 +73,9 @@ class Quadrature:
     @cached_property
     def gram(self) -> FloatArray:
         """`matrix @ matrix.T` (m, m): covariance of the sums under unit white noise."""
-        return self.overlap(self)
+        return self.compute_overlap(self)
 
-    def overlap(self, other: Quadrature) -> FloatArray:
+    def compute_overlap(self, other: Quadrature) -> FloatArray:
         """`matrix @ other.matrix.T` (m, m)."""
         return np.asarray((self.matrix @ other.matrix.T).toarray(), dtype=float)
 
@@ -88,13 +88,13 @@ class Kernels:
     slope: Quadrature
 
 
-def _hann_integral(u: FloatArray) -> FloatArray:
+def _integrate_hann(u: FloatArray) -> FloatArray:
     """∫ sin²(πu) du from 0, for u clipped to [0, 1]."""
     u = np.clip(u, 0.0, 1.0)
     return np.asarray(0.5 * u - np.sin(2.0 * np.pi * u) / (4.0 * np.pi), dtype=float)
 
 
-def hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kernels:
+def build_hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kernels:
     """Hann kernels ψ = sin²(πu), u = (t - start)/width, on a channel with stamps `time` (n,).
 
     A sample stamped t is taken to show the instant t - `shift` (the age of the value). `psi` is
@@ -112,7 +112,7 @@ def hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kern
     row = np.repeat(np.arange(windows.count), counts)
     column = np.arange(indptr[-1]) - indptr[row] + first[row]
     u = (instants[column] - windows.start[row]) / windows.width[row]
-    psi = np.sin(np.pi * np.clip(u, 0.0, 1.0)) ** 2 * _sample_weights(time)[column]
+    psi = np.sin(np.pi * np.clip(u, 0.0, 1.0)) ** 2 * _compute_sample_weights(time)[column]
     total = np.add.reduceat(psi, indptr[:-1]) if row.size else np.empty(0)
     bare = np.flatnonzero(~(total > 0.0))
     if bare.size:
@@ -124,7 +124,7 @@ def hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kern
     psi *= (0.5 * windows.width / total)[row]
     weight = np.zeros(max(row.size - 1, 0))
     inside = row[1:] == row[:-1]
-    spread = windows.width[row[:-1]] * np.diff(_hann_integral(u))
+    spread = windows.width[row[:-1]] * np.diff(_integrate_hann(u))
     np.divide(spread, np.diff(instants[column]), out=weight, where=inside)
     slope = np.concatenate([[0.0], weight]) - np.concatenate([weight, [0.0]])
     shape = (windows.count, time.size)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import Driveline
+from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.prior_conflict import (
     Contradiction,
-    contradictions,
-    held_against,
+    apply_contradictions,
+    find_contradictions,
 )
-from drivetwin.estimation.result.verdict import designed, judge, judge_with_design
+from drivetwin.estimation.result.verdict import assess, assess_with_prior, from_prior
 from drivetwin.vehicle.spec import PriorValue
 
 
@@ -31,7 +31,7 @@ class FittedParameters:
     values: FloatArray
     covariance: FloatArray
     std: FloatArray
-    driveline: Driveline
+    driveline: KnownDriveline
     systematic: Mapping[str, float]
     notes: Mapping[str, str]
     method: str
@@ -46,28 +46,30 @@ class FittedParameters:
     @cached_property
     def conflicts(self) -> tuple[Contradiction, ...]:
         """Design values that the log contradicts."""
-        return contradictions(self.ids, self.values, self.covariance, self.priors, self.systematic)
+        return find_contradictions(
+            self.ids, self.values, self.covariance, self.priors, self.systematic
+        )
 
     def assess(self) -> dict[str, Estimate]:
         """Return the estimates by id with the verdict of their intervals."""
         rows = zip(self.ids, self.values.tolist(), self.std.tolist(), strict=True)
-        return {name: self._assess_one(name, value, std) for name, value, std in rows}
+        return {name: self._assess_parameter(name, value, std) for name, value, std in rows}
 
     def downgrade_conflicts(self, estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
         """Return the estimates, none identified that a contradicted design value decides."""
-        return held_against(estimates, self.conflicts, self.prior_method)
+        return apply_contradictions(estimates, self.conflicts, self.prior_method)
 
-    def _assess_one(self, name: str, value: float, std: float) -> Estimate:
+    def _assess_parameter(self, name: str, value: float, std: float) -> Estimate:
         prior, systematic = self.priors.get(name), self.systematic.get(name)
         note = self.notes.get(name, "")
         if prior is None:
-            return judge(name, value, std, self.method, systematic, note)
+            return assess(name, value, std, self.method, systematic, note)
         told = name, value, std
-        return judge_with_design(told, prior, self.prior_method, systematic, note)
+        return assess_with_prior(told, prior, self.prior_method, systematic, note)
 
 
-def fill_from_card(drivelines: Sequence[Driveline], note: str) -> dict[str, Estimate]:
+def collect_fill_pressures(drivelines: Sequence[KnownDriveline], note: str) -> dict[str, Estimate]:
     """Return the card's P0 of the elements of all shifts."""
     elements = (element for one in drivelines for element in (one.offgoing, one.oncoming))
     fills = {f"P0.{element.name}": element.P0 for element in elements}
-    return {name: designed(name, prior, note) for name, prior in fills.items()}
+    return {name: from_prior(name, prior, note) for name, prior in fills.items()}

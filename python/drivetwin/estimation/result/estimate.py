@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
 
 FloatArray = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Estimate:
     @property
     def unit(self) -> str:
         """SI unit from the parameter table."""
-        return spec_of(self.id).unit
+        return get_parameter_spec(self.id).unit
 
     @property
     def std_total(self) -> float | None:
@@ -62,7 +62,7 @@ class Estimate:
             return None
         return float(np.hypot(self.std_noise, self.std_systematic or 0.0))
 
-    def _interval(self, std: float | None) -> tuple[float, float] | None:
+    def _compute_interval(self, std: float | None) -> tuple[float, float] | None:
         if self.value is None or std is None:
             return None
         return (self.value - Z95 * std, self.value + Z95 * std)
@@ -70,12 +70,12 @@ class Estimate:
     @property
     def ci95(self) -> tuple[float, float] | None:
         """95 % interval from noise alone."""
-        return self._interval(self.std_noise)
+        return self._compute_interval(self.std_noise)
 
     @property
     def ci95_total(self) -> tuple[float, float] | None:
         """95 % interval with sensor tolerances included; the one to show first."""
-        return self._interval(self.std_total)
+        return self._compute_interval(self.std_total)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,8 @@ class FrictionCurve:
 
     `mu_lo`, `mu_hi` bound the 95 % band (total). `points_slip`, `points_mu` are the raw points
     behind it. `stribeck` is the fitted law, or None; `stribeck_covariance` (4, 4) is over its
-    fields, from noise. `over_eta` marks a curve that is μ/η: no output torque gave μ its scale.
+    fields, from noise. `divide_by_eta` marks a curve that is μ/η: no output torque gave μ its
+    scale.
     """
 
     slip: FloatArray
@@ -108,7 +109,7 @@ class FrictionCurve:
         """Symbol of the curve in a formula."""
         return "μ/η" if self.over_eta else "μ"
 
-    def times(self, eta: float, std: float = 0.0) -> FrictionCurve:
+    def scale_by_eta(self, eta: float, std: float = 0.0) -> FrictionCurve:
         """μ of a curve that is μ/η, from η and its standard deviation, which widens the band."""
         mu, law = eta * self.mu, self.stribeck
         ends = (self.mu_lo, self.mu_hi)
@@ -137,8 +138,8 @@ class LoadLaw:
         T_v(ω) = i_f·(T_v/i_f) + aero·(ω·|ω| - mean_speed²)
 
     `aero` [N m s^2/rad^2] with its standard deviation (total); T_v/i_f, a parameter of its own,
-    holds at `mean_speed` [rad/s], the wheel's mean over the fit. `over_eta` marks a log without an
-    output torque: `aero` is then divided by η, as T_v/i_f is.
+    holds at `mean_speed` [rad/s], the wheel's mean over the fit. `divide_by_eta` marks a log
+    without an output torque: `aero` is then divided by η, as T_v/i_f is.
     """
 
     aero: float
@@ -146,12 +147,12 @@ class LoadLaw:
     mean_speed: float
     over_eta: bool = False
 
-    def times(self, eta: float, std: float = 0.0) -> LoadLaw:
+    def scale_by_eta(self, eta: float, std: float = 0.0) -> LoadLaw:
         """The law of a log without an output torque, from η and its standard deviation."""
         spread = float(np.hypot(eta * self.std, std * self.aero))
         return replace(self, aero=eta * self.aero, std=spread, over_eta=False)
 
-    def road_load(self, Tv_over_if: float, i_f: float) -> RoadLoad:
+    def to_road_load(self, Tv_over_if: float, i_f: float) -> RoadLoad:
         """Convert the law to the parameters of the model."""
         constant = i_f * Tv_over_if - self.aero * self.mean_speed**2
         return RoadLoad(constant=constant, aero=self.aero)

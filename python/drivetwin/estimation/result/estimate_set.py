@@ -10,14 +10,14 @@ from itertools import groupby
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
-from drivetwin.shifts.shift import shift_labels
+from drivetwin.shifts.shift import make_shift_labels
 
 
 @dataclass(frozen=True, eq=False)
-class Conclusions:
+class EstimateSet:
     """Estimates and notes that the pipeline adds to the Identification.
 
     `loads` are the loads of the shifts at the output shaft [N m] if they differ, else empty.
@@ -32,9 +32,9 @@ class Conclusions:
     loads: tuple[float, ...] = ()
 
 
-def _low_gear_note(signals: ShiftSignals, gear: str) -> str:
+def _describe_low_gear(signals: ShiftSignals, gear: str) -> str:
     """Return a note if the engine torque is constant in the lower gear; empty otherwise."""
-    torque = signals.engine_torque.within(signals.shift.before).values
+    torque = signals.engine_torque.select_span(signals.shift.before).values
     moving, level = float(np.std(torque)), abs(float(np.mean(torque)))
     if moving > 0.03 * level:
         return ""
@@ -45,31 +45,31 @@ def _low_gear_note(signals: ShiftSignals, gear: str) -> str:
     )
 
 
-def growth_told(aero: float, std: float, mean_speed: float) -> str:
+def describe_growth(aero: float, std: float, mean_speed: float) -> str:
     """Describe a load that grows with speed, from AERO and its standard deviation."""
     return (
         "the load grows with the square of the speed "
-        f"({in_units(aero, 'N*m*s^2/rad^2', Z95 * std)} at the wheel); "
+        f"({format_with_unit(aero, 'N*m*s^2/rad^2', Z95 * std)} at the wheel); "
         f"T_v/i_f holds at {mean_speed:.3g} rad/s of the wheel"
     )
 
 
-def labels_of(signals: Sequence[ShiftSignals]) -> list[str]:
+def collect_shift_labels(signals: Sequence[ShiftSignals]) -> list[str]:
     """Return the labels of the shifts: gears, and the lock-up time if a gear change repeats."""
     labels: list[str] = []
     for log, group in groupby(signals, key=lambda one: one.log):
-        names = shift_labels([one.shift for one in group], to="-")
+        names = make_shift_labels([one.shift for one in group], to="-")
         labels += [f"log {log}, shift {name}" if log else f"shift {name}" for name in names]
     return labels
 
 
-def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
+def collect_low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
     """By parameter id what a still engine torque in the lower gear costs it.
 
     A gear in which the torque moves before any of the shifts is told by that one.
     """
     notes: dict[str, str] = {}
-    found = [(s, _low_gear_note(s, s.shift.start_gear)) for s in signals]
+    found = [(s, _describe_low_gear(s, s.shift.start_gear)) for s in signals]
     moved = {s.shift.start_gear for s, note in found if not note}
     for s, note in found:
         if note and s.shift.start_gear not in moved:
@@ -78,7 +78,7 @@ def low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
     return notes
 
 
-def with_systematic_band(curve: FrictionCurve, std: FloatArray) -> FrictionCurve:
+def add_systematic_band(curve: FrictionCurve, std: FloatArray) -> FrictionCurve:
     """`curve` with its band widened by the sensors' systematic errors `std` (n,) of μ."""
     noise = (curve.mu_hi - curve.mu_lo) / (2.0 * Z95)
     half = Z95 * np.hypot(noise, std)

@@ -45,7 +45,7 @@ FAR = 3.0
 
 
 @dataclass(frozen=True)
-class Move:
+class LogPull:
     """Discrepancy between one log and the others on a parameter, in its standard deviations."""
 
     parameter: str
@@ -64,7 +64,7 @@ class Consistency:
     chi2: float
     freedom: int
     p: float
-    moves: tuple[Move, ...]
+    moves: tuple[LogPull, ...]
 
     @property
     def agree(self) -> bool:
@@ -72,7 +72,7 @@ class Consistency:
         return self.p >= SIGNIFICANT
 
     @property
-    def doubtful(self) -> dict[str, Move]:
+    def doubtful(self) -> dict[str, LogPull]:
         """Parameters on which the logs disagree; empty if they agree."""
         far = {one.parameter: one for one in self.moves if abs(one.z) > FAR}
         return {} if self.agree else far

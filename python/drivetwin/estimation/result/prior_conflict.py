@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
-from drivetwin.estimation.result.prior_update import CONTRADICTS, without_prior
-from drivetwin.estimation.result.verdict import doubted
-from drivetwin.parameters import OVER_ETA, spec_of
+from drivetwin.estimation.result.prior_update import CONTRADICTS, remove_prior
+from drivetwin.estimation.result.verdict import reject_identified
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
 
@@ -41,8 +41,8 @@ class Contradiction:
     @property
     def text(self) -> str:
         """The same in words."""
-        unit = spec_of(self.id).unit
-        card, log = (in_units(one.value, unit, one.std) for one in (self.design, self.log))
+        unit = get_parameter_spec(self.id).unit
+        card, log = (format_with_unit(one.value, unit, one.std) for one in (self.design, self.log))
         return (
             f"{self.id}: the vehicle card says {card}, the log {log} (1 sigma), "
             f"{self.apart:.1f} standard deviations apart: correct the card, or find what the "
@@ -50,7 +50,7 @@ class Contradiction:
         )
 
 
-def contradictions(
+def find_contradictions(
     ids: Sequence[str],
     values: FloatArray,
     covariance: FloatArray,
@@ -65,12 +65,12 @@ def contradictions(
     found = []
     for name, design in designs.items():
         k, sensors = ids.index(name), systematic.get(name, 0.0)
-        moved, spec = abs(float(values[k]) - design.value), spec_of(name)
+        moved, spec = abs(float(values[k]) - design.value), get_parameter_spec(name)
         if design.std == 0.0 or not spec.lower <= values[k] <= spec.upper:
             continue
         if moved <= design.std:  # no further off than the card allows, however sure the log is
             continue
-        freed = without_prior(values, covariance, k, design)
+        freed = remove_prior(values, covariance, k, design)
         log = PriorValue(float(values[k]), float(np.sqrt(covariance[k, k])))
         without: dict[str, float] = {}
         spread = float(np.hypot(design.std, sensors))
@@ -85,7 +85,7 @@ def contradictions(
     return tuple(found)
 
 
-def held_against(
+def apply_contradictions(
     estimates: Mapping[str, Estimate], found: Sequence[Contradiction], method: str
 ) -> dict[str, Estimate]:
     """The estimates, none of them identified that a contradicted design value decides.
@@ -102,28 +102,28 @@ def held_against(
             if name == one.id or other.value is None or other.std_total is None:
                 continue
             if abs(free - other.value) > Z95 * other.std_total:
-                value = in_units(free, other.unit, digits=5)
+                value = format_with_unit(free, other.unit, digits=5)
                 why = f"without the card's {one.id} the log gives {value}"
-                told[name] = doubted(other, why)
+                told[name] = reject_identified(other, why)
     return told
 
 
-def outside_ranges(estimates: Mapping[str, Estimate], design: DesignData) -> tuple[str, ...]:
+def check_design_ranges(estimates: Mapping[str, Estimate], design: DesignData) -> tuple[str, ...]:
     """What is said of inertias whose whole interval lies outside the card's design range."""
     ranges = {"J_prime": design.J_prime_range, "J_vehicle": design.J_vehicle_range}
     texts = []
     for name, one in estimates.items():
-        limits = None if name.endswith(OVER_ETA) else ranges.get(spec_of(name).stem)
+        limits = None if name.endswith(OVER_ETA) else ranges.get(get_parameter_spec(name).stem)
         if limits is None or one.value is None or one.verdict is Verdict.DESIGN:
             continue
         low, high = one.ci95_total or (one.value, one.value)
         if high < limits[0] or low > limits[1]:
-            text = outside(name, one.value, limits)
+            text = describe_range_violation(name, one.value, limits)
             texts.append(f"{text}: correct the range, or check ratios, gains and units of the log")
     return tuple(texts)
 
 
-def without_gain(
+def check_efficiency_limit(
     estimates: Mapping[str, Estimate], law: LossLaw
 ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
     """The estimates, an η whose whole interval lies above 1 doubted, and what is said of it.
@@ -138,20 +138,20 @@ def without_gain(
     if low <= 1.0:
         return dict(estimates), ()
     text = (
-        f"η = {in_units(one.value, one.unit)}: more power would leave the gears than enters; the "
+        f"η = {format_with_unit(one.value, one.unit)}: more power would leave the gears than enters; the "
         "engine torque, or the map of an open converter, gives too little, or the output torque "
         "reads too much"
     )
     if law == "paper":
         text += '; of a shift in overrun loss_law = "dissipative" tells η'
-    return {**estimates, "eta": doubted(one, "an efficiency above 1")}, (text,)
+    return {**estimates, "eta": reject_identified(one, "an efficiency above 1")}, (text,)
 
 
-def outside(symbol: str, value: float, design: tuple[float, float]) -> str:
+def describe_range_violation(symbol: str, value: float, design: tuple[float, float]) -> str:
     """What is said of an inertia [kg m^2] outside its design range; empty where it lies within."""
     if design[0] <= value <= design[1]:
         return ""
     return (
-        f"{symbol} = {in_units(value, 'kg*m^2')} lies outside its design range "
+        f"{symbol} = {format_with_unit(value, 'kg*m^2')} lies outside its design range "
         f"{design[0]:g} to {design[1]:g} kg·m²"
     )

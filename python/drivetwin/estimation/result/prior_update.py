@@ -20,7 +20,7 @@ LEAST = 0.02
 """Share of the information on a parameter below which nothing of it is the log's own."""
 
 
-def with_known(
+def add_priors(
     ids: Sequence[str],
     values: FloatArray,
     covariance: FloatArray,
@@ -52,7 +52,7 @@ def with_known(
     return values, covariance, tuple(warnings)
 
 
-def without_prior(
+def remove_prior(
     values: FloatArray, covariance: FloatArray, k: int, prior: PriorValue
 ) -> tuple[FloatArray, FloatArray] | None:
     """Values (q,) and covariance (q, q) with the normal `prior` of number k taken out.

@@ -16,7 +16,7 @@ NONE_HELPS = "none of the known experiments narrows it by a tenth or more"
 
 
 @dataclass(frozen=True)
-class Prospect:
+class ExpectedPrecision:
     """Precision expected from an experiment: half width of the 95 % interval of a parameter, SI.
 
     `shift` says by its gears on which shift of the log the experiment is built; empty where the log
@@ -31,7 +31,7 @@ class Prospect:
 
 
 @dataclass(frozen=True)
-class Suggestion:
+class ExperimentRanking:
     """Experiments for one parameter, in order of worth, helpful or not.
 
     `half_width` is that of the present 95 % interval (noise and sensors), infinite without one.
@@ -41,11 +41,11 @@ class Suggestion:
     parameter: str
     verdict: Verdict
     half_width: float
-    prospects: tuple[Prospect, ...]
+    prospects: tuple[ExpectedPrecision, ...]
     limit: str = ""
 
     @property
-    def best(self) -> Prospect | None:
+    def best(self) -> ExpectedPrecision | None:
         """First experiment that narrows the interval to `NARROWER` of its present width or less."""
         for one in self.prospects:
             told = one.verdict is not Verdict.NOT_IDENTIFIABLE

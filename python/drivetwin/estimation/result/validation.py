@@ -72,10 +72,10 @@ class HeldOut:
     shift: Shift
     validation: Validation | None
     own: Mapping[str, Estimate] = field(default_factory=dict)
-    bounds: Mapping[str, Bound] = field(default_factory=dict)
+    bounds: Mapping[str, PredictionInterval] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    def outcome_of(self, signal: str) -> Outcome:
+    def get_signal_outcome(self, signal: str) -> Outcome:
         """Verdict on one compared signal."""
         if self.validation is None or self.validation.status != "completed":
             return Outcome.NOT_PREDICTED
@@ -89,7 +89,7 @@ class HeldOut:
         """The worst verdict on any signal."""
         if self.validation is None:
             return Outcome.NOT_PREDICTED
-        found = {self.outcome_of(signal) for signal in self.validation.fit}
+        found = {self.get_signal_outcome(signal) for signal in self.validation.fit}
         order = (Outcome.NOT_PREDICTED, Outcome.WORSE, Outcome.NOT_JUDGED, Outcome.ALLOWED)
         return next(one for one in order if one in found)
 
@@ -100,7 +100,7 @@ class HeldOut:
 
 
 @dataclass(frozen=True)
-class Bound:
+class PredictionInterval:
     """Root mean square error of one compared signal that a right model has, SI.
 
     `usual` in the median, `largest` in 97.5 % of all cases.

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue
 
 DELAY_IDENTIFIED = 0.005
@@ -46,25 +46,25 @@ _EXPERIMENT = {
 }
 
 
-def experiment_for(parameter_id: str) -> str:
+def get_experiment(parameter_id: str) -> str:
     """Return the experiment that would narrow the interval of a parameter."""
-    return _EXPERIMENT[spec_of(parameter_id).stem]
+    return _EXPERIMENT[get_parameter_spec(parameter_id).stem]
 
 
-def sensors_decide(std_noise: float, std_systematic: float | None) -> bool:
+def is_sensor_limited(std_noise: float, std_systematic: float | None) -> bool:
     """Return True if sensor tolerances dominate an interval, so that no experiment narrows it."""
     systematic = std_systematic or 0.0
     return systematic > SENSORS * float(np.hypot(std_noise, systematic))
 
 
-def advice_for(parameter_id: str, std_noise: float, std_systematic: float | None) -> str:
+def get_advice(parameter_id: str, std_noise: float, std_systematic: float | None) -> str:
     """Return advice on narrowing an interval: an experiment or better sensors."""
-    if sensors_decide(std_noise, std_systematic):
+    if is_sensor_limited(std_noise, std_systematic):
         return CALIBRATE
-    return experiment_for(parameter_id)
+    return get_experiment(parameter_id)
 
 
-def judge(
+def assess(
     parameter_id: str,
     value: float,
     std_noise: float,
@@ -78,16 +78,16 @@ def judge(
     outside the parameter's bounds: not identifiable, and no value is given. Delays are judged by
     absolute width, since zero is a sound value for them.
     """
-    spec = spec_of(parameter_id)
+    spec = get_parameter_spec(parameter_id)
     half = Z95 * float(np.hypot(std_noise, std_systematic or 0.0))
     if spec.stem == "te_delay":
         width, limit, end = half, DELAY_IDENTIFIED, 4.0 * DELAY_IDENTIFIED
     else:
         width, limit, end = half / max(abs(value), 1e-300), spec.weak_above, 1.0
     inside = spec.lower <= value <= spec.upper
-    advice = advice_for(parameter_id, std_noise, std_systematic)
+    advice = get_advice(parameter_id, std_noise, std_systematic)
     if not np.isfinite(width) or width > end or not inside:
-        shown = f"the 95 % interval {in_units(value, spec.unit, half)} says nothing"
+        shown = f"the 95 % interval {format_with_unit(value, spec.unit, half)} says nothing"
         return Estimate(
             parameter_id,
             None,
@@ -97,7 +97,7 @@ def judge(
             reason=f"{shown}; {advice}",
         )
     if width > limit:
-        reason = f"the 95 % interval is ± {in_units(half, spec.unit, digits=2)}; {advice}"
+        reason = f"the 95 % interval is ± {format_with_unit(half, spec.unit, digits=2)}; {advice}"
         verdict = Verdict.WEAK
     else:
         reason, verdict = "", Verdict.IDENTIFIED
@@ -105,7 +105,7 @@ def judge(
     return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, text)
 
 
-def judge_with_design(
+def assess_with_prior(
     told: tuple[str, float, float],
     design: PriorValue,
     method: str,
@@ -120,20 +120,20 @@ def judge_with_design(
     """
     name, value, std = told
     if design.std == 0.0:
-        return designed(name, PriorValue(value), KNOWN)
+        return from_prior(name, PriorValue(value), KNOWN)
     if std >= PRIOR_SHARE * design.std:
-        return designed(name, PriorValue(value, std), ADDS_LITTLE, std_systematic)
-    one, spec = judge(name, value, std, method, std_systematic, note), spec_of(name)
+        return from_prior(name, PriorValue(value, std), ADDS_LITTLE, std_systematic)
+    one, spec = assess(name, value, std, method, std_systematic, note), get_parameter_spec(name)
     if one.value is not None or not spec.lower <= value <= spec.upper:
         return one
     half = Z95 * float(np.hypot(std, std_systematic or 0.0))
-    width = in_units(half, spec.unit, digits=2)
+    width = format_with_unit(half, spec.unit, digits=2)
     wide = f"the 95 % interval is ± {width}, with the card's design value in it"
-    text = "; ".join(part for part in (note, wide, advice_for(name, std, std_systematic)) if part)
+    text = "; ".join(part for part in (note, wide, get_advice(name, std, std_systematic)) if part)
     return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, text)
 
 
-def designed(
+def from_prior(
     parameter_id: str, prior: PriorValue, note: str, std_systematic: float | None = None
 ) -> Estimate:
     """Return the estimate of a value that the card states and the log adds little to.
@@ -145,13 +145,13 @@ def designed(
     return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", std_systematic, note)
 
 
-def refused(parameter_id: str, method: str, why: str) -> Estimate:
+def refuse_parameter(parameter_id: str, method: str, why: str) -> Estimate:
     """A parameter that the log cannot tell, with the reason and the experiment that would."""
-    reason = f"{why}; {experiment_for(parameter_id)}"
+    reason = f"{why}; {get_experiment(parameter_id)}"
     return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
 
 
-def doubted(one: Estimate, why: str) -> Estimate:
+def reject_identified(one: Estimate, why: str) -> Estimate:
     """The estimate with what speaks against it: however narrow, it is not identified.
 
     One that is refused, or the card's, stays as it is.
@@ -179,12 +179,12 @@ def propagate(
     return function(mean), slopes @ covariance @ slopes.T
 
 
-def independent(*blocks: FloatArray) -> FloatArray:
+def build_block_covariance(*blocks: FloatArray) -> FloatArray:
     """Covariance of estimates whose errors are independent between the blocks."""
     return np.asarray(block_diag(*blocks), dtype=float)
 
 
-def root_of(covariance: FloatArray) -> FloatArray:
+def compute_covariance_root(covariance: FloatArray) -> FloatArray:
     """L (p, p) with L·Lᵀ the covariance, formed on its correlation; what has no spread has none."""
     scale = np.sqrt(np.diag(covariance))
     divisor = np.where(scale > 0.0, scale, 1.0)
@@ -192,7 +192,7 @@ def root_of(covariance: FloatArray) -> FloatArray:
     return np.asarray(scale[:, None] * directions * np.sqrt(np.maximum(power, 0.0)))
 
 
-def correlation(covariance: FloatArray) -> FloatArray:
+def compute_correlation(covariance: FloatArray) -> FloatArray:
     """Correlation matrix; a parameter without uncertainty correlates with nothing."""
     std = np.sqrt(np.diag(covariance))
     scale = np.where(std > 0.0, std, np.inf)

@@ -3,6 +3,6 @@
 
 from __future__ import annotations
 
-from drivetwin.export.c.write import model_sources, twin_source, write_c
+from drivetwin.export.c.write import generate_twin_source, read_model_sources, write_c
 
-__all__ = ["model_sources", "twin_source", "write_c"]
+__all__ = ["generate_twin_source", "read_model_sources", "write_c"]

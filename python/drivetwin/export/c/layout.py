@@ -33,15 +33,15 @@ class Layout:
     estimates: Any
 
 
-def layout_of(precision: Precision) -> Layout:
+def build_layout(precision: Precision) -> Layout:
     """All structures, fields in the order of the headers."""
     real, integer = precision.value, ctypes.c_int
     both = real * CLUTCHES
-    speeds = _alike(real, "engine_speed", "output_speed", "wheel_speed", "twist")
-    inputs = _structure("Inputs", engine_torque=real, pressure=both)
+    speeds = _make_alike(real, "engine_speed", "output_speed", "wheel_speed", "twist")
+    inputs = _build_structure("Inputs", engine_torque=real, pressure=both)
     return Layout(
         inputs=inputs,
-        state=_structure(
+        state=_build_structure(
             "State",
             x=real * STATES,
             carry=real * STATES,
@@ -53,7 +53,7 @@ def layout_of(precision: Precision) -> Layout:
             inputs=inputs,
             params=ctypes.c_uint64,
         ),
-        outputs=_structure(
+        outputs=_build_structure(
             "Outputs",
             **speeds,
             output_torque=real,
@@ -62,59 +62,59 @@ def layout_of(precision: Precision) -> Layout:
             mode=integer * CLUTCHES,
             pieces=integer,
         ),
-        start=_structure("Start", **speeds, locked=integer),
-        params=_params(real),
-        tuning=_structure(
+        start=_build_structure("Start", **speeds, locked=integer),
+        params=_build_params(real),
+        tuning=_build_structure(
             "Tuning",
-            **_alike(real, "engine_speed", "output_speed", "engine_torque"),
-            **_alike(real, "scale", "load", "locked_slip"),
+            **_make_alike(real, "engine_speed", "output_speed", "engine_torque"),
+            **_make_alike(real, "scale", "load", "locked_slip"),
         ),
-        observer=_structure(
+        observer=_build_structure(
             "Observer",
             x=real * OBSERVED,
             P=real * OBSERVED * OBSERVED,
             locked=integer,
             learning=integer,
         ),
-        measured=_structure(
-            "Measured", inputs=inputs, **_alike(real, "engine_speed", "output_speed")
+        measured=_build_structure(
+            "Measured", inputs=inputs, **_make_alike(real, "engine_speed", "output_speed")
         ),
-        estimates=_structure(
+        estimates=_build_structure(
             "Estimates",
-            **_alike(real, "output_torque", "output_torque_std"),
-            **_alike(both, "clutch_torque", "scale", "scale_std"),
-            **_alike(real, "load", "load_std"),
+            **_make_alike(real, "output_torque", "output_torque_std"),
+            **_make_alike(both, "clutch_torque", "scale", "scale_std"),
+            **_make_alike(real, "load", "load_std"),
             slip=both,
             locked=integer,
         ),
     )
 
 
-def _params(real: Any) -> Any:
-    friction = _structure(
+def _build_params(real: Any) -> Any:
+    friction = _build_structure(
         "Friction",
-        **_alike(real, "mu_c", "mu_s", "v_s", "mu_v"),
+        **_make_alike(real, "mu_c", "mu_s", "v_s", "mu_v"),
         points=ctypes.c_int,
         slip=real * POINTS,
         mu=real * POINTS,
     )
-    clutch = _structure(
+    clutch = _build_structure(
         "Clutch",
-        **_alike(real, "i_c", "i_out", "gain", "P0", "peak", "drum_inertia"),
+        **_make_alike(real, "i_c", "i_out", "gain", "P0", "peak", "drum_inertia"),
         friction=friction,
     )
-    return _structure(
+    return _build_structure(
         "Params",
-        **_alike(real, "J1", "J2e", "eta", "i_in", "J_out", "i_f", "J_v", "k_o", "c_o"),
-        **_alike(real, "load_constant", "load_rolling", "load_aero"),
+        **_make_alike(real, "J1", "J2e", "eta", "i_in", "J_out", "i_f", "J_v", "k_o", "c_o"),
+        **_make_alike(real, "load_constant", "load_rolling", "load_aero"),
         loss_law=ctypes.c_int,
         clutch=clutch * CLUTCHES,
     )
 
 
-def _structure(name: str, **fields: Any) -> Any:
+def _build_structure(name: str, **fields: Any) -> Any:
     return type(name, (ctypes.Structure,), {"_fields_": list(fields.items())})
 
 
-def _alike(kind: Any, *names: str) -> dict[str, Any]:
+def _make_alike(kind: Any, *names: str) -> dict[str, Any]:
     return dict.fromkeys(names, kind)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin.errors import InputError
-from drivetwin.export.c.layout import Precision, layout_of
+from drivetwin.export.c.layout import Precision, build_layout
 from drivetwin.export.c.write import write_c
 from drivetwin.export.compiler import compile_library
 from drivetwin.export.subject import Subject
@@ -51,7 +51,7 @@ class CModel:
     """
 
     def __init__(self, subject: Subject, precision: Precision = Precision.DOUBLE) -> None:
-        self.layout = layout_of(precision)
+        self.layout = build_layout(precision)
         defines = ["DT_FLOAT"] if precision is Precision.FLOAT else []
         # The folder of a library that is still loaded cannot be removed on Windows.
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -76,13 +76,13 @@ class CModel:
         Inputs are linear between rows, or held. The first row of the result is the start.
         """
         state, outputs = self.layout.state(), self.layout.outputs()
-        rows = [self.inputs(row) for row in inputs]
+        rows = [self.to_c_inputs(row) for row in inputs]
         table = np.full((len(time), len(COLUMNS)), np.nan)
         status = self.library.dt_begin(
             *map(ctypes.byref, (state, self.params, self.start, rows[0], outputs))
         )
         if status == 0:
-            table[0] = _row(outputs)
+            table[0] = _to_row(outputs)
         for i in range(1, len(time)):
             if status != 0:
                 break
@@ -93,16 +93,16 @@ class CModel:
                 ctypes.byref(outputs),
             )
             if status == 0:
-                table[i] = _row(outputs)
+                table[i] = _to_row(outputs)
         columns = dict(zip(COLUMNS, np.ascontiguousarray(table.T), strict=True))
         return CRun(columns, STATUS[status])
 
-    def inputs(self, row: Sequence[float] | FloatArray) -> Any:
+    def to_c_inputs(self, row: Sequence[float] | FloatArray) -> Any:
         """Engine torque [N m] and two pressures [Pa] as the C structure."""
         return self.layout.inputs(float(row[0]), tuple(map(float, row[1:])))
 
 
-def _row(y: Any) -> list[float]:
+def _to_row(y: Any) -> list[float]:
     speeds = [y.engine_speed, y.output_speed, y.wheel_speed, y.twist, y.output_torque]
     return [*speeds, *y.clutch_torque, *y.slip, *y.mode, y.pieces]
 
@@ -132,16 +132,16 @@ class CObserver:
         self._model = model
         self.tuning = model.library.dt_usual_tuning()
         self._memory = model.layout.observer()
-        now = self._measured(inputs, speeds)
+        now = self._to_measured(inputs, speeds)
         model.library.dt_observer_begin(*map(ctypes.byref, (self._memory, model.params, now)))
 
-    def resume(self, inputs: Sequence[float], speeds: tuple[float, float]) -> None:
+    def restart_observer(self, inputs: Sequence[float], speeds: tuple[float, float]) -> None:
         """Start anew at measured speeds, with friction and load as known so far."""
-        now = self._measured(inputs, speeds)
+        now = self._to_measured(inputs, speeds)
         library, params = self._model.library, self._model.params
         library.dt_observer_resume(*map(ctypes.byref, (self._memory, params, now)))
 
-    def observe(
+    def update_estimates(
         self, inputs: Sequence[float], speeds: tuple[float, float], step: float
     ) -> Estimates:
         """Take in speeds of engine and output [rad/s], and inputs since the last call.
@@ -149,7 +149,7 @@ class CObserver:
         `step` [s] has passed since then. Raises InputError for what is not finite or not in range.
         """
         estimates = self._model.layout.estimates()
-        now = self._measured(inputs, speeds)
+        now = self._to_measured(inputs, speeds)
         status = self._model.library.dt_observe(
             *map(ctypes.byref, (self._memory, self._model.params, self.tuning, now)),
             step,
@@ -172,5 +172,5 @@ class CObserver:
             locked=estimates.locked,
         )
 
-    def _measured(self, inputs: Sequence[float], speeds: tuple[float, float]) -> Any:
-        return self._model.layout.measured(self._model.inputs(inputs), *map(float, speeds))
+    def _to_measured(self, inputs: Sequence[float], speeds: tuple[float, float]) -> Any:
+        return self._model.layout.measured(self._model.to_c_inputs(inputs), *map(float, speeds))

@@ -8,55 +8,55 @@ from pathlib import Path
 
 from drivetwin._util.atomic import write_bytes
 from drivetwin.export.checks import check_exportable
-from drivetwin.export.entries import Entry, entries_of, locked_index, start_entries
+from drivetwin.export.entries import Entry, get_lock_index, list_entries, start_entries
 from drivetwin.export.subject import Subject
 
 _LOSS_LAWS = {"paper": "DT_PAPER", "dissipative": "DT_DISSIPATIVE"}
 
 
-def model_sources() -> dict[str, bytes]:
+def read_model_sources() -> dict[str, bytes]:
     """The files of the model by name, without the twin's parameters."""
     folder = resources.files("drivetwin.export.c") / "source"
     names = sorted(entry.name for entry in folder.iterdir())
     return {name: (folder / name).read_bytes() for name in names}
 
 
-def twin_source(subject: Subject) -> str:
+def generate_twin_source(subject: Subject) -> str:
     """`dt_twin.c`: parameters and start as initialisers with unit and meaning.
 
     Raises InputError for a model that the C sources cannot hold.
     """
     model, start = subject.model, subject.start
     check_exportable(model, start)
-    names = ", ".join(c_string(element.name) for element in model.elements)
-    points = {f"clutch[{i}].friction.points": n for i, n in table_points(subject).items()}
+    names = ", ".join(format_c_string(element.name) for element in model.elements)
+    points = {f"clutch[{i}].friction.points": n for i, n in get_table_points(subject).items()}
     return "\n".join(
         (
             "/* SPDX-License-Identifier: MIT */",
-            f"/* {_comment(subject.name)}: {_comment(subject.note or 'parameters')}; written by"
+            f"/* {_format_comment(subject.name)}: {_format_comment(subject.note or 'parameters')}; written by"
             " drivetwin. */",
             "",
             '#include "dt_twin.h"',
             "",
-            f"const char dt_twin_name[] = {c_string(subject.name)};",
+            f"const char dt_twin_name[] = {format_c_string(subject.name)};",
             f"const char *const dt_twin_clutch_names[DT_CLUTCHES] = {{{names}}};",
             "",
             "const dt_params dt_twin_params = {",
-            *map(_initialiser, entries_of(model)),
+            *map(_format_initialiser, list_entries(model)),
             f"    .loss_law = {_LOSS_LAWS[model.loss_law]},",
             *(f"    .{field} = {count}," for field, count in points.items() if count),
             "};",
             "",
             "const dt_start dt_twin_start = {",
-            *map(_initialiser, start_entries(start)),
-            f"    .locked = {locked_index(model, start)},",
+            *map(_format_initialiser, start_entries(start)),
+            f"    .locked = {get_lock_index(model, start)},",
             "};",
             "",
         )
     )
 
 
-def table_points(subject: Subject) -> dict[int, int]:
+def get_table_points(subject: Subject) -> dict[int, int]:
     """Element index -> points of its friction table, 0 for a Stribeck law."""
     laws = (element.friction for element in subject.model.elements)
     return {i: len(getattr(law, "slip", ())) for i, law in enumerate(laws)}
@@ -67,14 +67,14 @@ def write_c(subject: Subject, folder: Path) -> tuple[Path, ...]:
 
     Raises InputError for a model that the C sources cannot hold, and OSError.
     """
-    generated = {"dt_twin.c": twin_source(subject).encode()}
-    files = {**model_sources(), **generated}
+    generated = {"dt_twin.c": generate_twin_source(subject).encode()}
+    files = {**read_model_sources(), **generated}
     for name, data in files.items():
         write_bytes(folder / name, data)
     return tuple(folder / name for name in files)
 
 
-def c_string(text: str) -> str:
+def format_c_string(text: str) -> str:
     """A C string literal; octal escapes stand for all but printable ASCII, and for asterisks."""
 
     def literal(byte: int) -> str:
@@ -83,11 +83,11 @@ def c_string(text: str) -> str:
     return '"' + "".join(map(literal, text.encode())) + '"'
 
 
-def _comment(text: str) -> str:
+def _format_comment(text: str) -> str:
     """Text that can neither begin nor end a comment, nor break its line."""
     return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
 
 
-def _initialiser(entry: Entry) -> str:
+def _format_initialiser(entry: Entry) -> str:
     value = float(entry.value)  # that of a numpy array would name its type
     return f"    .{entry.field} = DT_C({value!r}), /* {entry.unit}: {entry.meaning} */"

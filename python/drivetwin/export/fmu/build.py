@@ -17,15 +17,15 @@ from pathlib import Path
 
 from drivetwin._util.atomic import write_bytes
 from drivetwin.errors import InputError
-from drivetwin.export.c.write import model_sources, twin_source
-from drivetwin.export.compiler import compile_library, native_platform
-from drivetwin.export.entries import entries_of
+from drivetwin.export.c.write import generate_twin_source, read_model_sources
+from drivetwin.export.compiler import compile_library, detect_platform
+from drivetwin.export.entries import list_entries
 from drivetwin.export.fixed_step import DEFAULT_STEP
-from drivetwin.export.fmu.describe import Header, description
-from drivetwin.export.fmu.experiment import Experiment, reference_files
-from drivetwin.export.fmu.variables import variables_of
+from drivetwin.export.fmu.describe import Header, build_description
+from drivetwin.export.fmu.experiment import Experiment, build_reference_files
+from drivetwin.export.fmu.variables import list_variables
 from drivetwin.export.fmu.version import FmiVersion
-from drivetwin.export.parameters.xml_text import document
+from drivetwin.export.parameters.xml_text import format_document
 from drivetwin.export.platforms import Platform
 from drivetwin.export.subject import Subject
 
@@ -62,16 +62,16 @@ def build_fmu(subject: Subject, path: Path, options: BuildOptions | None = None)
     """
     options = options or BuildOptions()
     _check_platforms(options)
-    header, sources = _sources(subject, options)
+    header, sources = _collect_sources(subject, options)
     files = {
-        "modelDescription.xml": description(options.version, header, variables_of(subject)),
+        "modelDescription.xml": build_description(options.version, header, list_variables(subject)),
         **{f"sources/{name}": data for name, data in sources.items()},
-        **_binaries(header.identifier, sources, options),
-        **reference_files(subject, options.experiment, options.version),
+        **_compile_binaries(header.identifier, sources, options),
+        **build_reference_files(subject, options.experiment, options.version),
     }
     if options.version is FmiVersion.FMI3:
         files["sources/buildDescription.xml"] = _build_description(header)
-    write_bytes(path, _archive(files))
+    write_bytes(path, _build_archive(files))
 
 
 def _check_platforms(options: BuildOptions) -> None:
@@ -83,7 +83,7 @@ def _check_platforms(options: BuildOptions) -> None:
         )
 
 
-def identifier(name: str) -> str:
+def make_identifier(name: str) -> str:
     """A C identifier from a name, short enough for a file."""
     text = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "twin"
     return (text if text[0].isalpha() else f"twin_{text}")[:_LONGEST_IDENTIFIER]
@@ -93,24 +93,24 @@ _LONGEST_IDENTIFIER = 63
 """Significant characters of a C99 identifier; file names and archive paths may be longer."""
 
 
-def _sources(subject: Subject, options: BuildOptions) -> tuple[Header, dict[str, bytes]]:
+def _collect_sources(subject: Subject, options: BuildOptions) -> tuple[Header, dict[str, bytes]]:
     """Header of the description and all sources; the token marks both."""
     digit = options.version.value[0]
-    fixed = {name: data for name, data in model_sources().items() if name not in _NOT_IN_FMU}
+    fixed = {name: data for name, data in read_model_sources().items() if name not in _NOT_IN_FMU}
     for folder, pattern in (("source", rf"dt_fm(u\.|i{digit})"), ("headers", f"fmi{digit}")):
         place = resources.files("drivetwin.export.fmu") / folder
         for entry in place.iterdir():
             if re.match(pattern, entry.name):
                 fixed[entry.name] = entry.read_bytes()
-    fixed["dt_twin.c"] = twin_source(subject).encode()
-    token = _token(fixed, options.experiment)
-    places = " ".join(f"X({entry.field})" for entry in entries_of(subject.model))
+    fixed["dt_twin.c"] = generate_twin_source(subject).encode()
+    token = _compute_token(fixed, options.experiment)
+    places = " ".join(f"X({entry.field})" for entry in list_entries(subject.model))
     fixed["dt_fmu_twin.h"] = _TWIN_HEADER.format(token=token, places=places).encode()
     files = dict(sorted(fixed.items()))
     experiment = options.experiment
     header = Header(
         name=subject.name,
-        identifier=identifier(subject.name),
+        identifier=make_identifier(subject.name),
         token=token,
         note=subject.note,
         start_time=0.0 if experiment is None else float(experiment.time[0]),
@@ -128,16 +128,18 @@ _TWIN_HEADER = """/* SPDX-License-Identifier: MIT */
 """
 
 
-def _token(files: Mapping[str, bytes], experiment: Experiment | None) -> str:
-    digest = hashlib.sha256(b"" if experiment is None else experiment.digest())
+def _compute_token(files: Mapping[str, bytes], experiment: Experiment | None) -> str:
+    digest = hashlib.sha256(b"" if experiment is None else experiment.compute_digest())
     for name, data in sorted(files.items()):
         digest.update(name.encode() + b"\0" + data)
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
 
 
-def _binaries(name: str, sources: Mapping[str, bytes], options: BuildOptions) -> dict[str, bytes]:
+def _compile_binaries(
+    name: str, sources: Mapping[str, bytes], options: BuildOptions
+) -> dict[str, bytes]:
     folders = _FOLDERS[options.version]
-    here = native_platform()
+    here = detect_platform()
     wanted: Sequence[tuple[Platform, Platform | None]]
     if options.platforms:
         wanted = [(each, each) for each in options.platforms]
@@ -162,10 +164,10 @@ def _build_description(header: Header) -> bytes:
     files = ET.SubElement(configuration, "SourceFileSet", language="C99")
     for name in header.sources:
         ET.SubElement(files, "SourceFile", name=name)
-    return document(root).encode()
+    return format_document(root).encode()
 
 
-def _archive(files: Mapping[str, bytes]) -> bytes:
+def _build_archive(files: Mapping[str, bytes]) -> bytes:
     """Zip without times, so that the same contents are the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivetwin._util.version import program_version
-from drivetwin.export.fmu.units import display_unit, fmi_unit, unit_definitions
+from drivetwin.export.fmu.units import build_unit_definitions, get_display_unit, to_fmi_unit
 from drivetwin.export.fmu.variables import ENUMERATIONS, Kind, Role, Variable
 from drivetwin.export.fmu.version import FmiVersion
-from drivetwin.export.parameters.xml_text import document
+from drivetwin.export.parameters.xml_text import format_document
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,17 @@ class Header:
     sources: tuple[str, ...]
 
 
-def description(version: FmiVersion, header: Header, variables: Sequence[Variable]) -> bytes:
+def build_description(version: FmiVersion, header: Header, variables: Sequence[Variable]) -> bytes:
     """Contents of `modelDescription.xml`."""
-    root = _fmi2(header, variables) if version is FmiVersion.FMI2 else _fmi3(header, variables)
-    return document(root).encode()
+    root = (
+        _build_fmi2(header, variables)
+        if version is FmiVersion.FMI2
+        else _build_fmi3(header, variables)
+    )
+    return format_document(root).encode()
 
 
-def _root(version: FmiVersion, header: Header, token: str) -> ET.Element:
+def _build_root(version: FmiVersion, header: Header, token: str) -> ET.Element:
     return ET.Element(
         "fmiModelDescription",
         {
@@ -57,8 +61,8 @@ _ABILITIES = {
 }
 
 
-def _fmi2(header: Header, variables: Sequence[Variable]) -> ET.Element:
-    root = _root(FmiVersion.FMI2, header, "guid")
+def _build_fmi2(header: Header, variables: Sequence[Variable]) -> ET.Element:
+    root = _build_root(FmiVersion.FMI2, header, "guid")
     abilities = {
         **_ABILITIES,
         "canInterpolateInputs": "true",
@@ -72,16 +76,16 @@ def _fmi2(header: Header, variables: Sequence[Variable]) -> ET.Element:
     files = ET.SubElement(simulation, "SourceFiles")
     for name in header.sources:
         ET.SubElement(files, "File", name=name)
-    root.append(_units(variables))
+    root.append(_build_units(variables))
     types = ET.SubElement(root, "TypeDefinitions")
     for kind, names in ENUMERATIONS.items():
         items = ET.SubElement(ET.SubElement(types, "SimpleType", name=kind.value), "Enumeration")
-        _items(items, names)
+        _add_items(items, names)
     _log_categories(root)
-    _experiment(root, header)
+    _add_experiment(root, header)
     listed = ET.SubElement(root, "ModelVariables")
     for variable in variables:
-        _scalar_variable(listed, variable)
+        _add_scalar_variable(listed, variable)
     structure = ET.SubElement(root, "ModelStructure")
     for part in ("Outputs", "InitialUnknowns"):
         unknowns = ET.SubElement(structure, part)
@@ -91,37 +95,37 @@ def _fmi2(header: Header, variables: Sequence[Variable]) -> ET.Element:
     return root
 
 
-def _scalar_variable(parent: ET.Element, variable: Variable) -> None:
+def _add_scalar_variable(parent: ET.Element, variable: Variable) -> None:
     about = {
         "name": variable.name,
         "valueReference": str(variable.reference),
         "description": variable.meaning,
         "causality": variable.role.causality,
-        "variability": variable.role.variability(variable.kind),
+        "variability": variable.role.get_variability(variable.kind),
     }
-    item = ET.SubElement(parent, "ScalarVariable", {**about, **_initial(variable)})
+    item = ET.SubElement(parent, "ScalarVariable", {**about, **_get_initial(variable)})
     if variable.kind in ENUMERATIONS:
         typed = {"declaredType": variable.kind.value, **_start(variable)}
         ET.SubElement(item, "Enumeration", typed)
     else:
-        ET.SubElement(item, variable.kind.value, {**_quantity(variable), **_start(variable)})
+        ET.SubElement(item, variable.kind.value, {**_get_quantity(variable), **_start(variable)})
 
 
-def _fmi3(header: Header, variables: Sequence[Variable]) -> ET.Element:
-    root = _root(FmiVersion.FMI3, header, "instantiationToken")
+def _build_fmi3(header: Header, variables: Sequence[Variable]) -> ET.Element:
+    root = _build_root(FmiVersion.FMI3, header, "instantiationToken")
     ET.SubElement(root, "CoSimulation", {"modelIdentifier": header.identifier, **_ABILITIES})
-    root.append(_units(variables))
+    root.append(_build_units(variables))
     types = ET.SubElement(root, "TypeDefinitions")
     for kind, names in ENUMERATIONS.items():
-        _items(ET.SubElement(types, "EnumerationType", name=kind.value), names)
+        _add_items(ET.SubElement(types, "EnumerationType", name=kind.value), names)
     _log_categories(root)
-    _experiment(root, header)
+    _add_experiment(root, header)
     listed = ET.SubElement(root, "ModelVariables")
     time = {"name": "time", "valueReference": "0", "description": "simulation time"}
     continuous = {"causality": "independent", "variability": "continuous"}
     ET.SubElement(listed, "Float64", {**time, **continuous, "unit": "s"})
     for variable in variables:
-        _variable3(listed, variable)
+        _add_variable3(listed, variable)
     structure = ET.SubElement(root, "ModelStructure")
     for part in ("Output", "InitialUnknown"):
         for variable in variables:
@@ -130,52 +134,54 @@ def _fmi3(header: Header, variables: Sequence[Variable]) -> ET.Element:
     return root
 
 
-def _variable3(parent: ET.Element, variable: Variable) -> None:
+def _add_variable3(parent: ET.Element, variable: Variable) -> None:
     tag = {Kind.REAL: "Float64", Kind.INTEGER: "Int32"}.get(variable.kind, "Enumeration")
     about = {
         "name": variable.name,
         "valueReference": str(variable.reference),
         "description": variable.meaning,
         "causality": variable.role.causality,
-        "variability": variable.role.variability(variable.kind),
+        "variability": variable.role.get_variability(variable.kind),
     }
-    typed = {"declaredType": variable.kind.value} if tag == "Enumeration" else _quantity(variable)
-    ET.SubElement(parent, tag, {**about, **_initial(variable), **typed, **_start(variable)})
+    typed = (
+        {"declaredType": variable.kind.value} if tag == "Enumeration" else _get_quantity(variable)
+    )
+    ET.SubElement(parent, tag, {**about, **_get_initial(variable), **typed, **_start(variable)})
 
 
-def _initial(variable: Variable) -> dict[str, str]:
+def _get_initial(variable: Variable) -> dict[str, str]:
     initial = {"parameter": "exact", "output": "calculated"}.get(variable.role.causality)
     return {} if initial is None else {"initial": initial}
 
 
-def _quantity(variable: Variable) -> dict[str, str]:
+def _get_quantity(variable: Variable) -> dict[str, str]:
     """Unit, display unit and limits; without a dimension there is no unit."""
     attributes = {}
     if variable.unit not in ("", "1"):
-        attributes["unit"] = fmi_unit(variable.unit)
-        shown = display_unit(variable.unit)
+        attributes["unit"] = to_fmi_unit(variable.unit)
+        shown = get_display_unit(variable.unit)
         attributes |= {} if shown is None else {"displayUnit": shown}
     for name, limit in (("min", variable.least), ("max", variable.most)):
         if math.isfinite(limit):
-            attributes[name] = _number(variable, limit)
+            attributes[name] = _format_number(variable, limit)
     return attributes
 
 
 def _start(variable: Variable) -> dict[str, str]:
-    return {} if variable.start is None else {"start": _number(variable, variable.start)}
+    return {} if variable.start is None else {"start": _format_number(variable, variable.start)}
 
 
-def _number(variable: Variable, value: float) -> str:
+def _format_number(variable: Variable, value: float) -> str:
     return repr(float(value)) if variable.kind is Kind.REAL else str(int(value))
 
 
-def _items(parent: ET.Element, names: tuple[str, ...]) -> None:
+def _add_items(parent: ET.Element, names: tuple[str, ...]) -> None:
     for value, name in enumerate(names):
         ET.SubElement(parent, "Item", name=name, value=str(value))
 
 
-def _units(variables: Sequence[Variable]) -> ET.Element:
-    return unit_definitions({"s", *(one.unit for one in variables)} - {"", "1"})
+def _build_units(variables: Sequence[Variable]) -> ET.Element:
+    return build_unit_definitions({"s", *(one.unit for one in variables)} - {"", "1"})
 
 
 def _log_categories(root: ET.Element) -> None:
@@ -183,6 +189,6 @@ def _log_categories(root: ET.Element) -> None:
     ET.SubElement(ET.SubElement(root, "LogCategories"), "Category", about)
 
 
-def _experiment(root: ET.Element, header: Header) -> None:
+def _add_experiment(root: ET.Element, header: Header) -> None:
     times = {"startTime": header.start_time, "stopTime": header.stop_time, "stepSize": header.step}
     ET.SubElement(root, "DefaultExperiment", {key: repr(value) for key, value in times.items()})

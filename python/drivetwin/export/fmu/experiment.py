@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.export.fixed_step import InputKind, stepped_run
-from drivetwin.export.fmu.variables import Role, Variable, variables_of
+from drivetwin.export.fixed_step import InputKind, run_fixed_step
+from drivetwin.export.fmu.variables import Role, Variable, list_variables
 from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.content import ParameterSet, Scalar
-from drivetwin.export.parameters.ssv import ssv_text
-from drivetwin.export.parameters.xml_text import document
+from drivetwin.export.parameters.ssv import format_ssv
+from drivetwin.export.parameters.xml_text import format_document
 from drivetwin.export.subject import Subject
 from drivetwin.simulation.dual_clutch import FloatArray
 
@@ -47,39 +47,39 @@ class Experiment:
     inputs: FloatArray
     step: float
 
-    def digest(self) -> bytes:
+    def compute_digest(self) -> bytes:
         """Hash that identifies this experiment."""
         label = f"{self.name} {self.step!r}".encode()
         return hashlib.sha256(label + self.time.tobytes() + self.inputs.tobytes()).digest()
 
 
-def reference_files(
+def build_reference_files(
     subject: Subject, experiment: Experiment | None, version: FmiVersion
 ) -> dict[str, bytes]:
     """Files of the archive by path; without an experiment only the parameter set."""
-    files = {"resources/parameters.ssv": ssv_text(_parameters(subject)).encode()}
+    files = {"resources/parameters.ssv": format_ssv(_format_parameters(subject)).encode()}
     related = [(_PARAMETERS, "application/x-ssp-parameter-set", "parameter")]
     if experiment is not None:
-        files |= _experiment_files(subject, experiment, version)
+        files |= _build_experiment_files(subject, experiment, version)
         related += [
             ("measured_shift.xml", "application/xml", "experiment/validation"),
             ("measured_shift-in.csv", "text/csv", "other"),
             ("measured_shift-ref.csv", "text/csv", "result"),
         ]
-    manifest = _manifest(related, files)
+    manifest = _build_manifest(related, files)
     return {**files, f"{_FOLDER}/fmi-ls-manifest.xml": manifest}
 
 
-def _parameters(subject: Subject) -> ParameterSet:
+def _format_parameters(subject: Subject) -> ParameterSet:
     numbers = (
         Scalar(one.name, one.start, one.unit, one.meaning)
-        for one in variables_of(subject)
+        for one in list_variables(subject)
         if one.role is Role.TUNABLE and one.start is not None
     )
     return ParameterSet(subject.name, tuple(numbers), notes=(subject.note,))
 
 
-def _experiment_files(
+def _build_experiment_files(
     subject: Subject, experiment: Experiment, version: FmiVersion
 ) -> dict[str, bytes]:
     """Stimulus, reference result by the core, and the description of both.
@@ -87,8 +87,8 @@ def _experiment_files(
     FMI 2.0 takes inputs with their derivatives, FMI 3.0 holds them over a step.
     """
     kind = InputKind.LINEAR if version is FmiVersion.FMI2 else InputKind.HOLD
-    run = stepped_run(subject.model, subject.start, experiment.time, experiment.inputs, kind)
-    variables = variables_of(subject)
+    run = run_fixed_step(subject.model, subject.start, experiment.time, experiment.inputs, kind)
+    variables = list_variables(subject)
     inputs = [one for one in variables if one.role is Role.INPUT]
     outputs = [one for one in variables if one.role is Role.OUTPUT][: len(_SPEEDS)]
     results = np.column_stack([getattr(run, name) for name in _SPEEDS])
@@ -104,9 +104,9 @@ def _experiment_files(
     ET.SubElement(item, "Stimuli", source="measured_shift-in.csv")
     ET.SubElement(item, "References", source="measured_shift-ref.csv")
     return {
-        f"{_FOLDER}/measured_shift.xml": document(root).encode(),
-        f"{_FOLDER}/measured_shift-in.csv": _csv(inputs, experiment.time, experiment.inputs),
-        f"{_FOLDER}/measured_shift-ref.csv": _csv(outputs, experiment.time, results),
+        f"{_FOLDER}/measured_shift.xml": format_document(root).encode(),
+        f"{_FOLDER}/measured_shift-in.csv": _format_csv(inputs, experiment.time, experiment.inputs),
+        f"{_FOLDER}/measured_shift-ref.csv": _format_csv(outputs, experiment.time, results),
     }
 
 
@@ -114,7 +114,7 @@ _SPEEDS = ("engine_speed", "output_speed", "wheel_speed", "twist", "shaft_torque
 """Fields of a trajectory in the order of the FMU's first outputs."""
 
 
-def _csv(variables: Sequence[Variable], time: FloatArray, table: FloatArray) -> bytes:
+def _format_csv(variables: Sequence[Variable], time: FloatArray, table: FloatArray) -> bytes:
     """Rows that read back as the same doubles."""
     lines = [",".join(("time", *(one.name for one in variables)))]
     rows = np.column_stack((time, table)).tolist()
@@ -122,7 +122,7 @@ def _csv(variables: Sequence[Variable], time: FloatArray, table: FloatArray) -> 
     return ("\n".join(lines) + "\n").encode()
 
 
-def _manifest(related: Sequence[tuple[str, str, str]], files: dict[str, bytes]) -> bytes:
+def _build_manifest(related: Sequence[tuple[str, str, str]], files: dict[str, bytes]) -> bytes:
     names = {f"fmi-ls:{key}": value for key, value in _LABELS.items()}
     root = ET.Element("fmiReferences", {"xmlns:fmi-ls": _MANIFEST, **names})
     for source, kind, role in related:
@@ -130,4 +130,4 @@ def _manifest(related: Sequence[tuple[str, str, str]], files: dict[str, bytes]) 
         digest = hashlib.sha3_256(data).hexdigest()
         about = {"type": kind, "source": source, "role": role, "checksum": digest}
         ET.SubElement(root, "Related", about)
-    return document(root).encode()
+    return format_document(root).encode()

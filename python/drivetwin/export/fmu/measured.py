@@ -7,22 +7,22 @@ from pathlib import PurePath
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
-from drivetwin.export.fixed_step import DEFAULT_STEP, Stepping, start_of, stepped_inputs
+from drivetwin.export.fixed_step import DEFAULT_STEP, Stepping, get_start_state, sample_inputs
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.subject import Subject
-from drivetwin.shifts.detect import usable_shifts
+from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.simulate_log import validate
+from drivetwin.validation.simulate_log import simulate_shift
 
 
-def measured_subject(
+def build_measured_subject(
     twin: Twin, log: ShiftLog, gears: tuple[str, str] | None = None
 ) -> tuple[Subject, Experiment]:
     """Model of the first shift of a log between `gears` (None: any), and that shift's inputs.
 
     Raises NoShiftError where there is none, and what the validation of a shift raises.
     """
-    found = usable_shifts(log, twin.card()).shifts
+    found = require_shifts(log, twin.build_card()).shifts
     wanted = [one for one in found if gears in (None, (one.start_gear, one.end_gear))]
     if not wanted:
         raise NoShiftError(
@@ -30,14 +30,14 @@ def measured_subject(
             f"choose one of {', '.join(f'{s.start_gear}-{s.end_gear}' for s in found)}",
             Where(file=log.source),
         )
-    shift = validate(twin, log, wanted[0])
+    shift = simulate_shift(twin, log, wanted[0])
     name = f"{wanted[0].start_gear}-{wanted[0].end_gear}"
     source = PurePath(log.source).name
-    time, inputs = stepped_inputs(shift, Stepping(DEFAULT_STEP))
+    time, inputs = sample_inputs(shift, Stepping(DEFAULT_STEP))
     subject = Subject(
         name=f"{twin.name} {name}",
         model=shift.model,
-        start=start_of(shift),
+        start=get_start_state(shift),
         note=f"identified by the {twin.method} method, loss law {shift.model.loss_law}",
     )
     return subject, Experiment(f"shift {name} of {source}", time, inputs, DEFAULT_STEP)

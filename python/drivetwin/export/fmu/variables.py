@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from drivetwin.export.entries import Entry, entries_of, locked_index, start_entries
-from drivetwin.export.parameters.spelling import ascii_line, distinct, one_line
+from drivetwin.export.entries import Entry, get_lock_index, list_entries, start_entries
+from drivetwin.export.parameters.spelling import make_distinct, to_ascii_line, to_one_line
 from drivetwin.export.subject import Subject
 
 INPUTS, OUTPUTS, MODES, LOSS_LAW, LOCKED, START, PARAMETERS = 1, 10, 30, 40, 41, 50, 100
@@ -46,7 +46,7 @@ class Role(StrEnum):
         """As FMI names it."""
         return "parameter" if self in (Role.TUNABLE, Role.FIXED) else self.value
 
-    def variability(self, kind: Kind) -> str:
+    def get_variability(self, kind: Kind) -> str:
         """As FMI names it."""
         if self.causality == "parameter":
             return self.value.partition(" ")[0]
@@ -68,15 +68,15 @@ class Variable:
     most: float = INF
 
 
-def variables_of(subject: Subject) -> tuple[Variable, ...]:
+def list_variables(subject: Subject) -> tuple[Variable, ...]:
     """All variables: inputs, outputs, parameters; names are structured as FMI has it."""
     model = subject.model
     elements = [element.name for element in model.elements]
-    spelled = structured_names(elements)
+    spelled = make_structured_names(elements)
     names = list(spelled.values())
     return (
-        *_inputs(names),
-        *_outputs(names),
+        *_list_inputs(names),
+        *_list_outputs(names),
         Variable(
             "loss_law",
             LOSS_LAW,
@@ -90,32 +90,32 @@ def variables_of(subject: Subject) -> tuple[Variable, ...]:
             LOCKED,
             Kind.INTEGER,
             Role.FIXED,
-            "element that starts locked: 0 none, 1 {}, 2 {}".format(*map(one_line, elements)),
-            start=float(locked_index(model, subject.start)),
+            "element that starts locked: 0 none, 1 {}, 2 {}".format(*map(to_one_line, elements)),
+            start=float(get_lock_index(model, subject.start)),
             least=0.0,
             most=2.0,
         ),
         *(
-            _parameter(e, START + i, Role.FIXED, spelled)
+            _build_parameter(e, START + i, Role.FIXED, spelled)
             for i, e in enumerate(start_entries(subject.start))
         ),
         *(
-            _parameter(e, PARAMETERS + i, Role.TUNABLE, spelled)
-            for i, e in enumerate(entries_of(model))
+            _build_parameter(e, PARAMETERS + i, Role.TUNABLE, spelled)
+            for i, e in enumerate(list_entries(model))
         ),
     )
 
 
-def structured_names(names: Iterable[str]) -> dict[str, str]:
+def make_structured_names(names: Iterable[str]) -> dict[str, str]:
     """Name parts that FMI's structured naming accepts; those that would coincide are numbered."""
-    return distinct(names, _structured)
+    return make_distinct(names, _make_structured_name)
 
 
-def _structured(name: str) -> str:
+def _make_structured_name(name: str) -> str:
     """Quoted where the name is no identifier, in ASCII."""
     if name.isascii() and name.isidentifier():
         return name
-    quoted = re.sub(_NOT_IN_QUOTES, "_", ascii_line(name)).replace("'", "\\'")
+    quoted = re.sub(_NOT_IN_QUOTES, "_", to_ascii_line(name)).replace("'", "\\'")
     return f"'{quoted or '_'}'"
 
 
@@ -123,7 +123,9 @@ _NOT_IN_QUOTES = r"[^A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ']"
 """What a quoted name of FMI cannot hold, the apostrophe aside, which it escapes."""
 
 
-def _parameter(entry: Entry, reference: int, role: Role, spelled: Mapping[str, str]) -> Variable:
+def _build_parameter(
+    entry: Entry, reference: int, role: Role, spelled: Mapping[str, str]
+) -> Variable:
     head, dot, tail = entry.name.rpartition(".")
     name = f"{spelled.get(head, head)}{dot}{tail}"
     return Variable(
@@ -139,7 +141,7 @@ def _parameter(entry: Entry, reference: int, role: Role, spelled: Mapping[str, s
     )
 
 
-def _inputs(names: list[str]) -> list[Variable]:
+def _list_inputs(names: list[str]) -> list[Variable]:
     def of(name: str, index: int, meaning: str, unit: str) -> Variable:
         return Variable(name, INPUTS + index, Kind.REAL, Role.INPUT, meaning, unit, 0.0)
 
@@ -149,7 +151,7 @@ def _inputs(names: list[str]) -> list[Variable]:
     return [of("engine_torque", 0, "indicated less friction", "N*m"), *pressures]
 
 
-def _outputs(names: list[str]) -> list[Variable]:
+def _list_outputs(names: list[str]) -> list[Variable]:
     reals = (
         ("engine_speed", "engine speed", "rad/s"),
         ("output_speed", "speed of the gearbox output", "rad/s"),

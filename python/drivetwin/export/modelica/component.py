@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from drivetwin.export.parameters.content import number
+from drivetwin.export.parameters.content import format_number
 
 ROTATIONAL = "Modelica.Mechanics.Rotational"
 
@@ -24,7 +24,7 @@ class Component:
     modifiers: Modifiers = ()
     flanges: Flanges = ()
 
-    def declaration(self) -> str:
+    def format_declaration(self) -> str:
         """Its line in the model."""
         values = ", ".join(f"{key}={value}" for key, value in self.modifiers)
         return f"  {self.type} {self.name}({values});" if values else f"  {self.type} {self.name};"
@@ -45,9 +45,9 @@ class Part:
     rest: str = ""
 
 
-def values(**modifiers: float) -> Modifiers:
+def format_values(**modifiers: float) -> Modifiers:
     """Modifiers from numbers."""
-    return tuple((key, number(value)) for key, value in modifiers.items())
+    return tuple((key, format_number(value)) for key, value in modifiers.items())
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.atomic import write_text
-from drivetwin.export.modelica.model import Run, package_text
+from drivetwin.export.modelica.model import Run, format_package
 from drivetwin.export.subject import Subject
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, ShiftElement, Signal, State
 from drivetwin.simulation.network import Element, Start
@@ -21,7 +21,7 @@ ENGINE, OUTPUT, WHEEL, SHAFT = "engine", "output", "wheel", "output shaft"
 _INPUT, _AXLE = "input gear", "axle"
 
 
-def modelica_text(
+def format_modelica(
     subject: Subject,
     inputs: Mapping[str, Signal] | None = None,
     time: tuple[float, float] | None = None,
@@ -30,39 +30,39 @@ def modelica_text(
     also the model of its run from the subject's start."""
     run = None
     if inputs is not None and time is not None:
-        run = Run(inputs, network_start(subject.start), time)
-    return package_text(subject.name, network_of(subject.model), run, note=subject.note)
+        run = Run(inputs, build_network_start(subject.start), time)
+    return format_package(subject.name, build_network(subject.model), run, note=subject.note)
 
 
 def write_modelica(subject: Subject, experiment: Experiment | None, path: Path) -> None:
     """Write the package, with the run of an experiment where there is one; whole or not at all."""
     if experiment is None:
-        text = modelica_text(subject)
+        text = format_modelica(subject)
     else:
         names = (ENGINE_TORQUE, *(element.name for element in subject.model.elements))
         columns = zip(names, experiment.inputs.T, strict=True)
         inputs = {name: Signal(experiment.time, column) for name, column in columns}
         span = float(experiment.time[0]), float(experiment.time[-1])
-        text = modelica_text(subject, inputs, span)
+        text = format_modelica(subject, inputs, span)
     write_text(path, text)
 
 
-def network_start(start: State) -> Start:
+def build_network_start(start: State) -> Start:
     """The start of a run in terms of the network."""
     speeds = {ENGINE: start.engine_speed, OUTPUT: start.output_speed, WHEEL: start.wheel_speed}
     return Start(speeds, {SHAFT: start.twist}, start.locked)
 
 
-def network_of(model: DualClutch) -> list[Element]:
+def build_network(model: DualClutch) -> list[Element]:
     """The elements of eqs. 2-9: engine, input gear with the loss, two clutches between their
     ratios, output shaft, final drive, vehicle."""
     loss = {"law": model.loss_law, "eta": model.eta}
     elements: list[Element] = [
-        _inertia("J1", ENGINE, model.J1),
+        _build_inertia("J1", ENGINE, model.J1),
         {"type": "torque", "name": "engine", "node": ENGINE, "input": ENGINE_TORQUE},
-        {**_gear("i_in", ENGINE, _INPUT, model.i_in), "loss": loss},
-        _inertia("J2", _INPUT, model.J2e * model.i_in**2),
-        _inertia("J_out", OUTPUT, model.J_out),
+        {**_build_gear("i_in", ENGINE, _INPUT, model.i_in), "loss": loss},
+        _build_inertia("J2", _INPUT, model.J2e * model.i_in**2),
+        _build_inertia("J_out", OUTPUT, model.J_out),
         {
             "type": "spring_damper",
             "name": SHAFT,
@@ -71,18 +71,18 @@ def network_of(model: DualClutch) -> list[Element]:
             "stiffness": model.k_o,
             "damping": model.c_o,
         },
-        _gear("i_f", _AXLE, WHEEL, model.i_f),
-        _inertia("J_v", WHEEL, model.J_v),
+        _build_gear("i_f", _AXLE, WHEEL, model.i_f),
+        _build_inertia("J_v", WHEEL, model.J_v),
         {"type": "road_load", "name": "load", "node": WHEEL, **asdict(model.load)},
     ]
-    return [*elements, *(one for element in model.elements for one in _path(element))]
+    return [*elements, *(one for element in model.elements for one in _build_path(element))]
 
 
-def _path(element: ShiftElement) -> list[Element]:
+def _build_path(element: ShiftElement) -> list[Element]:
     """Gear i_c, clutch, gear i_out between input gear and output (paper Figure 2)."""
     a, b = f"{element.name} input side", f"{element.name} output side"
     return [
-        _gear(f"i_c {element.name}", _INPUT, a, element.i_c),
+        _build_gear(f"i_c {element.name}", _INPUT, a, element.i_c),
         {
             "type": "clutch",
             "name": element.name,
@@ -95,13 +95,13 @@ def _path(element: ShiftElement) -> list[Element]:
             "pressure": element.name,
             "drum_inertia": element.drum_inertia,
         },
-        _gear(f"i_out {element.name}", b, OUTPUT, element.i_out),
+        _build_gear(f"i_out {element.name}", b, OUTPUT, element.i_out),
     ]
 
 
-def _inertia(name: str, node: str, inertia: float) -> Element:
+def _build_inertia(name: str, node: str, inertia: float) -> Element:
     return {"type": "inertia", "name": name, "node": node, "inertia": inertia}
 
 
-def _gear(name: str, a: str, b: str, ratio: float) -> Element:
+def _build_gear(name: str, a: str, b: str, ratio: float) -> Element:
     return {"type": "gear", "name": name, "a": a, "b": b, "ratio": ratio}

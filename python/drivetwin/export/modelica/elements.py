@@ -10,11 +10,11 @@ from drivetwin.export.modelica.component import (
     Modifiers,
     Names,
     Part,
-    values,
+    format_values,
 )
-from drivetwin.export.modelica.friction import bearing, clutch, one_way_clutch
+from drivetwin.export.modelica.friction import build_bearing, build_clutch, build_one_way_clutch
 from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR
-from drivetwin.export.modelica.text import matrix
+from drivetwin.export.modelica.text import format_matrix
 from drivetwin.simulation.network import Element
 
 _COMPONENTS = f"{ROTATIONAL}.Components"
@@ -22,7 +22,7 @@ _SOURCES = f"{ROTATIONAL}.Sources"
 _HOLD = ("extrapolation", "Modelica.Blocks.Types.Extrapolation.HoldLastPoint")
 
 
-def part_of(element: Element, names: Names) -> Part:
+def build_part(element: Element, names: Names) -> Part:
     """Declarations and equations of one element. Raises InputError for an unknown type."""
     try:
         translate = _TRANSLATIONS[element["type"]]
@@ -34,68 +34,68 @@ def part_of(element: Element, names: Names) -> Part:
     return translate(element, names)
 
 
-def _inertia(element: Element, names: Names) -> Part:
+def _build_inertia(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
     flange = (("flange_a", element["node"]),)
-    inertia = values(J=element["inertia"])
+    inertia = format_values(J=element["inertia"])
     return Part((Component(f"{_COMPONENTS}.Inertia", name, inertia, flange),))
 
 
-def _gear(element: Element, names: Names) -> Part:
+def _build_gear(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
     flanges = (("flange_a", element["a"]), ("flange_b", element["b"]))
-    ratio, loss = values(ratio=element["ratio"]), element.get("loss")
+    ratio, loss = format_values(ratio=element["ratio"]), element.get("loss")
     if loss is None:
         return Part((Component(f"{_COMPONENTS}.IdealGear", name, ratio, flanges),))
     if loss["law"] == "paper":
-        modifiers = (*ratio, *values(eta=loss["eta"]))
+        modifiers = (*ratio, *format_values(eta=loss["eta"]))
         gear = Component(PAPER_GEAR, name, modifiers, flanges)
         return Part((gear,), helpers=frozenset({PAPER_GEAR}))
     drag = loss.get("drag", 0.0)
     row = (0.0, loss["eta"], loss.get("eta_backward", loss["eta"]), drag)
-    table = matrix([(*row, loss.get("drag_backward", drag))])
+    table = format_matrix([(*row, loss.get("drag_backward", drag))])
     lossy = Component(f"{_COMPONENTS}.LossyGear", name, (*ratio, ("lossTable", table)), flanges)
     return Part((lossy,))
 
 
-def _planetary(element: Element, names: Names) -> Part:
+def _build_planetary(element: Element, names: Names) -> Part:
     """The set; the planets, which spin behind a set of their own, z' = (z - 1)/2, as an inertia."""
     name, z = names.elements[element["name"]], element["z"]
     shafts = (("sun", element["sun"]), ("carrier", element["carrier"]))
     kind = f"{_COMPONENTS}.IdealPlanetary"
-    gears = Component(kind, name, values(ratio=z), (*shafts, ("ring", element["ring"])))
+    gears = Component(kind, name, format_values(ratio=z), (*shafts, ("ring", element["ring"])))
     spin = element.get("planet_inertia", 0.0)
     if spin == 0.0:
         return Part((gears,))
     planet = f"{name} planets"
     pinions = Component(
-        kind, f"{name}_pinions", values(ratio=(z - 1.0) / 2.0), (*shafts, ("ring", planet))
+        kind, f"{name}_pinions", format_values(ratio=(z - 1.0) / 2.0), (*shafts, ("ring", planet))
     )
     mass = Component(
-        f"{_COMPONENTS}.Inertia", f"{name}_planets", values(J=spin), (("flange_a", planet),)
+        f"{_COMPONENTS}.Inertia", f"{name}_planets", format_values(J=spin), (("flange_a", planet),)
     )
     return Part((gears, pinions, mass))
 
 
-def _spring_damper(element: Element, names: Names) -> Part:
-    modifiers = values(c=element["stiffness"], d=element["damping"])
-    return _compliance(f"{_COMPONENTS}.SpringDamper", modifiers, element, names)
+def _build_spring_damper(element: Element, names: Names) -> Part:
+    modifiers = format_values(c=element["stiffness"], d=element["damping"])
+    return _build_compliance(f"{_COMPONENTS}.SpringDamper", modifiers, element, names)
 
 
-def _backlash(element: Element, names: Names) -> Part:
-    modifiers = values(c=element["stiffness"], d=element["damping"], b=element["gap"])
-    return _compliance(f"{_COMPONENTS}.ElastoBacklash", modifiers, element, names)
+def _build_backlash(element: Element, names: Names) -> Part:
+    modifiers = format_values(c=element["stiffness"], d=element["damping"], b=element["gap"])
+    return _build_compliance(f"{_COMPONENTS}.ElastoBacklash", modifiers, element, names)
 
 
-def _compliance(kind: str, modifiers: Modifiers, element: Element, names: Names) -> Part:
+def _build_compliance(kind: str, modifiers: Modifiers, element: Element, names: Names) -> Part:
     flanges = (("flange_a", element["a"]), ("flange_b", element["b"]))
     return Part((Component(kind, names.elements[element["name"]], modifiers, flanges),))
 
 
-def _torque_converter(element: Element, names: Names) -> Part:
+def _build_torque_converter(element: Element, names: Names) -> Part:
     table = element["map"]
     columns = (table["speed_ratio"], table["capacity"], table["torque_ratio"])
-    rows = matrix(list(zip(*columns, strict=True)))
+    rows = format_matrix(list(zip(*columns, strict=True)))
     flanges = (("flange_a", element["pump"]), ("flange_b", element["turbine"]))
     name = names.elements[element["name"]]
     return Part(
@@ -103,51 +103,51 @@ def _torque_converter(element: Element, names: Names) -> Part:
     )
 
 
-def _road_load(element: Element, names: Names) -> Part:
+def _build_road_load(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
     flange = (("flange", element["node"]),)
     parts = []
     if element["constant"] != 0.0:
-        torque = values(tau_constant=-element["constant"])
+        torque = format_values(tau_constant=-element["constant"])
         parts.append(Component(f"{_SOURCES}.ConstantTorque", f"{name}_constant", torque, flange))
     if element["aero"] != 0.0:
-        torque = (*values(tau_nominal=-element["aero"]), ("TorqueDirection", "false"))
+        torque = (*format_values(tau_nominal=-element["aero"]), ("TorqueDirection", "false"))
         parts.append(
             Component(
                 f"{_SOURCES}.QuadraticSpeedDependentTorque",
                 f"{name}_aero",
-                (*torque, *values(w_nominal=1.0)),
+                (*torque, *format_values(w_nominal=1.0)),
                 flange,
             )
         )
     if element["rolling"] == 0.0:
         return Part(tuple(parts))
     table = {"name": element["name"], "a": element["node"], "b": "ground", "peak": 1.0}
-    rolling = bearing({**table, "speed": [0.0], "torque": [element["rolling"]]}, names)
+    rolling = build_bearing({**table, "speed": [0.0], "torque": [element["rolling"]]}, names)
     return Part((*parts, *rolling.components), rest=rolling.rest)
 
 
-def _torque(element: Element, names: Names) -> Part:
+def _build_torque(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
     source = Component(f"{_SOURCES}.Torque", name, (), (("flange", element["node"]),))
     return Part((source,), (f"{name}.tau = {names.inputs[element['input']]};",))
 
 
-def _prescribed_speed(element: Element, names: Names) -> Part:
+def _build_speed_source(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
     flange = (("flange", element["node"]),)
     source = Component(f"{_SOURCES}.Speed", name, (("exact", "true"),), flange)
     return Part((source,), (f"{name}.w_ref = {names.inputs[element['input']]};",))
 
 
-def _engine_map(element: Element, names: Names) -> Part:
+def _build_engine_map(element: Element, names: Names) -> Part:
     name, table = names.elements[element["name"]], element["map"]
     head = [(0.0, *table["speed"])]
     rows = [(t, *torque) for t, torque in zip(table["throttle"], table["torque"], strict=True)]
     steady = Component(
         "Modelica.Blocks.Tables.CombiTable2Ds",
         f"{name}_map",
-        (("table", matrix(head + rows)), _HOLD),
+        (("table", format_matrix(head + rows)), _HOLD),
     )
     source = Component(f"{_SOURCES}.Torque", name, (), (("flange", element["node"]),))
     equations = [
@@ -160,24 +160,24 @@ def _engine_map(element: Element, names: Names) -> Part:
     lag = Component(
         "Modelica.Blocks.Continuous.FirstOrder",
         f"{name}_lag",
-        (*values(T=element["lag"], y_start=0.0), start),
+        (*format_values(T=element["lag"], y_start=0.0), start),
     )
     equations += [f"{name}_lag.u = {name}_map.y;", f"{name}.tau = {name}_lag.y;"]
     return Part((steady, lag, source), tuple(equations))
 
 
 _TRANSLATIONS = {
-    "inertia": _inertia,
-    "gear": _gear,
-    "planetary": _planetary,
-    "clutch": clutch,
-    "one_way_clutch": one_way_clutch,
-    "bearing": bearing,
-    "spring_damper": _spring_damper,
-    "backlash": _backlash,
-    "torque_converter": _torque_converter,
-    "road_load": _road_load,
-    "torque": _torque,
-    "prescribed_speed": _prescribed_speed,
-    "engine_map": _engine_map,
+    "inertia": _build_inertia,
+    "gear": _build_gear,
+    "planetary": _build_planetary,
+    "clutch": build_clutch,
+    "one_way_clutch": build_one_way_clutch,
+    "bearing": build_bearing,
+    "spring_damper": _build_spring_damper,
+    "backlash": _build_backlash,
+    "torque_converter": _build_torque_converter,
+    "road_load": _build_road_load,
+    "torque": _build_torque,
+    "prescribed_speed": _build_speed_source,
+    "engine_map": _build_engine_map,
 }

@@ -13,10 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.export.modelica.component import ROTATIONAL, Component, Flanges, Names, Part, values
+from drivetwin.export.modelica.component import (
+    ROTATIONAL,
+    Component,
+    Flanges,
+    Names,
+    Part,
+    format_values,
+)
 from drivetwin.export.modelica.helpers import SLIP_INERTIA
-from drivetwin.export.modelica.text import matrix
-from drivetwin.export.parameters.content import number
+from drivetwin.export.modelica.text import format_matrix
+from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.simulation.network import Element
 
@@ -28,7 +35,7 @@ _POINTS, _DECAYS, _TAIL = 101, 10.0, 40.0
 is a straight line then: the table keeps within 1e-4 of μ and goes on along its last piece."""
 
 
-def clutch(element: Element, names: Names) -> Part:
+def build_clutch(element: Element, names: Names) -> Part:
     """A clutch, or a brake where `b` is the ground; its drum as an inertia on the slip."""
     name = names.elements[element["name"]]
     both: Flanges = (("flange_a", element["a"]), ("flange_b", element["b"]))
@@ -36,32 +43,35 @@ def clutch(element: Element, names: Names) -> Part:
         kind, flanges, rest = "Brake", both[:1], f"{name}.w"
     else:
         kind, flanges, rest = "Clutch", both, f"{name}.w_rel"
-    part = replace(_pressed(f"{ROTATIONAL}.Components.{kind}", element, flanges, names), rest=rest)
+    part = replace(
+        _build_friction_component(f"{ROTATIONAL}.Components.{kind}", element, flanges, names),
+        rest=rest,
+    )
     drum = element.get("drum_inertia", 0.0)
     if drum == 0.0:
         return part
-    inertia = Component(SLIP_INERTIA, f"{name}_drum", values(J=drum), both)
+    inertia = Component(SLIP_INERTIA, f"{name}_drum", format_values(J=drum), both)
     return replace(part, components=(*part.components, inertia), helpers=frozenset({SLIP_INERTIA}))
 
 
-def one_way_clutch(element: Element, names: Names) -> Part:
+def build_one_way_clutch(element: Element, names: Names) -> Part:
     """A freewheel with the clutch beside it; without one, the normal force is zero."""
     name = names.elements[element["name"]]
     kind = f"{ROTATIONAL}.Components.OneWayClutch"
     flanges = (("flange_a", element["a"]), ("flange_b", element["b"]))
     beside = element.get("clutch")
     if beside is None:
-        free = Component(kind, name, values(fn_max=1.0), flanges)
+        free = Component(kind, name, format_values(fn_max=1.0), flanges)
         return Part((free,), (f"{name}.f_normalized = 0;",), rest=f"{name}.w_rel")
-    part = _pressed(kind, {**beside, "name": element["name"]}, flanges, names)
+    part = _build_friction_component(kind, {**beside, "name": element["name"]}, flanges, names)
     return replace(part, rest=f"{name}.w_rel")
 
 
-def bearing(element: Element, names: Names) -> Part:
+def build_bearing(element: Element, names: Names) -> Part:
     """Bearing friction, against the housing or another shaft."""
     name, b = names.elements[element["name"]], element["b"]
     rows = zip(element["speed"], element["torque"], strict=True)
-    modifiers = (("tau_pos", matrix(rows)), *values(peak=element["peak"]))
+    modifiers = (("tau_pos", format_matrix(rows)), *format_values(peak=element["peak"]))
     flanges: Flanges = (("flange_a", element["a"]),)
     if b != GROUND:
         modifiers, flanges = (*modifiers, ("useSupport", "true")), (*flanges, ("support", b))
@@ -69,11 +79,11 @@ def bearing(element: Element, names: Names) -> Part:
     return Part((Component(kind, name, modifiers, flanges),), rest=f"{name}.w")
 
 
-def _pressed(kind: str, element: Element, flanges: Flanges, names: Names) -> Part:
+def _build_friction_component(kind: str, element: Element, flanges: Flanges, names: Names) -> Part:
     name = names.elements[element["name"]]
     modifiers = (
-        ("mu_pos", matrix(friction_rows(element["friction"]))),
-        *values(peak=element["peak"], cgeo=element["gain"], fn_max=_FULL_PRESSURE),
+        ("mu_pos", format_matrix(build_friction_rows(element["friction"]))),
+        *format_values(peak=element["peak"], cgeo=element["gain"], fn_max=_FULL_PRESSURE),
     )
     pressure = names.inputs[element["pressure"]]
     fill = f"P0_{name}"
@@ -81,13 +91,13 @@ def _pressed(kind: str, element: Element, flanges: Flanges, names: Names) -> Par
         (Component(kind, name, modifiers, flanges),),
         (f"{name}.f_normalized = max(0, {pressure} - {fill})/{name}.fn_max;",),
         (
-            f"  parameter Modelica.Units.SI.Pressure {fill}={number(element['p0'])}"
+            f"  parameter Modelica.Units.SI.Pressure {fill}={format_number(element['p0'])}"
             f' "Pressure at which the fill of {name} ends";',
         ),
     )
 
 
-def friction_rows(law: Mapping[str, Any]) -> list[tuple[float, float]]:
+def build_friction_rows(law: Mapping[str, Any]) -> list[tuple[float, float]]:
     """Slip [rad/s] and μ as a table that goes on along its last piece."""
     if "slip" in law:
         rows = [(float(s), float(m)) for s, m in zip(law["slip"], law["mu"], strict=True)]
@@ -97,4 +107,4 @@ def friction_rows(law: Mapping[str, Any]) -> list[tuple[float, float]]:
     stribeck = Stribeck(**law)
     bend = _DECAYS * stribeck.v_s * np.linspace(0.0, 1.0, _POINTS) ** 2
     slip = np.append(bend, _TAIL * stribeck.v_s)
-    return list(zip(slip.tolist(), stribeck.at(slip).tolist(), strict=True))
+    return list(zip(slip.tolist(), stribeck.evaluate(slip).tolist(), strict=True))

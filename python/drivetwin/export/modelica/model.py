@@ -12,12 +12,17 @@ import numpy as np
 
 from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import ROTATIONAL, Component, Names, Part
-from drivetwin.export.modelica.elements import part_of
+from drivetwin.export.modelica.elements import build_part
 from drivetwin.export.modelica.friction import GROUND
 from drivetwin.export.modelica.helpers import HELPERS
-from drivetwin.export.modelica.start import initial_equations
-from drivetwin.export.modelica.text import identifier, identifiers, matrix, string
-from drivetwin.export.parameters.content import number
+from drivetwin.export.modelica.start import build_initial_equations
+from drivetwin.export.modelica.text import (
+    format_matrix,
+    format_string,
+    make_identifier,
+    make_identifiers,
+)
+from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.network import Element, Start
 
@@ -37,7 +42,7 @@ class Run:
     time: tuple[float, float]
 
 
-def package_text(
+def format_package(
     name: str,
     elements: Sequence[Element],
     run: Run | None = None,
@@ -52,16 +57,16 @@ def package_text(
     would stand for two things.
     """
     _refuse_doubles(str(element["name"]) for element in elements)
-    names = _names(elements)
-    parts = {str(element["name"]): part_of(element, names) for element in elements}
+    names = _collect_names(elements)
+    parts = {str(element["name"]): build_part(element, names) for element in elements}
     helpers = sorted(frozenset().union(*(part.helpers for part in parts.values())))
-    plain = identifier(name)
+    plain = make_identifier(name)
     texts = [
-        f"package {plain} {string(note or name)}",
+        f"package {plain} {format_string(note or name)}",
         "  extends Modelica.Icons.Package;\n",
         *(HELPERS[helper] for helper in helpers),
-        _driveline(parts, names, ends),
-        *([] if run is None else [_shift(elements, parts, names, run)]),
+        _format_driveline(parts, names, ends),
+        *([] if run is None else [_format_shift(elements, parts, names, run)]),
         f'  annotation(uses(Modelica(version="{MSL_VERSION}")));',
         f"end {plain};",
     ]
@@ -77,28 +82,28 @@ def _refuse_doubles(names: Iterable[str]) -> None:
         )
 
 
-def _names(elements: Sequence[Element]) -> Names:
-    found = chain.from_iterable(_inputs(element) for element in elements)
+def _collect_names(elements: Sequence[Element]) -> Names:
+    found = chain.from_iterable(_list_inputs(element) for element in elements)
     listed = list(dict.fromkeys(found))
-    inputs = identifiers(f"u_{name}" for name in listed)
-    own = identifiers(str(element["name"]) for element in elements)
+    inputs = make_identifiers(f"u_{name}" for name in listed)
+    own = make_identifiers(str(element["name"]) for element in elements)
     return Names(own, {name: inputs[f"u_{name}"] for name in listed})
 
 
-def _inputs(element: Element) -> list[str]:
+def _list_inputs(element: Element) -> list[str]:
     nested = element.get("clutch") or {}
     return [str(part[key]) for part in (element, nested) for key in _INPUT_FIELDS if key in part]
 
 
-def _driveline(parts: Mapping[str, Part], names: Names, ends: tuple[str, ...]) -> str:
+def _format_driveline(parts: Mapping[str, Part], names: Names, ends: tuple[str, ...]) -> str:
     components = [one for part in parts.values() for one in part.components]
-    flanges = {node: identifier(f"flange_{node}") for node in ends}
+    flanges = {node: make_identifier(f"flange_{node}") for node in ends}
     ports_of_nodes = [f"  {_FLANGE} {flange};" for flange in flanges.values()]
     ports = [
-        f"  Modelica.Blocks.Interfaces.RealInput {plain} {string(name + ' [SI]')};"
+        f"  Modelica.Blocks.Interfaces.RealInput {plain} {format_string(name + ' [SI]')};"
         for name, plain in names.inputs.items()
     ]
-    nodes = _flanges(components)
+    nodes = _collect_flanges(components)
     fixed = Component(f"{ROTATIONAL}.Components.Fixed", "ground_")
     declared = (one.name for one in (*components, fixed))
     _refuse_doubles((*declared, *flanges.values(), *names.inputs.values()))
@@ -107,18 +112,18 @@ def _driveline(parts: Mapping[str, Part], names: Names, ends: tuple[str, ...]) -
         *ports_of_nodes,
         *ports,
         *(line for part in parts.values() for line in part.parameters),
-        *(one.declaration() for one in components),
-        *([fixed.declaration()] if GROUND in nodes else []),
+        *(one.format_declaration() for one in components),
+        *([fixed.format_declaration()] if GROUND in nodes else []),
         "equation",
         *(f"  {line}" for part in parts.values() for line in part.equations),
-        *(line for node, members in nodes.items() for line in _connections(node, members)),
+        *(line for node, members in nodes.items() for line in _format_connections(node, members)),
         *(f"  connect({flange}, {nodes[node][0]});" for node, flange in flanges.items()),
         "end Driveline;\n",
     ]
     return "\n".join(f"  {line}" for line in lines)
 
 
-def _flanges(components: Sequence[Component]) -> dict[str, list[str]]:
+def _collect_flanges(components: Sequence[Component]) -> dict[str, list[str]]:
     """Flanges of every node, as `component.flange`."""
     nodes: dict[str, list[str]] = {}
     for component in components:
@@ -127,15 +132,17 @@ def _flanges(components: Sequence[Component]) -> dict[str, list[str]]:
     return nodes
 
 
-def _connections(node: str, ends: Sequence[str]) -> list[str]:
+def _format_connections(node: str, ends: Sequence[str]) -> list[str]:
     first, *others = ["ground_.flange", *ends] if node == GROUND else ends
     return [f"  connect({first}, {other});" for other in others]
 
 
-def _shift(elements: Sequence[Element], parts: Mapping[str, Part], names: Names, run: Run) -> str:
-    flanges = _flanges([one for part in parts.values() for one in part.components])
+def _format_shift(
+    elements: Sequence[Element], parts: Mapping[str, Part], names: Names, run: Run
+) -> str:
+    flanges = _collect_flanges([one for part in parts.values() for one in part.components])
     inside = "driveline."
-    start = initial_equations(
+    start = build_initial_equations(
         elements,
         run.start,
         {node: f"{inside}{ends[0]}.phi" for node, ends in flanges.items()},
@@ -149,7 +156,7 @@ def _shift(elements: Sequence[Element], parts: Mapping[str, Part], names: Names,
         "  Modelica.Blocks.Sources.CombiTimeTable inputs(",
         f"    columns=2:{len(names.inputs) + 1},",
         "    extrapolation=Modelica.Blocks.Types.Extrapolation.HoldLastPoint,",
-        f"    table={matrix(_table(names, run))});",
+        f"    table={format_matrix(_build_table(names, run))});",
         "initial equation",
         *(f"  {line}" for line in start),
         "equation",
@@ -157,14 +164,14 @@ def _shift(elements: Sequence[Element], parts: Mapping[str, Part], names: Names,
             f"  driveline.{plain} = inputs.y[{place}];"
             for place, plain in enumerate(names.inputs.values(), 1)
         ),
-        f"  annotation(experiment(StartTime={number(first)}, StopTime={number(last)}, "
-        f"Interval={number(_INTERVAL)}, Tolerance={number(_TOLERANCE)}));",
+        f"  annotation(experiment(StartTime={format_number(first)}, StopTime={format_number(last)}, "
+        f"Interval={format_number(_INTERVAL)}, Tolerance={format_number(_TOLERANCE)}));",
         "end Shift;\n",
     ]
     return "\n".join(f"  {line}" for line in lines)
 
 
-def _table(names: Names, run: Run) -> list[tuple[float, ...]]:
+def _build_table(names: Names, run: Run) -> list[tuple[float, ...]]:
     """Time and inputs at every sample of any input within the run, each linear in between.
 
     Where an input jumps the time stands twice, as Modelica's table wants it.
@@ -178,12 +185,12 @@ def _table(names: Names, run: Run) -> list[tuple[float, ...]]:
     time: FloatArray = np.sort(np.concatenate([[first], inner, twice, [last]]))
     ends = np.append(np.diff(time) == 0.0, True)  # rows that end what came before
     columns = [
-        np.where(ends, _until(one, time), np.interp(time, one.arrival, one.values))
+        np.where(ends, _evaluate_left_limit(one, time), np.interp(time, one.arrival, one.values))
         for one in signals
     ]
     return [tuple(float(value) for value in row) for row in zip(time, *columns, strict=True)]
 
 
-def _until(signal: Signal, time: FloatArray) -> FloatArray:
+def _evaluate_left_limit(signal: Signal, time: FloatArray) -> FloatArray:
     """Values at `time` (n,) [s]; at a jump the one before it."""
     return np.interp(-time, -signal.arrival[::-1], signal.values[::-1])

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from drivetwin.export.modelica.friction import GROUND
-from drivetwin.export.parameters.content import number
+from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import FloatArray
 from drivetwin.simulation.network import Element, Start
 
@@ -21,9 +21,9 @@ class _Independent:
     def __init__(self, rows: Iterable[FloatArray], size: int) -> None:
         self._rows = np.zeros((0, size))
         for row in rows:
-            self.takes(row)
+            self.add_independent(row)
 
-    def takes(self, row: FloatArray) -> bool:
+    def add_independent(self, row: FloatArray) -> bool:
         """Add a row if it is independent of the earlier ones; return True if it was added."""
         joined = np.vstack([self._rows, row])
         if int(np.linalg.matrix_rank(joined)) == self._rows.shape[0]:
@@ -32,7 +32,7 @@ class _Independent:
         return True
 
 
-def initial_equations(
+def build_initial_equations(
     elements: Sequence[Element],
     start: Start,
     flanges: Mapping[str, str],
@@ -45,39 +45,44 @@ def initial_equations(
     relative angle (b less a) of each compliance, as expressions. Elements that start locked go
     before stated speeds; of those, as many are set as are independent.
     """
-    nodes = sorted({node for element in elements for node in _nodes(element)} - {GROUND})
+    nodes = sorted({node for element in elements for node in _list_nodes(element)} - {GROUND})
     index = {node: place for place, node in enumerate(nodes)}
-    rigid = [_row(pairs, index) for element in elements for pairs in _constraints(element)]
+    rigid = [
+        _build_row(pairs, index) for element in elements for pairs in _list_constraints(element)
+    ]
     by_name = {str(element["name"]): element for element in elements}
 
     speeds = _Independent(rigid, len(nodes))
     lines = [
         f"{rests[name]} = 0;"
         for name in start.locked
-        if speeds.takes(_row(_slip(by_name[name]), index))
+        if speeds.add_independent(_build_row(_get_slip_row(by_name[name]), index))
     ]
     lines += [
-        f"der({flanges[node]}) = {number(speed)};"
+        f"der({flanges[node]}) = {format_number(speed)};"
         for node, speed in start.speeds.items()
-        if node in index and speeds.takes(_row(((node, 1.0),), index))
+        if node in index and speeds.add_independent(_build_row(((node, 1.0),), index))
     ]
     angles = _Independent(rigid, len(nodes))
     lines += [
-        f"{twists[str(element['name'])]} = {number(-start.twists.get(str(element['name']), 0.0))};"
+        f"{twists[str(element['name'])]} = {format_number(-start.twists.get(str(element['name']), 0.0))};"
         for element in elements
-        if element["type"] in _COMPLIANT and angles.takes(_row(_slip(element), index))
+        if element["type"] in _COMPLIANT
+        and angles.add_independent(_build_row(_get_slip_row(element), index))
     ]
     lines += [
-        f"{flanges[node]} = 0;" for node in nodes if angles.takes(_row(((node, 1.0),), index))
+        f"{flanges[node]} = 0;"
+        for node in nodes
+        if angles.add_independent(_build_row(((node, 1.0),), index))
     ]
     return lines
 
 
-def _slip(element: Element) -> tuple[tuple[str, float], ...]:
+def _get_slip_row(element: Element) -> tuple[tuple[str, float], ...]:
     return ((element["a"], 1.0), (element["b"], -1.0))
 
 
-def _constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...]]:
+def _list_constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...]]:
     """Kinematic constraints of an element: coefficients of node speeds whose sum is zero."""
     match element["type"]:
         case "gear":
@@ -89,12 +94,12 @@ def _constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...]]:
             yield ((element["node"], 1.0),)
 
 
-def _nodes(element: Element) -> list[str]:
+def _list_nodes(element: Element) -> list[str]:
     fields = ("node", "a", "b", "sun", "ring", "carrier", "pump", "turbine")
     return [element[field] for field in fields if field in element]
 
 
-def _row(pairs: Iterable[tuple[str, float]], index: Mapping[str, int]) -> FloatArray:
+def _build_row(pairs: Iterable[tuple[str, float]], index: Mapping[str, int]) -> FloatArray:
     row = np.zeros(len(index))
     for node, factor in pairs:
         if node != GROUND:

@@ -6,8 +6,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from drivetwin.export.parameters.content import number
-from drivetwin.export.parameters.spelling import ascii_line, distinct
+from drivetwin.export.parameters.content import format_number
+from drivetwin.export.parameters.spelling import make_distinct, to_ascii_line
 
 _KEYWORDS = re.compile(
     "algorithm|and|annotation|assert|block|break|class|connect|connector|constant|constrainedby|"
@@ -18,23 +18,23 @@ _KEYWORDS = re.compile(
 )
 
 
-def identifier(name: str) -> str:
+def make_identifier(name: str) -> str:
     """The name in letters, digits and `_`, no digit in front, and no keyword."""
-    plain = re.sub(r"[^A-Za-z0-9_]", "_", ascii_line(name))
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", to_ascii_line(name))
     return f"x_{plain}" if not re.match("[A-Za-z]", plain) or _KEYWORDS.fullmatch(plain) else plain
 
 
-def identifiers(names: Iterable[str]) -> dict[str, str]:
+def make_identifiers(names: Iterable[str]) -> dict[str, str]:
     """An identifier for each name; those that would coincide are numbered."""
-    return distinct(names, identifier)
+    return make_distinct(names, make_identifier)
 
 
-def string(text: str) -> str:
+def format_string(text: str) -> str:
     """A string literal."""
-    return f'"{ascii_line(text)}"'
+    return f'"{to_ascii_line(text)}"'
 
 
-def matrix(rows: Iterable[Sequence[float]]) -> str:
+def format_matrix(rows: Iterable[Sequence[float]]) -> str:
     """A matrix literal, one row per line where there are several."""
-    lines = [", ".join(number(value) for value in row) for row in rows]
+    lines = [", ".join(format_number(value) for value in row) for row in rows]
     return "[" + ";\n      ".join(lines) + "]"

@@ -15,20 +15,26 @@ from drivetwin.export.parameters.content import (
     Curve,
     ParameterSet,
     Scalar,
-    curve_of,
-    finite,
-    legal,
-    number,
+    build_curve,
+    format_number,
+    make_legal,
+    parse_finite,
 )
 from drivetwin.export.parameters.spelling import (
-    dotted_name,
-    one_line,
-    shown_unit,
-    unit_of,
-    with_axis,
-    without_axis,
+    append_axis,
+    parse_tool_unit,
+    split_axis,
+    to_dotted_name,
+    to_one_line,
+    to_tool_unit,
 )
-from drivetwin.export.parameters.xml_text import child, comment, document, parse_xml, text_at
+from drivetwin.export.parameters.xml_text import (
+    add_child,
+    format_comment,
+    format_document,
+    get_text,
+    parse_xml,
+)
 
 _DOCTYPE = (
     '<!DOCTYPE MSRSW PUBLIC "-//ASAM//DTD CALIBRATION DATA FORMAT:V2.0.0:LAI:IAI:XML:CDF200.XSD'
@@ -36,49 +42,49 @@ _DOCTYPE = (
 )
 
 
-def legal_for_cdfx(parameters: ParameterSet) -> ParameterSet:
+def convert_for_cdfx(parameters: ParameterSet) -> ParameterSet:
     """The set as the format can hold it."""
-    return legal(parameters, dotted_name, one_line)
+    return make_legal(parameters, to_dotted_name, to_one_line)
 
 
-def cdfx_text(parameters: ParameterSet) -> str:
+def format_cdfx(parameters: ParameterSet) -> str:
     """Contents of the file."""
-    content = legal_for_cdfx(parameters)
+    content = convert_for_cdfx(parameters)
     root = ET.Element("MSRSW", CREATOR="drivetwin")
-    child(root, "SHORT-NAME", dotted_name(content.name))
-    child(root, "CATEGORY", "CDF20")
-    system = child(child(root, "SW-SYSTEMS"), "SW-SYSTEM")
-    child(system, "SHORT-NAME", dotted_name(content.name))
-    child(system, "LONG-NAME", content.name)
-    tree = child(child(system, "SW-INSTANCE-SPEC"), "SW-INSTANCE-TREE")
-    child(tree, "SHORT-NAME", "drivetwin")
-    child(tree, "CATEGORY", "NO_VCD")
+    add_child(root, "SHORT-NAME", to_dotted_name(content.name))
+    add_child(root, "CATEGORY", "CDF20")
+    system = add_child(add_child(root, "SW-SYSTEMS"), "SW-SYSTEM")
+    add_child(system, "SHORT-NAME", to_dotted_name(content.name))
+    add_child(system, "LONG-NAME", content.name)
+    tree = add_child(add_child(system, "SW-INSTANCE-SPEC"), "SW-INSTANCE-TREE")
+    add_child(tree, "SHORT-NAME", "drivetwin")
+    add_child(tree, "CATEGORY", "NO_VCD")
     for scalar in content.scalars:
-        instance = _instance(tree, scalar.name, scalar.text, "VALUE")
-        _values(child(instance, "SW-VALUE-CONT"), scalar.unit, (scalar.value,))
+        instance = _add_instance(tree, scalar.name, scalar.text, "VALUE")
+        _add_values(add_child(instance, "SW-VALUE-CONT"), scalar.unit, (scalar.value,))
     for curve in content.curves:
-        text = with_axis(curve.text, curve.axis.name)
-        instance = _instance(tree, curve.name, text, "CURVE")
-        _values(child(instance, "SW-VALUE-CONT"), curve.unit, curve.values)
-        axis = child(child(instance, "SW-AXIS-CONTS"), "SW-AXIS-CONT")
-        child(axis, "CATEGORY", "STD_AXIS")
-        _values(axis, curve.axis.unit, curve.axis.points)
-    return document(root, _DOCTYPE, comment(content.notes))
+        text = append_axis(curve.text, curve.axis.name)
+        instance = _add_instance(tree, curve.name, text, "CURVE")
+        _add_values(add_child(instance, "SW-VALUE-CONT"), curve.unit, curve.values)
+        axis = add_child(add_child(instance, "SW-AXIS-CONTS"), "SW-AXIS-CONT")
+        add_child(axis, "CATEGORY", "STD_AXIS")
+        _add_values(axis, curve.axis.unit, curve.axis.points)
+    return format_document(root, _DOCTYPE, format_comment(content.notes))
 
 
-def _instance(tree: ET.Element, name: str, text: str, category: str) -> ET.Element:
-    instance = child(tree, "SW-INSTANCE")
-    child(instance, "SHORT-NAME", name)
-    child(instance, "LONG-NAME", text)
-    child(instance, "CATEGORY", category)
+def _add_instance(tree: ET.Element, name: str, text: str, category: str) -> ET.Element:
+    instance = add_child(tree, "SW-INSTANCE")
+    add_child(instance, "SHORT-NAME", name)
+    add_child(instance, "LONG-NAME", text)
+    add_child(instance, "CATEGORY", category)
     return instance
 
 
-def _values(parent: ET.Element, unit: str, values: tuple[float, ...]) -> None:
-    child(parent, "UNIT-DISPLAY-NAME", shown_unit(unit))
-    listed = child(parent, "SW-VALUES-PHYS")
+def _add_values(parent: ET.Element, unit: str, values: tuple[float, ...]) -> None:
+    add_child(parent, "UNIT-DISPLAY-NAME", to_tool_unit(unit))
+    listed = add_child(parent, "SW-VALUES-PHYS")
     for value in values:
-        child(listed, "V", number(value))
+        add_child(listed, "V", format_number(value))
 
 
 def parse_cdfx(text: str, source: str) -> ParameterSet:
@@ -94,42 +100,42 @@ def parse_cdfx(text: str, source: str) -> ParameterSet:
         )
     scalars, curves, skipped = [], [], []
     for instance in system.iter("SW-INSTANCE"):
-        name, category = text_at(instance, "SHORT-NAME"), text_at(instance, "CATEGORY")
+        name, category = get_text(instance, "SHORT-NAME"), get_text(instance, "CATEGORY")
         # With variants the values stand one level deeper; without a choice the first holds.
         holder = instance.find("SW-INSTANCE-PROPS-VARIANTS/SW-INSTANCE-PROPS-VARIANT")
         holder = instance if holder is None else holder
         axis = holder.find("SW-AXIS-CONTS/SW-AXIS-CONT")
         if category == "VALUE" and holder.find("SW-VALUE-CONT/SW-VALUES-PHYS/V") is not None:
-            scalars.append(_scalar(name, instance, holder, source))
+            scalars.append(_parse_scalar(name, instance, holder, source))
         elif category == "CURVE" and axis is not None and axis.find("SW-VALUES-PHYS/V") is not None:
-            curves.append(_curve(name, (instance, holder, axis), source))
+            curves.append(_parse_curve(name, (instance, holder, axis), source))
         else:
             skipped.append(f"{category} {name}")
-    title = text_at(system, "LONG-NAME") or Path(source).stem
+    title = get_text(system, "LONG-NAME") or Path(source).stem
     return ParameterSet(title, tuple(scalars), tuple(curves), skipped=tuple(skipped))
 
 
-def _scalar(name: str, instance: ET.Element, holder: ET.Element, source: str) -> Scalar:
-    value = finite(text_at(holder, "SW-VALUE-CONT/SW-VALUES-PHYS/V"), source, name)
-    unit = unit_of(text_at(holder, "SW-VALUE-CONT/UNIT-DISPLAY-NAME"))
-    return Scalar(name, value, unit, text_at(instance, "LONG-NAME"))
+def _parse_scalar(name: str, instance: ET.Element, holder: ET.Element, source: str) -> Scalar:
+    value = parse_finite(get_text(holder, "SW-VALUE-CONT/SW-VALUES-PHYS/V"), source, name)
+    unit = parse_tool_unit(get_text(holder, "SW-VALUE-CONT/UNIT-DISPLAY-NAME"))
+    return Scalar(name, value, unit, get_text(instance, "LONG-NAME"))
 
 
-def _curve(name: str, at: tuple[ET.Element, ET.Element, ET.Element], source: str) -> Curve:
+def _parse_curve(name: str, at: tuple[ET.Element, ET.Element, ET.Element], source: str) -> Curve:
     instance, holder, axis = at
 
     def numbers(parent: ET.Element, path: str) -> tuple[float, ...]:
-        return tuple(finite(one.text or "", source, name) for one in parent.findall(path))
+        return tuple(parse_finite(one.text or "", source, name) for one in parent.findall(path))
 
-    description, over = without_axis(text_at(instance, "LONG-NAME"))
-    return curve_of(
+    description, over = split_axis(get_text(instance, "LONG-NAME"))
+    return build_curve(
         name,
         Axis(
             over,
             numbers(axis, "SW-VALUES-PHYS//V"),
-            unit_of(text_at(axis, "UNIT-DISPLAY-NAME")),
+            parse_tool_unit(get_text(axis, "UNIT-DISPLAY-NAME")),
         ),
         numbers(holder, "SW-VALUE-CONT/SW-VALUES-PHYS//V"),
-        (unit_of(text_at(holder, "SW-VALUE-CONT/UNIT-DISPLAY-NAME")), description),
+        (parse_tool_unit(get_text(holder, "SW-VALUE-CONT/UNIT-DISPLAY-NAME")), description),
         source,
     )

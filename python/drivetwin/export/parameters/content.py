@@ -71,7 +71,7 @@ class ParameterSet:
         return (*self.scalars, *self.curves)
 
 
-def legal(
+def make_legal(
     parameters: ParameterSet,
     spell: Callable[[str], str],
     line: Callable[[str], str] = lambda text: text,
@@ -131,14 +131,14 @@ def _refuse_twins(names: Iterable[tuple[str, str]]) -> None:
         origins[name] = origin
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Shortest decimal that reads back as the same double, always with a decimal point."""
     text = repr(float(value))
     mantissa, e, exponent = text.partition("e")
     return text if "." in mantissa or not e else f"{mantissa}.0e{exponent}"
 
 
-def finite(text: str, source: str, key: str) -> float:
+def parse_finite(text: str, source: str, key: str) -> float:
     """Number behind a text. Raises FileFormatError, naming `source` and `key`."""
     try:
         value = float(text)
@@ -153,7 +153,7 @@ def finite(text: str, source: str, key: str) -> float:
     return value
 
 
-def curve_of(
+def build_curve(
     name: str, axis: Axis, values: Iterable[float], labels: tuple[str, str], source: str
 ) -> Curve:
     """Curve from what a file holds; `labels` are its unit and text.

@@ -17,12 +17,12 @@ from drivetwin.export.parameters.content import (
     Curve,
     ParameterSet,
     Scalar,
-    curve_of,
-    finite,
-    legal,
-    number,
+    build_curve,
+    format_number,
+    make_legal,
+    parse_finite,
 )
-from drivetwin.export.parameters.spelling import free_name, one_line
+from drivetwin.export.parameters.spelling import to_free_name, to_one_line
 
 _COLUMNS = ("name", "axis", "at", "axis_unit", "value", "unit", "text")
 _TITLE = "# Parameters of "
@@ -30,25 +30,25 @@ _TITLE = "# Parameters of "
 _Row = dict[str, str]
 
 
-def legal_for_csv(parameters: ParameterSet) -> ParameterSet:
+def convert_for_csv(parameters: ParameterSet) -> ParameterSet:
     """The set as the format can hold it."""
-    return legal(parameters, free_name, one_line)
+    return make_legal(parameters, to_free_name, to_one_line)
 
 
-def csv_text(parameters: ParameterSet) -> str:
+def format_csv(parameters: ParameterSet) -> str:
     """Contents of the file."""
-    content = legal_for_csv(parameters)
+    content = convert_for_csv(parameters)
     out = io.StringIO()
     for line in (f"{_TITLE}{content.name}", *(f"# {note}" for note in content.notes)):
         out.write(f"{line}\n")
     table = csv.writer(out, lineterminator="\n")
     table.writerow(_COLUMNS)
     for one in content.scalars:
-        table.writerow((one.name, "", "", "", number(one.value), one.unit, one.text))
+        table.writerow((one.name, "", "", "", format_number(one.value), one.unit, one.text))
     for curve in content.curves:
         axis = curve.axis
         for at, value in zip(axis.points, curve.values, strict=True):
-            point = (curve.name, axis.name, number(at), axis.unit, number(value))
+            point = (curve.name, axis.name, format_number(at), axis.unit, format_number(value))
             table.writerow((*point, curve.unit, curve.text))
     return out.getvalue()
 
@@ -66,17 +66,17 @@ def parse_csv(text: str, source: str) -> ParameterSet:
             Where(file=source),
         )
     scalars, curves = [], []
-    for name, group in groupby(_rows(rows, source), key=lambda row: row["name"]):
+    for name, group in groupby(_read_rows(rows, source), key=lambda row: row["name"]):
         members = list(group)
         if members[0]["axis"]:
-            curves.append(_curve(name, members, source))
+            curves.append(_parse_curve(name, members, source))
         else:
-            scalars += [_scalar(row, source) for row in members]
+            scalars += [_parse_scalar(row, source) for row in members]
     title = named.removeprefix(_TITLE) if named else Path(source).stem
     return ParameterSet(title, tuple(scalars), tuple(curves))
 
 
-def _rows(reader: csv.DictReader[str], source: str) -> list[_Row]:
+def _read_rows(reader: csv.DictReader[str], source: str) -> list[_Row]:
     try:
         rows = list(reader)
     except csv.Error as fault:
@@ -91,20 +91,22 @@ def _rows(reader: csv.DictReader[str], source: str) -> list[_Row]:
     return rows
 
 
-def _scalar(row: _Row, source: str) -> Scalar:
-    return Scalar(row["name"], finite(row["value"], source, row["name"]), row["unit"], row["text"])
+def _parse_scalar(row: _Row, source: str) -> Scalar:
+    return Scalar(
+        row["name"], parse_finite(row["value"], source, row["name"]), row["unit"], row["text"]
+    )
 
 
-def _curve(name: str, rows: list[_Row], source: str) -> Curve:
+def _parse_curve(name: str, rows: list[_Row], source: str) -> Curve:
     first = rows[0]
-    return curve_of(
+    return build_curve(
         name,
         Axis(
             first["axis"],
-            tuple(finite(row["at"], source, name) for row in rows),
+            tuple(parse_finite(row["at"], source, name) for row in rows),
             first["axis_unit"],
         ),
-        (finite(row["value"], source, name) for row in rows),
+        (parse_finite(row["value"], source, name) for row in rows),
         (first["unit"], first["text"]),
         source,
     )

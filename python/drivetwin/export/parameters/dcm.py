@@ -18,18 +18,18 @@ from drivetwin.export.parameters.content import (
     Curve,
     ParameterSet,
     Scalar,
-    curve_of,
-    finite,
-    legal,
-    number,
+    build_curve,
+    format_number,
+    make_legal,
+    parse_finite,
 )
 from drivetwin.export.parameters.spelling import (
-    ascii_line,
-    dotted_name,
-    shown_unit,
-    unit_of,
-    with_axis,
-    without_axis,
+    append_axis,
+    parse_tool_unit,
+    split_axis,
+    to_ascii_line,
+    to_dotted_name,
+    to_tool_unit,
 )
 
 _FORMAT = "KONSERVIERUNG_FORMAT"
@@ -42,38 +42,48 @@ _COMMENTS = ("*", "!", ".")
 _Fields = dict[str, list[str]]
 
 
-def legal_for_dcm(parameters: ParameterSet) -> ParameterSet:
+def convert_for_dcm(parameters: ParameterSet) -> ParameterSet:
     """The set as the format can hold it."""
-    return legal(parameters, dotted_name, ascii_line)
+    return make_legal(parameters, to_dotted_name, to_ascii_line)
 
 
-def dcm_text(parameters: ParameterSet) -> str:
+def format_dcm(parameters: ParameterSet) -> str:
     """Contents of the file."""
-    content = legal_for_dcm(parameters)
-    function = dotted_name(content.name)
+    content = convert_for_dcm(parameters)
+    function = to_dotted_name(content.name)
     lines = [f"* {note}" for note in content.notes]
     lines += ["", f"{_FORMAT} 2.0", "", "FUNKTIONEN"]
     lines += [f'  FKT {function} "" "{content.name}"', "END", ""]
     for scalar in content.scalars:
-        lines += [f"FESTWERT {scalar.name}", *_head(scalar, function)]
-        lines += [f'  EINHEIT_W "{shown_unit(scalar.unit)}"', f"  WERT {number(scalar.value)}"]
+        lines += [f"FESTWERT {scalar.name}", *_format_head(scalar, function)]
+        lines += [
+            f'  EINHEIT_W "{to_tool_unit(scalar.unit)}"',
+            f"  WERT {format_number(scalar.value)}",
+        ]
         lines += ["END", ""]
     for curve in content.curves:
-        described = replace(curve, text=with_axis(curve.text, curve.axis.name))
-        lines += [f"KENNLINIE {curve.name} {len(curve.values)}", *_head(described, function)]
-        lines += [f'  EINHEIT_X "{shown_unit(curve.axis.unit)}"']
-        lines += [f'  EINHEIT_W "{shown_unit(curve.unit)}"']
-        lines += [*_listed("ST/X", curve.axis.points), *_listed("WERT", curve.values), "END", ""]
+        described = replace(curve, text=append_axis(curve.text, curve.axis.name))
+        lines += [f"KENNLINIE {curve.name} {len(curve.values)}", *_format_head(described, function)]
+        lines += [f'  EINHEIT_X "{to_tool_unit(curve.axis.unit)}"']
+        lines += [f'  EINHEIT_W "{to_tool_unit(curve.unit)}"']
+        lines += [
+            *_format_list("ST/X", curve.axis.points),
+            *_format_list("WERT", curve.values),
+            "END",
+            "",
+        ]
     return "\n".join(lines)
 
 
-def _head(entry: Scalar | Curve, function: str) -> list[str]:
+def _format_head(entry: Scalar | Curve, function: str) -> list[str]:
     return [f'  LANGNAME "{entry.text}"', f"  FUNKTION {function}"]
 
 
-def _listed(keyword: str, values: tuple[float, ...]) -> Iterator[str]:
+def _format_list(keyword: str, values: tuple[float, ...]) -> Iterator[str]:
     for start in range(0, len(values), _PER_LINE):
-        yield f"  {keyword} " + " ".join(number(v) for v in values[start : start + _PER_LINE])
+        yield f"  {keyword} " + " ".join(
+            format_number(v) for v in values[start : start + _PER_LINE]
+        )
 
 
 def parse_dcm(text: str, source: str) -> ParameterSet:
@@ -88,20 +98,20 @@ def parse_dcm(text: str, source: str) -> ParameterSet:
         )
     name = Path(source).stem
     scalars, curves, skipped = [], [], []
-    for kind, rest, fields in _blocks(lines, source):
+    for kind, rest, fields in _iterate_blocks(lines, source):
         label = rest.split(maxsplit=1)[0] if rest else ""
         if kind == "FUNKTIONEN":
-            name = _function_name(fields) or name
+            name = _parse_function_name(fields) or name
         elif kind == "FESTWERT" and "WERT" in fields:
-            scalars.append(_scalar(label, fields, source))
+            scalars.append(_parse_scalar(label, fields, source))
         elif kind in _CURVES and "WERT" in fields and "ST/X" in fields:
-            curves.append(_curve(label, fields, source))
+            curves.append(_parse_curve(label, fields, source))
         else:
             skipped.append(f"{kind} {label}")
     return ParameterSet(name, tuple(scalars), tuple(curves), skipped=tuple(skipped))
 
 
-def _blocks(lines: list[str], source: str) -> Iterator[tuple[str, str, _Fields]]:
+def _iterate_blocks(lines: list[str], source: str) -> Iterator[tuple[str, str, _Fields]]:
     """Keyword, rest of its line and the fields of every block up to its END."""
     open_block: tuple[str, str, _Fields] | None = None
     for line in lines:
@@ -123,31 +133,36 @@ def _blocks(lines: list[str], source: str) -> Iterator[tuple[str, str, _Fields]]
         )
 
 
-def _function_name(fields: _Fields) -> str:
+def _parse_function_name(fields: _Fields) -> str:
     quoted = re.findall(r'"([^"]*)"', fields.get("FKT", [""])[0])
     return quoted[-1] if quoted else ""
 
 
-def _quoted(fields: _Fields, keyword: str) -> str:
+def _parse_string(fields: _Fields, keyword: str) -> str:
     return fields.get(keyword, [""])[0].strip().strip('"')
 
 
-def _numbers(fields: _Fields, keyword: str, label: str, source: str) -> tuple[float, ...]:
+def _parse_numbers(fields: _Fields, keyword: str, label: str, source: str) -> tuple[float, ...]:
     words = " ".join(fields[keyword]).split()
-    return tuple(finite(word, source, label) for word in words)
+    return tuple(parse_finite(word, source, label) for word in words)
 
 
-def _scalar(label: str, fields: _Fields, source: str) -> Scalar:
-    value = finite(fields["WERT"][0], source, label)
-    return Scalar(label, value, unit_of(_quoted(fields, "EINHEIT_W")), _quoted(fields, "LANGNAME"))
+def _parse_scalar(label: str, fields: _Fields, source: str) -> Scalar:
+    value = parse_finite(fields["WERT"][0], source, label)
+    return Scalar(
+        label,
+        value,
+        parse_tool_unit(_parse_string(fields, "EINHEIT_W")),
+        _parse_string(fields, "LANGNAME"),
+    )
 
 
-def _curve(label: str, fields: _Fields, source: str) -> Curve:
-    text, over = without_axis(_quoted(fields, "LANGNAME"))
+def _parse_curve(label: str, fields: _Fields, source: str) -> Curve:
+    text, over = split_axis(_parse_string(fields, "LANGNAME"))
     axis = Axis(
         over,
-        _numbers(fields, "ST/X", label, source),
-        unit_of(_quoted(fields, "EINHEIT_X")),
+        _parse_numbers(fields, "ST/X", label, source),
+        parse_tool_unit(_parse_string(fields, "EINHEIT_X")),
     )
-    labels = (unit_of(_quoted(fields, "EINHEIT_W")), text)
-    return curve_of(label, axis, _numbers(fields, "WERT", label, source), labels, source)
+    labels = (parse_tool_unit(_parse_string(fields, "EINHEIT_W")), text)
+    return build_curve(label, axis, _parse_numbers(fields, "WERT", label, source), labels, source)

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from drivetwin._util.atomic import write_text
 from drivetwin.errors import FileFormatError, InputError, Where
-from drivetwin.export.parameters.cdfx import cdfx_text, legal_for_cdfx, parse_cdfx
+from drivetwin.export.parameters.cdfx import convert_for_cdfx, format_cdfx, parse_cdfx
 from drivetwin.export.parameters.content import ParameterSet
-from drivetwin.export.parameters.csv_file import csv_text, legal_for_csv, parse_csv
-from drivetwin.export.parameters.dcm import dcm_text, legal_for_dcm, parse_dcm
-from drivetwin.export.parameters.json_file import json_text, legal_for_json, parse_json
-from drivetwin.export.parameters.matlab import legal_for_m, m_text, parse_m
-from drivetwin.export.parameters.ssv import legal_for_ssv, parse_ssv, ssv_text
+from drivetwin.export.parameters.csv_file import convert_for_csv, format_csv, parse_csv
+from drivetwin.export.parameters.dcm import convert_for_dcm, format_dcm, parse_dcm
+from drivetwin.export.parameters.json_file import convert_for_json, format_json, parse_json
+from drivetwin.export.parameters.matlab import convert_for_m, format_m, parse_m
+from drivetwin.export.parameters.ssv import convert_for_ssv, format_ssv, parse_ssv
 
 
 class ParameterFormat(StrEnum):
@@ -44,12 +44,12 @@ class Codec:
 
 
 CODECS = {
-    ParameterFormat.SSV: Codec(ssv_text, parse_ssv, legal_for_ssv),
-    ParameterFormat.CDFX: Codec(cdfx_text, parse_cdfx, legal_for_cdfx),
-    ParameterFormat.DCM: Codec(dcm_text, parse_dcm, legal_for_dcm),
-    ParameterFormat.M: Codec(m_text, parse_m, legal_for_m),
-    ParameterFormat.JSON: Codec(json_text, parse_json, legal_for_json),
-    ParameterFormat.CSV: Codec(csv_text, parse_csv, legal_for_csv),
+    ParameterFormat.SSV: Codec(format_ssv, parse_ssv, convert_for_ssv),
+    ParameterFormat.CDFX: Codec(format_cdfx, parse_cdfx, convert_for_cdfx),
+    ParameterFormat.DCM: Codec(format_dcm, parse_dcm, convert_for_dcm),
+    ParameterFormat.M: Codec(format_m, parse_m, convert_for_m),
+    ParameterFormat.JSON: Codec(format_json, parse_json, convert_for_json),
+    ParameterFormat.CSV: Codec(format_csv, parse_csv, convert_for_csv),
 }
 
 
@@ -67,11 +67,11 @@ def read_parameters(path: Path, kind: ParameterFormat | None = None) -> Paramete
     What is neither a number nor a curve is named in `skipped`. Raises FileFormatError where the
     file is damaged, InputError for an unknown ending, and OSError.
     """
-    chosen = kind or _by_ending(path)
-    return CODECS[chosen].parse(_decoded(path), path.name)
+    chosen = kind or _select_format(path)
+    return CODECS[chosen].parse(_read_decoded(path), path.name)
 
 
-def _by_ending(path: Path) -> ParameterFormat:
+def _select_format(path: Path) -> ParameterFormat:
     try:
         return ParameterFormat(path.suffix.removeprefix(".").lower())
     except ValueError:
@@ -82,7 +82,7 @@ def _by_ending(path: Path) -> ParameterFormat:
         ) from None
 
 
-def _decoded(path: Path) -> str:
+def _read_decoded(path: Path) -> str:
     """Text in UTF-8 or, as older tools write, Latin-1."""
     data = path.read_bytes()
     if b"\0" in data:

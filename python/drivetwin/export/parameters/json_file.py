@@ -10,8 +10,8 @@ from pydantic import Field, FiniteFloat, ValidationError
 
 from drivetwin._util.toml import StrictModel
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.export.parameters.content import Axis, ParameterSet, Scalar, curve_of, legal
-from drivetwin.export.parameters.spelling import free_name, one_line
+from drivetwin.export.parameters.content import Axis, ParameterSet, Scalar, build_curve, make_legal
+from drivetwin.export.parameters.spelling import to_free_name, to_one_line
 
 SCHEMA = "drivetwin/parameters-1"
 
@@ -47,14 +47,14 @@ class ParameterFile(StrictModel):
     notes: list[str] = Field(default_factory=list)
 
 
-def legal_for_json(parameters: ParameterSet) -> ParameterSet:
+def convert_for_json(parameters: ParameterSet) -> ParameterSet:
     """The set as the format can hold it."""
-    return legal(parameters, free_name, one_line)
+    return make_legal(parameters, to_free_name, to_one_line)
 
 
-def json_text(parameters: ParameterSet) -> str:
+def format_json(parameters: ParameterSet) -> str:
     """Contents of the file."""
-    fields = asdict(legal_for_json(parameters))
+    fields = asdict(convert_for_json(parameters))
     fields.pop("skipped")
     text = json.dumps({"schema": SCHEMA, **fields}, ensure_ascii=False, allow_nan=False, indent=2)
     return text + "\n"
@@ -71,7 +71,7 @@ def parse_json(text: str, source: str) -> ParameterSet:
             Where(file=source),
         ) from None
     curves = (
-        curve_of(
+        build_curve(
             one.name,
             Axis(one.axis.name, tuple(one.axis.points), one.axis.unit),
             one.values,

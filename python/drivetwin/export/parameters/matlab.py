@@ -15,47 +15,54 @@ from drivetwin.export.parameters.content import (
     Curve,
     ParameterSet,
     Scalar,
-    curve_of,
-    finite,
-    legal,
-    number,
+    build_curve,
+    format_number,
+    make_legal,
+    parse_finite,
 )
-from drivetwin.export.parameters.spelling import ascii_line, flat_name
+from drivetwin.export.parameters.spelling import to_ascii_line, to_flat_name
 
 _TITLE = "%% Parameters of "
 _LINE = re.compile(r"(\w+)\s*=\s*([^;%]+);\s*(?:%\s*\[([^\]]*)\]\s*(.*))?")
 _BREAKPOINTS = re.compile(r"breakpoints (\w+) of (\w+)")
 
 
-def legal_for_m(parameters: ParameterSet) -> ParameterSet:
+def convert_for_m(parameters: ParameterSet) -> ParameterSet:
     """The set as the format can hold it."""
-    return legal(parameters, flat_name, ascii_line, _breakpoints_name)
+    return make_legal(parameters, to_flat_name, to_ascii_line, _make_breakpoints_name)
 
 
-def _breakpoints_name(curve: Curve) -> str:
-    return flat_name(f"{curve.name}_{curve.axis.name}")
+def _make_breakpoints_name(curve: Curve) -> str:
+    return to_flat_name(f"{curve.name}_{curve.axis.name}")
 
 
-def m_text(parameters: ParameterSet) -> str:
+def format_m(parameters: ParameterSet) -> str:
     """Contents of the file."""
-    content = legal_for_m(parameters)
+    content = convert_for_m(parameters)
     lines = [f"{_TITLE}{content.name}", *(f"% {note}" for note in content.notes), ""]
     for scalar in content.scalars:
-        lines.append(_assignment(scalar.name, number(scalar.value), scalar.unit, scalar.text))
+        lines.append(
+            _format_assignment(scalar.name, format_number(scalar.value), scalar.unit, scalar.text)
+        )
     for curve in content.curves:
         text = f"breakpoints {curve.axis.name} of {curve.name}"
-        over = _breakpoints_name(curve)
-        lines += ["", _assignment(over, _row(curve.axis.points), curve.axis.unit, text)]
-        lines.append(_assignment(curve.name, _row(curve.values), curve.unit, curve.text))
+        over = _make_breakpoints_name(curve)
+        lines += [
+            "",
+            _format_assignment(over, _format_row(curve.axis.points), curve.axis.unit, text),
+        ]
+        lines.append(
+            _format_assignment(curve.name, _format_row(curve.values), curve.unit, curve.text)
+        )
     return "\n".join(lines) + "\n"
 
 
-def _assignment(name: str, value: str, unit: str, text: str) -> str:
+def _format_assignment(name: str, value: str, unit: str, text: str) -> str:
     return f"{name} = {value}; % [{unit}] {text}".rstrip()
 
 
-def _row(values: tuple[float, ...]) -> str:
-    return "[" + " ".join(number(value) for value in values) + "]"
+def _format_row(values: tuple[float, ...]) -> str:
+    return "[" + " ".join(format_number(value) for value in values) + "]"
 
 
 def parse_m(text: str, source: str) -> ParameterSet:
@@ -77,9 +84,9 @@ def parse_m(text: str, source: str) -> ParameterSet:
             continue
         label, value, unit, about = found[1], found[2].strip(), found[3] or "1", found[4] or ""
         if not value.startswith("["):
-            scalars.append(Scalar(label, finite(value, source, label), unit, about))
+            scalars.append(Scalar(label, parse_finite(value, source, label), unit, about))
             continue
-        values = tuple(finite(word, source, label) for word in _words(value))
+        values = tuple(parse_finite(word, source, label) for word in _split_words(value))
         if points := _BREAKPOINTS.fullmatch(about):
             axes[points[2]] = Axis(points[1], values, unit)
         else:
@@ -90,12 +97,12 @@ def parse_m(text: str, source: str) -> ParameterSet:
         )
     skipped += [label for label in vectors if label not in axes]
     curves = [
-        curve_of(label, axes[label], one.values, (one.unit, one.text), source)
+        build_curve(label, axes[label], one.values, (one.unit, one.text), source)
         for label, one in vectors.items()
         if label in axes
     ]
     return ParameterSet(name, tuple(scalars), tuple(curves), skipped=tuple(skipped))
 
 
-def _words(row: str) -> list[str]:
+def _split_words(row: str) -> list[str]:
     return row.strip("[]").replace(",", " ").split()

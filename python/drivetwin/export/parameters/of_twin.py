@@ -10,9 +10,9 @@ import numpy as np
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.names import Names
-from drivetwin.export.parameters.spelling import one_line
-from drivetwin.parameters import OVER_ETA, spec_of
-from drivetwin.twin.twin import friction_law
+from drivetwin.export.parameters.spelling import to_one_line
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.twin.twin import build_friction_law
 
 if TYPE_CHECKING:
     from drivetwin.estimation.result.estimate import Estimate
@@ -44,7 +44,7 @@ LAW_FIELDS = {
 """Numbers of a friction law: unit and meaning."""
 
 
-def parameters_of(
+def collect_parameters(
     twin: Twin, names: Names = Names.DRIVETWIN, converter: Converter | None = None
 ) -> ParameterSet:
     """All numbers of a twin that are known, and μ over slip of its elements.
@@ -52,18 +52,27 @@ def parameters_of(
     Unidentified parameters have no entry and are listed in the notes. A `converter` map comes from
     a powertrain file, because it is not identifiable with the lock-up clutch engaged.
     """
-    from drivetwin.export.parameters.simscape import simscape
+    from drivetwin.export.parameters.simscape import convert_to_simscape_blocks
 
     own = ParameterSet(
-        name=one_line(twin.name),
-        scalars=(*_estimates(twin), *_load(twin), *_gearing(twin), *_elements(twin), *_laws(twin)),
-        curves=(*_friction(twin), *(() if converter is None else converter_curves(converter))),
-        notes=tuple(one_line(note) for note in _notes(twin)),
+        name=to_one_line(twin.name),
+        scalars=(
+            *_collect_estimates(twin),
+            *_collect_load_terms(twin),
+            *_collect_gearing(twin),
+            *_collect_elements(twin),
+            *_collect_laws(twin),
+        ),
+        curves=(
+            *_collect_friction(twin),
+            *(() if converter is None else build_converter_curves(converter)),
+        ),
+        notes=tuple(to_one_line(note) for note in _collect_notes(twin)),
     )
-    return simscape(own, tuple(twin.elements)) if names is Names.SIMSCAPE else own
+    return convert_to_simscape_blocks(own, tuple(twin.elements)) if names is Names.SIMSCAPE else own
 
 
-def converter_curves(converter: Converter) -> tuple[Curve, Curve]:
+def build_converter_curves(converter: Converter) -> tuple[Curve, Curve]:
     """Torque ratio and capacity over the speed ratio."""
     axis = Axis("speed_ratio", converter.speed_ratio)
     return (
@@ -83,20 +92,25 @@ def converter_curves(converter: Converter) -> tuple[Curve, Curve]:
     )
 
 
-def _estimates(twin: Twin) -> Iterator[Scalar]:
+def _collect_estimates(twin: Twin) -> Iterator[Scalar]:
     for estimate in twin.parameters.values():
         if estimate.value is not None:
-            yield Scalar(estimate.id, estimate.value, estimate.unit, one_line(_told(estimate)))
+            yield Scalar(
+                estimate.id,
+                estimate.value,
+                estimate.unit,
+                to_one_line(_describe_estimate(estimate)),
+            )
 
 
-def _told(estimate: Estimate) -> str:
+def _describe_estimate(estimate: Estimate) -> str:
     """Meaning, verdict and interval; that of a value of the card has no width and is left out."""
-    text = f"{spec_of(estimate.id).meaning}; {estimate.verdict.value}"
+    text = f"{get_parameter_spec(estimate.id).meaning}; {estimate.verdict.value}"
     low, high = estimate.ci95_total or (0.0, 0.0)
     return f"{text}, 95 %: {low:.5g} .. {high:.5g}" if low < high else text
 
 
-def _load(twin: Twin) -> Iterator[Scalar]:
+def _collect_load_terms(twin: Twin) -> Iterator[Scalar]:
     """Speed-dependent load terms, if they were estimated."""
     if (law := twin.load_law) is not None:
         over = ", over η" if law.over_eta else ""
@@ -106,20 +120,20 @@ def _load(twin: Twin) -> Iterator[Scalar]:
         yield Scalar("load.mean_speed", law.mean_speed, "rad/s", text)
 
 
-def _gearing(twin: Twin) -> Iterator[Scalar]:
+def _collect_gearing(twin: Twin) -> Iterator[Scalar]:
     yield Scalar("i_in", twin.i_in, text="input gear")
     yield Scalar("i_f", twin.final_drive, text="final drive")
     for name, gear in twin.gears.items():
-        text = one_line(f"overall ratio of gear {name}, held by {gear.element}")
+        text = to_one_line(f"overall ratio of gear {name}, held by {gear.element}")
         yield Scalar(f"ratio_{name}", gear.ratio, text=text)
 
 
-def _elements(twin: Twin) -> Iterator[Scalar]:
+def _collect_elements(twin: Twin) -> Iterator[Scalar]:
     for name, element in twin.elements.items():
-        yield from _design(name, element, twin)
+        yield from _build_design_scalar(name, element, twin)
 
 
-def _design(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
+def _build_design_scalar(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
     told = {one.id for one in twin.parameters.values() if one.value is not None}
     for field, (unit, text) in DESIGN_FIELDS.items():
         key = f"{field}.{name}"
@@ -127,7 +141,7 @@ def _design(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
             yield Scalar(key, getattr(element, field), unit, f"{text}; design value")
 
 
-def _laws(twin: Twin) -> Iterator[Scalar]:
+def _collect_laws(twin: Twin) -> Iterator[Scalar]:
     for name, curve in twin.friction.items():
         law = {} if curve.stribeck is None else vars(curve.stribeck)
         for field, value in law.items():
@@ -136,19 +150,19 @@ def _laws(twin: Twin) -> Iterator[Scalar]:
             yield Scalar(f"{field}.{name}", value, unit, text + over)
 
 
-def _friction(twin: Twin) -> Iterator[Curve]:
+def _collect_friction(twin: Twin) -> Iterator[Curve]:
     for name, curve in twin.friction.items():
-        law = friction_law(curve)
-        points = _breakpoints(law, float(curve.slip[-1]))
+        law = build_friction_law(curve)
+        points = _select_breakpoints(law, float(curve.slip[-1]))
         yield Curve(
             f"mu.{name}",
             Axis("slip", tuple(points.tolist()), "rad/s"),
-            tuple(law.at(points).tolist()),
-            text=one_line(f"friction coefficient of {name} over slip, {curve.method_text}"),
+            tuple(law.evaluate(points).tolist()),
+            text=to_one_line(f"friction coefficient of {name} over slip, {curve.method_text}"),
         )
 
 
-def _breakpoints(law: Stribeck | FrictionTable, last: float) -> FloatArray:
+def _select_breakpoints(law: Stribeck | FrictionTable, last: float) -> FloatArray:
     """Slips (n,) [rad/s] at which a curve gives the law: those of a table, or from 0 to `last`."""
     if hasattr(law, "slip"):
         return np.asarray(law.slip, dtype=np.float64)
@@ -158,7 +172,7 @@ def _breakpoints(law: Stribeck | FrictionTable, last: float) -> FloatArray:
     return np.append(bent * np.linspace(0.0, 1.0, POINTS - 1) ** 2, last)
 
 
-def _notes(twin: Twin) -> Iterator[str]:
+def _collect_notes(twin: Twin) -> Iterator[str]:
     yield f"drivetwin {twin.version}, method {twin.method.value}, loss law {twin.loss_law}"
     for name, digest in twin.inputs.items():
         yield f"from {name}, SHA-256 {digest}"

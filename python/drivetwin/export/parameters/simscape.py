@@ -21,7 +21,7 @@ _CLUTCH_FIELDS = ("gain", "P0", "peak", "mu_c", "mu_s", "v_s", "mu_v")
 """What the block states in its own way: the geometry, and the friction law as a table."""
 
 
-def simscape(own: ParameterSet, elements: tuple[str, ...]) -> ParameterSet:
+def convert_to_simscape_blocks(own: ParameterSet, elements: tuple[str, ...]) -> ParameterSet:
     """Convert a set to Simscape blocks: each clutch of `elements` as a Disc Friction Clutch.
 
     Only the product of surfaces, de-rating, area and radius is known of a clutch. It is written
@@ -34,13 +34,13 @@ def simscape(own: ParameterSet, elements: tuple[str, ...]) -> ParameterSet:
         own,
         scalars=(
             *(replace(one, name=_RENAMED.get(one.name, one.name)) for one in kept),
-            *(one for name in elements for one in _clutch(own, name)),
+            *(one for name in elements for one in _convert_clutch(own, name)),
         ),
-        curves=tuple(_curve(one) for one in own.curves),
+        curves=tuple(_convert_curve(one) for one in own.curves),
     )
 
 
-def _clutch(own: ParameterSet, name: str) -> tuple[Scalar, ...]:
+def _convert_clutch(own: ParameterSet, name: str) -> tuple[Scalar, ...]:
     values = {one.name: one for one in own.scalars}
     area, pressure = values[f"gain.{name}"], values[f"P0.{name}"]
     geometry = (
@@ -57,7 +57,7 @@ def _clutch(own: ParameterSet, name: str) -> tuple[Scalar, ...]:
     return (*geometry, Scalar(f"mu_s.{name}", static, "1", text))
 
 
-def _curve(curve: Curve) -> Curve:
+def _convert_curve(curve: Curve) -> Curve:
     if curve.name.startswith("mu."):
         return replace(
             curve,
@@ -67,10 +67,10 @@ def _curve(curve: Curve) -> Curve:
     axis = replace(curve.axis, name="speed_ratio")
     if curve.name == "converter.torque_ratio":
         return replace(curve, name="tc_torque_ratio", axis=axis)
-    return _capacity_factor(curve, axis)
+    return _compute_capacity_factor(curve, axis)
 
 
-def _capacity_factor(capacity: Curve, axis: Axis) -> Curve:
+def _compute_capacity_factor(capacity: Curve, axis: Axis) -> Curve:
     """Speed over root of torque, which is how the block states it; finite below ν = 1 only."""
     drive = [
         (ratio, value)

@@ -42,7 +42,7 @@ _MATLAB_KEYWORDS = re.compile(
 )
 
 
-def one_line(text: str) -> str:
+def to_one_line(text: str) -> str:
     """The text with white space as single blanks, without control characters."""
     kept = (
         " " if char.isspace() else char
@@ -56,39 +56,41 @@ _UNPRINTABLE = frozenset({"Cc", "Cf", "Cn", "Co", "Cs"})
 """Unicode categories that an XML file may not hold or that nobody sees."""
 
 
-def ascii_line(text: str) -> str:
+def to_ascii_line(text: str) -> str:
     """One line in 7 bits, without the double quote and the backslash that would end or escape it.
 
     Greek letters are spelled, accents dropped; what has no counterpart becomes a question mark.
     """
-    plain = unicodedata.normalize("NFKD", one_line(text).translate(_REPLACED))
+    plain = unicodedata.normalize("NFKD", to_one_line(text).translate(_REPLACED))
     bare = "".join(char for char in plain if not unicodedata.combining(char))
-    return one_line(bare.encode("ascii", "replace").decode().replace('"', "'").replace("\\", "/"))
+    return to_one_line(
+        bare.encode("ascii", "replace").decode().replace('"', "'").replace("\\", "/")
+    )
 
 
-def free_name(name: str) -> str:
+def to_free_name(name: str) -> str:
     """Any name on one line, `_` where nothing is left."""
-    return one_line(name) or "_"
+    return to_one_line(name) or "_"
 
 
-def dotted_name(name: str) -> str:
+def to_dotted_name(name: str) -> str:
     """Identifier of calibration tools: letters, digits, `_` and `.`, no digit or dot in front.
 
     Something stands after every dot, as in the structured names of FMI.
     """
-    plain = re.sub(r"^(?=[0-9.])|^$", "_", re.sub(r"[^A-Za-z0-9_.]", "_", ascii_line(name)))
+    plain = re.sub(r"^(?=[0-9.])|^$", "_", re.sub(r"[^A-Za-z0-9_.]", "_", to_ascii_line(name)))
     return re.sub(r"\.(?=\.|$)", "_", plain)
 
 
-def flat_name(name: str) -> str:
+def to_flat_name(name: str) -> str:
     """Identifier of MATLAB: letters, digits and `_`, a letter in front, at most 63 characters."""
-    flat = re.sub(r"[^A-Za-z0-9_]", "_", ascii_line(name))
+    flat = re.sub(r"[^A-Za-z0-9_]", "_", to_ascii_line(name))
     if not flat[:1].isalpha() or _MATLAB_KEYWORDS.fullmatch(flat):
         flat = f"p_{flat}"
     return flat[:_MATLAB_NAME_LENGTH]
 
 
-def distinct(names: Iterable[str], spelled: Callable[[str], str]) -> dict[str, str]:
+def make_distinct(names: Iterable[str], spelled: Callable[[str], str]) -> dict[str, str]:
     """Each name as `spelled`; those that would coincide are numbered."""
     chosen: dict[str, str] = {}
     for name in names:
@@ -100,22 +102,22 @@ def distinct(names: Iterable[str], spelled: Callable[[str], str]) -> dict[str, s
     return chosen
 
 
-def shown_unit(unit: str) -> str:
+def to_tool_unit(unit: str) -> str:
     """Unit as calibration tools show it: `-` without dimension."""
     return "-" if unit == "1" else unit
 
 
-def unit_of(shown: str) -> str:
-    """Inverse of `shown_unit`; nothing at all also means without dimension."""
+def parse_tool_unit(shown: str) -> str:
+    """Inverse of `to_tool_unit`; nothing at all also means without dimension."""
     return "1" if shown.strip() in ("", "-") else shown.strip()
 
 
-def with_axis(text: str, axis: str) -> str:
+def append_axis(text: str, axis: str) -> str:
     """Description of a curve that also names its axis, for formats without a place for that."""
     return f"{text} (over {axis})".strip()
 
 
-def without_axis(text: str) -> tuple[str, str]:
-    """Inverse of `with_axis`: text and axis, which is `x` where none is named."""
+def split_axis(text: str) -> tuple[str, str]:
+    """Inverse of `append_axis`: text and axis, which is `x` where none is named."""
     found = re.fullmatch(r"(.*?) ?\(over ([A-Za-z0-9_.]+)\)", text)
     return (found[1], found[2]) if found else (text, "x")

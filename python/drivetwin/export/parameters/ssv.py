@@ -17,59 +17,64 @@ from drivetwin.export.parameters.content import (
     Curve,
     ParameterSet,
     Scalar,
-    curve_of,
-    finite,
-    legal,
-    number,
+    build_curve,
+    format_number,
+    make_legal,
+    parse_finite,
 )
-from drivetwin.export.parameters.spelling import dotted_name, one_line
-from drivetwin.export.parameters.units import base_units
-from drivetwin.export.parameters.xml_text import child, comment, document, parse_xml
+from drivetwin.export.parameters.spelling import to_dotted_name, to_one_line
+from drivetwin.export.parameters.units import parse_base_units
+from drivetwin.export.parameters.xml_text import (
+    add_child,
+    format_comment,
+    format_document,
+    parse_xml,
+)
 
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 _SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 _INDEXED = re.compile(r"(.+)\[(\d+)\]")
 
 
-def legal_for_ssv(parameters: ParameterSet) -> ParameterSet:
+def convert_for_ssv(parameters: ParameterSet) -> ParameterSet:
     """The set as the format can hold it."""
-    return legal(parameters, dotted_name, one_line, _axis_name)
+    return make_legal(parameters, to_dotted_name, to_one_line, _make_axis_name)
 
 
-def _axis_name(curve: Curve) -> str:
+def _make_axis_name(curve: Curve) -> str:
     return f"{curve.name}.{curve.axis.name}"
 
 
-def ssv_text(parameters: ParameterSet) -> str:
+def format_ssv(parameters: ParameterSet) -> str:
     """Contents of the file."""
-    content = legal_for_ssv(parameters)
+    content = convert_for_ssv(parameters)
     root = ET.Element("ssv:ParameterSet", {"xmlns:ssv": _SSV, "xmlns:ssc": _SSC})
     root.attrib |= {"version": "1.0", "name": content.name, "generationTool": "drivetwin"}
-    listed = child(root, "ssv:Parameters")
+    listed = add_child(root, "ssv:Parameters")
     for scalar in content.scalars:
-        _real(listed, scalar)
+        _add_real(listed, scalar)
     for curve in content.curves:
-        over = _axis_name(curve)
+        over = _make_axis_name(curve)
         for index, (at, value) in enumerate(zip(curve.axis.points, curve.values, strict=True), 1):
-            _real(listed, Scalar(f"{over}[{index}]", at, curve.axis.unit))
+            _add_real(listed, Scalar(f"{over}[{index}]", at, curve.axis.unit))
             text = curve.text if index == 1 else ""
-            _real(listed, Scalar(f"{curve.name}[{index}]", value, curve.unit, text))
-    units = child(root, "ssv:Units")
-    for unit in _units(content):
+            _add_real(listed, Scalar(f"{curve.name}[{index}]", value, curve.unit, text))
+    units = add_child(root, "ssv:Units")
+    for unit in _add_units(content):
         # The format declares whole powers only; a root of torque stays a bare name.
-        if (powers := base_units(unit)) is not None:
+        if (powers := parse_base_units(unit)) is not None:
             base = {name: str(power) for name, power in powers.items()}
-            child(child(units, "ssc:Unit", name=unit), "ssc:BaseUnit", **base)
-    return document(root, comment(content.notes))
+            add_child(add_child(units, "ssc:Unit", name=unit), "ssc:BaseUnit", **base)
+    return format_document(root, format_comment(content.notes))
 
 
-def _real(parent: ET.Element, scalar: Scalar) -> None:
+def _add_real(parent: ET.Element, scalar: Scalar) -> None:
     about = {"description": scalar.text} if scalar.text else {}
-    parameter = child(parent, "ssv:Parameter", name=scalar.name, **about)
-    child(parameter, "ssv:Real", value=number(scalar.value), unit=scalar.unit)
+    parameter = add_child(parent, "ssv:Parameter", name=scalar.name, **about)
+    add_child(parameter, "ssv:Real", value=format_number(scalar.value), unit=scalar.unit)
 
 
-def _units(content: ParameterSet) -> list[str]:
+def _add_units(content: ParameterSet) -> list[str]:
     entries = (one.unit for one in content.entries)
     return sorted({*entries, *(curve.axis.unit for curve in content.curves), "1"})
 
@@ -88,14 +93,16 @@ def parse_ssv(text: str, source: str) -> ParameterSet:
         if real is None:
             skipped.append(name)
             continue
-        value = finite(real.get("value", ""), source, name)
+        value = parse_finite(real.get("value", ""), source, name)
         about = parameter.get("description", "")
         scalars.append(Scalar(name, value, real.get("unit", "1"), about))
-    alone, curves = _gathered(scalars, source)
+    alone, curves = _collect_curves(scalars, source)
     return ParameterSet(root.get("name", Path(source).stem), alone, curves, skipped=tuple(skipped))
 
 
-def _gathered(scalars: list[Scalar], source: str) -> tuple[tuple[Scalar, ...], tuple[Curve, ...]]:
+def _collect_curves(
+    scalars: list[Scalar], source: str
+) -> tuple[tuple[Scalar, ...], tuple[Curve, ...]]:
     """Scalars that stand alone, and the curves among the indexed ones, in the order of indices."""
     indexed: dict[str, list[tuple[int, Scalar]]] = {}
     alone = []
@@ -113,14 +120,18 @@ def _gathered(scalars: list[Scalar], source: str) -> tuple[tuple[Scalar, ...], t
     # What has an axis of its own is a curve, also where its name begins like another's.
     ends = within.keys() - within.values()
     axes = {prefix: name for name, prefix in within.items() if prefix in arrays and name in ends}
-    curves = [_curve(name, arrays[name], axis, arrays[axis], source) for name, axis in axes.items()]
+    curves = [
+        _parse_curve(name, arrays[name], axis, arrays[axis], source) for name, axis in axes.items()
+    ]
     paired = {*axes, *axes.values()}
     alone += [one for name, members in arrays.items() if name not in paired for one in members]
     return tuple(alone), tuple(curves)
 
 
-def _curve(name: str, values: list[Scalar], axis: str, points: list[Scalar], source: str) -> Curve:
-    return curve_of(
+def _parse_curve(
+    name: str, values: list[Scalar], axis: str, points: list[Scalar], source: str
+) -> Curve:
+    return build_curve(
         name,
         Axis(axis.rpartition(".")[2], tuple(one.value for one in points), points[0].unit),
         (one.value for one in values),

@@ -11,10 +11,10 @@ import numpy as np
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, parameters_of
-from drivetwin.export.parameters.spelling import dotted_name, flat_name
+from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, collect_parameters
+from drivetwin.export.parameters.spelling import to_dotted_name, to_flat_name
 from drivetwin.export.parameters.units import is_same_unit
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.twin.twin import SIMULATED
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Update:
     unknown: tuple[str, ...]
 
 
-def updated(twin: Twin, parameters: ParameterSet) -> Update:
+def update_twin(twin: Twin, parameters: ParameterSet) -> Update:
     """Give a twin the values of a file that differ from its own, under drivetwin's own names.
 
     What changes counts as a design value without interval. An unidentified parameter
@@ -48,39 +48,39 @@ def updated(twin: Twin, parameters: ParameterSet) -> Update:
     where a name is given twice, in another unit than the twin's or as a curve instead of a number,
     and for a ratio or a stiffness of zero.
     """
-    own = parameters_of(twin)
+    own = collect_parameters(twin)
     values = {one.name: one for one in own.entries}
-    known, unknown = _known(parameters, _spellings(twin, own))
+    known, unknown = _match_entries(parameters, _collect_spellings(twin, own))
     changed: dict[str, Scalar | Curve] = {}
     idle = []
     for name, entry in known.items():
         _check(name, values.get(name), entry)
-        if _same(values.get(name), entry):
+        if _is_same(values.get(name), entry):
             continue
-        if name in twin.parameters and spec_of(name).stem not in SIMULATED:
+        if name in twin.parameters and get_parameter_spec(name).stem not in SIMULATED:
             idle.append(name)
         else:
             changed[name] = entry
     made = twin
     for name, entry in changed.items():
         made = (
-            _with_curve(made, name, entry, changed)
+            _set_curve(made, name, entry, changed)
             if isinstance(entry, Curve)
-            else _with(made, name, entry.value)
+            else _set_number(made, name, entry.value)
         )
     if any(name in twin.covariance_ids for name in changed):
         made = replace(made, covariance_ids=(), covariance=None)
     return Update(made, tuple(changed), tuple(idle), tuple(unknown))
 
 
-def _spellings(twin: Twin, own: ParameterSet) -> dict[str, str]:
+def _collect_spellings(twin: Twin, own: ParameterSet) -> dict[str, str]:
     """Own name by every way a format spells it, also of parameters without a value."""
     names = [one.name for one in own.entries]
     names += [name for name in twin.parameters if name not in names]
-    return {spell(name): name for spell in (flat_name, dotted_name, str) for name in names}
+    return {spell(name): name for spell in (to_flat_name, to_dotted_name, str) for name in names}
 
 
-def _known(
+def _match_entries(
     parameters: ParameterSet, spelled: dict[str, str]
 ) -> tuple[dict[str, Scalar | Curve], list[str]]:
     """The entries of a file by own name, and the names of the others."""
@@ -105,7 +105,7 @@ def _check(name: str, own: Scalar | Curve | None, given: Scalar | Curve) -> None
             f"the file gives {name} as a {_KINDS[type(given)]}, not as a {_KINDS[kind]}",
             "give it as it was exported",
         )
-    unit = spec_of(name).unit if own is None else own.unit
+    unit = get_parameter_spec(name).unit if own is None else own.unit
     pairs = [(given.unit, unit)]
     if isinstance(own, Curve) and isinstance(given, Curve):
         pairs.append((given.axis.unit, own.axis.unit))
@@ -120,7 +120,7 @@ def _check(name: str, own: Scalar | Curve | None, given: Scalar | Curve) -> None
         raise InputError(f"{name} = 0 is impossible", "give it a value other than zero")
 
 
-def _same(own: Scalar | Curve | None, given: Scalar | Curve) -> bool:
+def _is_same(own: Scalar | Curve | None, given: Scalar | Curve) -> bool:
     if isinstance(own, Scalar) and isinstance(given, Scalar):
         return own.value == given.value
     if isinstance(own, Curve) and isinstance(given, Curve):
@@ -128,7 +128,7 @@ def _same(own: Scalar | Curve | None, given: Scalar | Curve) -> bool:
     return False
 
 
-def _with(twin: Twin, name: str, value: float) -> Twin:
+def _set_number(twin: Twin, name: str, value: float) -> Twin:
     """The twin with one number changed."""
     field, _, element = name.partition(".")
     if name == "i_in":
@@ -142,7 +142,7 @@ def _with(twin: Twin, name: str, value: float) -> Twin:
         changes: dict[str, Any] = {element: value}
         return replace(twin, load_law=replace(twin.load_law, **changes))
     if field in LAW_FIELDS:
-        return _with_law(twin, element, field, value)
+        return _set_law_field(twin, element, field, value)
     if field in DESIGN_FIELDS and name not in twin.parameters:
         changes = {field: value}
         design = replace(twin.elements[element], **changes)
@@ -151,7 +151,7 @@ def _with(twin: Twin, name: str, value: float) -> Twin:
     return replace(twin, parameters={**twin.parameters, name: told})
 
 
-def _with_law(twin: Twin, element: str, field: str, value: float) -> Twin:
+def _set_law_field(twin: Twin, element: str, field: str, value: float) -> Twin:
     curve = twin.friction[element]
     assert curve.stribeck is not None  # Else the twin would not know the name.
     changes: dict[str, Any] = {field: value}
@@ -160,7 +160,7 @@ def _with_law(twin: Twin, element: str, field: str, value: float) -> Twin:
     return replace(twin, friction={**twin.friction, element: changed})
 
 
-def _with_curve(twin: Twin, name: str, given: Curve, changed: dict[str, Scalar | Curve]) -> Twin:
+def _set_curve(twin: Twin, name: str, given: Curve, changed: dict[str, Scalar | Curve]) -> Twin:
     element = name.removeprefix("mu.")
     both = [field for field in LAW_FIELDS if f"{field}.{element}" in changed]
     if both:

@@ -21,14 +21,14 @@ _BASE = {
 _FACTOR = re.compile(r"([A-Za-z]+|1)(?:\^(\d+(?:\.\d+)?))?")
 
 
-def base_units(unit: str) -> dict[str, int] | None:
+def parse_base_units(unit: str) -> dict[str, int] | None:
     """Powers of kg, m, s and rad behind a unit; None where they are not whole numbers.
 
     What follows a `/` is one denominator, with or without parentheses. Raises InputError for a
     unit that is not made of these.
     """
     powers: dict[str, Fraction] = {}
-    for sign, group in _groups(unit):
+    for sign, group in _parse_groups(unit):
         for name, power in group:
             for base, own in _BASE[name].items():
                 powers[base] = powers.get(base, Fraction(0)) + sign * power * own
@@ -45,20 +45,20 @@ def is_same_unit(stated: str, expected: str) -> bool:
     if stated in ("1", expected):
         return True
     try:
-        return base_units(stated) == base_units(expected)
+        return parse_base_units(stated) == parse_base_units(expected)
     except InputError:
         return False
 
 
-def _groups(unit: str) -> list[tuple[int, list[tuple[str, Fraction]]]]:
+def _parse_groups(unit: str) -> list[tuple[int, list[tuple[str, Fraction]]]]:
     numerators, *denominators = unit.replace("(", "").replace(")", "").split("/")
     return [
-        (sign, [_factor(part, unit) for part in group.split("*")])
+        (sign, [_parse_factor(part, unit) for part in group.split("*")])
         for sign, group in ((1, numerators), *((-1, each) for each in denominators))
     ]
 
 
-def _factor(text: str, unit: str) -> tuple[str, Fraction]:
+def _parse_factor(text: str, unit: str) -> tuple[str, Fraction]:
     found = _FACTOR.fullmatch(text.strip())
     if found is None or found[1] not in _BASE:
         raise InputError(

@@ -9,20 +9,20 @@ from collections.abc import Iterable
 from drivetwin.errors import FileFormatError, Where
 
 
-def child(parent: ET.Element, tag: str, text: str = "", **attributes: str) -> ET.Element:
+def add_child(parent: ET.Element, tag: str, text: str = "", **attributes: str) -> ET.Element:
     """Append an element with a text and return it."""
     element = ET.SubElement(parent, tag, attributes)
     element.text = text or None
     return element
 
 
-def comment(lines: Iterable[str]) -> str:
+def format_comment(lines: Iterable[str]) -> str:
     """The lines as one XML comment, which may not hold two hyphens; nothing without lines."""
     text = "\n".join(f"  {line}" for line in lines).replace("--", "- -")
     return f"<!--\n{text}\n-->" if text else ""
 
 
-def document(root: ET.Element, *heads: str) -> str:
+def format_document(root: ET.Element, *heads: str) -> str:
     """The tree as indented UTF-8 text, behind the declaration and further `heads`."""
     ET.indent(root)
     body = ET.tostring(root, encoding="unicode")
@@ -44,6 +44,6 @@ def parse_xml(text: str, source: str) -> ET.Element:
         ) from None
 
 
-def text_at(element: ET.Element, path: str) -> str:
+def get_text(element: ET.Element, path: str) -> str:
     """Text of the first element at `path`, empty where there is none."""
     return (element.findtext(path) or "").strip()

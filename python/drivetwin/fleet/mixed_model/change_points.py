@@ -47,41 +47,43 @@ def find_steps(
     members = [np.flatnonzero(unit == each) for each in range(int(unit.max()) + 1)]
     members = [rows[np.argsort(reading[rows], kind="stable")] for rows in members]
     members = [rows for rows in members if rows.size >= _LEAST_LOGS]
-    tried = sum(len(_splits(rows.size)) for rows in members)
+    tried = sum(len(_list_splits(rows.size)) for rows in members)
     if not tried:
         return []
     limit = float(norm.isf(0.5 * FALSE_ALARMS / tried))
     found: list[Step] = []
     for rows in members:
-        found += _within(int(unit[rows[0]]), reading[rows], residual[rows], variance[rows], limit)
+        found += _find_unit_steps(
+            int(unit[rows[0]]), reading[rows], residual[rows], variance[rows], limit
+        )
     return found
 
 
-def _splits(count: int) -> IntArray:
+def _list_splits(count: int) -> IntArray:
     places = np.linspace(_LEAST_PART, count - _LEAST_PART, min(_SPLITS, count))
     return np.unique(places.astype(np.int_))
 
 
-def _within(
+def _find_unit_steps(
     unit: int, reading: FloatArray, values: FloatArray, variance: FloatArray, limit: float
 ) -> list[Step]:
     """The largest step of one unit, then those on either side of it."""
     if reading.size < _LEAST_LOGS:
         return []
-    step = _largest(unit, reading, values, variance)
+    step = _find_largest_step(unit, reading, values, variance)
     if step is None or abs(step.z) < limit:
         return []
     place = int(np.searchsorted(reading, step.after))
     parts: Sequence[slice] = (slice(0, place), slice(place, None))
-    sides = [_within(unit, reading[p], values[p], variance[p], limit) for p in parts]
+    sides = [_find_unit_steps(unit, reading[p], values[p], variance[p], limit) for p in parts]
     return [*sides[0], step, *sides[1]]
 
 
-def _largest(
+def _find_largest_step(
     unit: int, reading: FloatArray, values: FloatArray, variance: FloatArray
 ) -> Step | None:
     """Find the most significant step, in addition to the unit's own level and drift."""
-    places = [int(k) for k in _splits(reading.size) if reading[k] > reading[k - 1]]
+    places = [int(k) for k in _list_splits(reading.size) if reading[k] > reading[k - 1]]
     if not places or reading[-1] == reading[0]:
         return None
     root = np.sqrt(variance)

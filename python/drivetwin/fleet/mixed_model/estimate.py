@@ -10,10 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.fleet.mixed_model.change_points import Step, find_steps
-from drivetwin.fleet.mixed_model.mixed import FloatArray, IntArray, MixedFit, Observations, fit
-from drivetwin.fleet.mixed_model.observations import LogFacts, Observed, facts, observed
-from drivetwin.fleet.mixed_model.outliers import limit, roughly_sound, unit_limit, unit_scores
-from drivetwin.fleet.mixed_model.reasons import reasons
+from drivetwin.fleet.mixed_model.mixed import (
+    FloatArray,
+    IntArray,
+    MixedFit,
+    Observations,
+    fit_mixed_model,
+)
+from drivetwin.fleet.mixed_model.observations import (
+    LogFacts,
+    Observed,
+    collect_facts,
+    collect_observations,
+)
+from drivetwin.fleet.mixed_model.outliers import (
+    compute_outlier_limit,
+    compute_unit_limit,
+    compute_unit_scores,
+    select_plausible,
+)
+from drivetwin.fleet.mixed_model.reasons import attach_reasons
 from drivetwin.fleet.mixed_model.result import (
     Change,
     Drift,
@@ -24,7 +40,7 @@ from drivetwin.fleet.mixed_model.result import (
 )
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 
 Mask = NDArray[np.bool_]
 
@@ -41,27 +57,29 @@ _MIXED = (
 )
 
 
-def joint_estimates(store: Store, wanted: Sequence[str] = ()) -> list[JointEstimate]:
+def estimate_fleet(store: Store, wanted: Sequence[str] = ()) -> list[JointEstimate]:
     """Estimate all parameters, or the `wanted` ones by id, over the fleet.
 
     Parameters with too few logs for that, fewer than four more than unknowns, are left out.
     """
-    known = facts(store)
+    known = collect_facts(store)
     plain = {log: fact for log, (_, fact) in known.items()}
     found = []
-    for seen in observed(store, known):
+    for seen in collect_observations(store, known):
         if not wanted or seen.parameter in wanted:
-            one = estimate(seen, plain)
+            one = estimate_parameter(seen, plain)
             if one is not None:
                 found.append(one)
-    return reasons(store, found)
+    return attach_reasons(store, found)
 
 
-def untold(store: Store, found: Sequence[JointEstimate], wanted: Sequence[str] = ()) -> list[str]:
+def list_missing_estimates(
+    store: Store, found: Sequence[JointEstimate], wanted: Sequence[str] = ()
+) -> list[str]:
     """Ids of the parameters of a store, or the `wanted` ones, that have no joint estimate: too few
     logs tell them, or all have the card's design value.
     """
-    names = store.rows(RowKind.PARAMETER).column("name").to_pylist()
+    names = store.read_rows(RowKind.PARAMETER).column("name").to_pylist()
     told = {one.parameter for one in found}
     return [name for name in dict.fromkeys(wanted or names) if name not in told]
 
@@ -87,7 +105,7 @@ class _Data:
         middle, width = self.readings.mean(axis=0), self.readings.std(axis=0)
         return np.asarray((self.readings - middle) / width, dtype=np.float64)
 
-    def design(self, group: IntArray) -> tuple[FloatArray, FloatArray]:
+    def make_design(self, group: IntArray) -> tuple[FloatArray, FloatArray]:
         """Fixed effects (n, p): level and drifts; random effects (n, q) of the groups."""
         ones = np.ones((self.value.size, 1))
         groups = int(group.max()) + 1
@@ -98,25 +116,25 @@ class _Data:
         return np.hstack([ones, self.scaled]), np.hstack([ones, random])
 
 
-def estimate(seen: Observed, known: Mapping[str, LogFacts]) -> JointEstimate | None:
+def estimate_parameter(seen: Observed, known: Mapping[str, LogFacts]) -> JointEstimate | None:
     """Estimate one parameter; None if there are too few logs."""
-    data = _data(seen, known)
+    data = _collect_data(seen, known)
     if data is None:
         return None
-    sound = roughly_sound(data.value, data.unit)
+    sound = select_plausible(data.value, data.unit)
     first = _fit(data, data.unit, sound)
     if first is None:
         return None
-    steps = _steps(data, first, sound)
-    group, since = _groups(data, steps)
-    found, sound = _without_outliers(data, group, sound)
+    steps = _find_unit_changes(data, first, sound)
+    group, since = _assign_groups(data, steps)
+    found, sound = _fit_rejecting_outliers(data, group, sound)
     if found is None:
         return None
-    return _conclude(seen, known, _Settled(data, steps, group, since, found, sound))
+    return _assemble_estimate(seen, known, _FitBasis(data, steps, group, since, found, sound))
 
 
 @dataclass(frozen=True, eq=False)
-class _Settled:
+class _FitBasis:
     """Basis of the conclusions.
 
     The groups are units; a unit is divided at a step, which lies at the reading `since`. `sound`
@@ -131,7 +149,7 @@ class _Settled:
     sound: Mask
 
 
-def _data(seen: Observed, known: Mapping[str, LogFacts]) -> _Data | None:
+def _collect_data(seen: Observed, known: Mapping[str, LogFacts]) -> _Data | None:
     every = [known[log] for log in seen.logs]
     names = dict.fromkeys(name for fact in every for name in fact.fields)
     common = [n for n in names if sum(n in f.fields for f in every) >= _KNOWN_SHARE * len(every)]
@@ -139,7 +157,7 @@ def _data(seen: Observed, known: Mapping[str, LogFacts]) -> _Data | None:
     if len(kept) < 4:
         return None
     readings = np.array([[every[k].fields[name] for name in common] for k in kept], dtype=float)
-    fields, notes = _usable_fields(common, readings.reshape(len(kept), len(common)))
+    fields, notes = _select_usable_fields(common, readings.reshape(len(kept), len(common)))
     settings = {every[k].settings for k in kept}
     if len(settings) > 1:
         notes = (*notes, _MIXED.format(len(settings)))
@@ -157,7 +175,9 @@ def _data(seen: Observed, known: Mapping[str, LogFacts]) -> _Data | None:
     )
 
 
-def _usable_fields(names: Sequence[str], readings: FloatArray) -> tuple[list[int], tuple[str, ...]]:
+def _select_usable_fields(
+    names: Sequence[str], readings: FloatArray
+) -> tuple[list[int], tuple[str, ...]]:
     """Select the fields that vary and are separable from earlier ones; also return the rejects."""
     used: list[int] = []
     notes = []
@@ -175,13 +195,13 @@ def _usable_fields(names: Sequence[str], readings: FloatArray) -> tuple[list[int
 
 def _fit(data: _Data, group: IntArray, sound: Mask, *, intervals: bool = False) -> MixedFit | None:
     """Fit over the sound logs; residuals and variances of all. None with too few logs."""
-    x, z = data.design(group)
+    x, z = data.make_design(group)
     kept = np.flatnonzero(sound)
     present, inverse = np.unique(group[kept], return_inverse=True)
     if kept.size < x.shape[1] + z.shape[1] + 4:
         return None
     seen = Observations(data.value[kept], data.std[kept], inverse, x[kept], z[kept])
-    found = fit(seen, intervals=intervals)
+    found = fit_mixed_model(seen, intervals=intervals)
     groups = int(group.max()) + 1
     deviation = np.zeros((groups, z.shape[1]))
     error = np.tile(found.sigma, (groups, 1))
@@ -199,17 +219,17 @@ def _fit(data: _Data, group: IntArray, sound: Mask, *, intervals: bool = False) 
     )
 
 
-def _steps(data: _Data, first: MixedFit, sound: Mask) -> list[Step]:
+def _find_unit_changes(data: _Data, first: MixedFit, sound: Mask) -> list[Step]:
     """Changes of units over the first field."""
     if not data.fields:
         return []
     kept = np.flatnonzero(sound)
-    x, _ = data.design(data.unit)
+    x, _ = data.make_design(data.unit)
     left = data.value - x @ first.beta
     return find_steps(data.unit[kept], data.readings[kept, 0], left[kept], first.variance[kept])
 
 
-def _groups(data: _Data, steps: Sequence[Step]) -> tuple[IntArray, tuple[float | None, ...]]:
+def _assign_groups(data: _Data, steps: Sequence[Step]) -> tuple[IntArray, tuple[float | None, ...]]:
     """Units as groups (n,); a unit that changed is a new one from there on."""
     group = data.unit.copy()
     since: list[float | None] = [None] * len(data.names)
@@ -220,9 +240,11 @@ def _groups(data: _Data, steps: Sequence[Step]) -> tuple[IntArray, tuple[float |
     return group, tuple(since)
 
 
-def _without_outliers(data: _Data, group: IntArray, sound: Mask) -> tuple[MixedFit | None, Mask]:
+def _fit_rejecting_outliers(
+    data: _Data, group: IntArray, sound: Mask
+) -> tuple[MixedFit | None, Mask]:
     """Fit, leave out what does not fit, and again until nothing changes."""
-    bound = limit(data.value.size)
+    bound = compute_outlier_limit(data.value.size)
     found = _fit(data, group, sound)
     for _ in range(_ROUNDS):
         if found is None:
@@ -235,28 +257,30 @@ def _without_outliers(data: _Data, group: IntArray, sound: Mask) -> tuple[MixedF
     return _fit(data, group, sound, intervals=True), sound
 
 
-def _conclude(seen: Observed, known: Mapping[str, LogFacts], end: _Settled) -> JointEstimate:
+def _assemble_estimate(
+    seen: Observed, known: Mapping[str, LogFacts], end: _FitBasis
+) -> JointEstimate:
     data, found = end.data, end.fit
     nothing = np.full(data.value.size, np.nan)
     spread = bool(found.sigma.size)
     return JointEstimate(
         parameter=seen.parameter,
         rule=seen.rule,
-        si_unit=spec_of(seen.parameter).unit,
+        si_unit=get_parameter_spec(seen.parameter).unit,
         logs=data.value.size,
         left_out=seen.left_out + len(seen.logs) - data.value.size,
         value=float(found.beta[0]),
-        ci95=_interval(found, 0, 1.0),
+        ci95=_scale_interval(found, 0, 1.0),
         spread=float(found.sigma[0]) if spread else None,
         spread_ci95=(float(found.sigma_ci[0, 0]), float(found.sigma_ci[0, 1])) if spread else None,
         excess=found.excess,
-        drifts=_drifts(data, found),
-        units=_units(end),
+        drifts=_collect_drifts(data, found),
+        units=_collect_units(end),
         changes=tuple(
             Change(data.names[s.unit], data.fields[0], s.before, s.after, s.size, s.std)
             for s in end.steps
         ),
-        outliers=_outliers(end, known),
+        outliers=_collect_outliers(end, known),
         notes=data.notes,
         points=Points(
             data.readings[:, 0] if data.fields else nothing,
@@ -267,18 +291,18 @@ def _conclude(seen: Observed, known: Mapping[str, LogFacts], end: _Settled) -> J
     )
 
 
-def _interval(found: MixedFit, place: int, scale: float) -> tuple[float, float]:
+def _scale_interval(found: MixedFit, place: int, scale: float) -> tuple[float, float]:
     middle, half = float(found.beta[place]), float(found.half[place])
     return (middle - half) / scale, (middle + half) / scale
 
 
-def _drifts(data: _Data, found: MixedFit) -> tuple[Drift, ...]:
+def _collect_drifts(data: _Data, found: MixedFit) -> tuple[Drift, ...]:
     scales = data.readings.std(axis=0)
     return tuple(
         Drift(
             field=name,
             slope=float(found.beta[1 + k] / scales[k]),
-            ci95=_interval(found, 1 + k, float(scales[k])),
+            ci95=_scale_interval(found, 1 + k, float(scales[k])),
             reference=float(data.readings[:, k].mean()),
             spread=float(found.sigma[1] / scales[k]) if k == 0 and found.sigma.size > 1 else None,
         )
@@ -286,13 +310,13 @@ def _drifts(data: _Data, found: MixedFit) -> tuple[Drift, ...]:
     )
 
 
-def _units(end: _Settled) -> tuple[UnitValue, ...]:
+def _collect_units(end: _FitBasis) -> tuple[UnitValue, ...]:
     """Collect the deviations of the units, before and after changes."""
     if not end.fit.sigma.size:
         return ()
     deviation = end.fit.deviation[:, 0]
-    scores = unit_scores(deviation)
-    bound = unit_limit(deviation.size)
+    scores = compute_unit_scores(deviation)
+    bound = compute_unit_limit(deviation.size)
     owner = {int(g): int(u) for g, u in zip(end.group, end.data.unit, strict=True)}
     return tuple(
         UnitValue(
@@ -308,7 +332,7 @@ def _units(end: _Settled) -> tuple[UnitValue, ...]:
     )
 
 
-def _outliers(end: _Settled, known: Mapping[str, LogFacts]) -> tuple[Outlier, ...]:
+def _collect_outliers(end: _FitBasis, known: Mapping[str, LogFacts]) -> tuple[Outlier, ...]:
     """Logs that were left out, the farthest first."""
     data = end.data
     score = end.fit.residual / np.sqrt(end.fit.variance)

@@ -98,15 +98,15 @@ class _Likelihood:
         self.seen = seen
         self.square = seen.std**2
         self.typical = float(np.median(self.square))
-        self.weighted = lru_cache(8)(self._weighted)
+        self.weighted = lru_cache(8)(self._apply_weights)
 
-    def variance(self, w: float) -> FloatArray:
+    def compute_variance(self, w: float) -> FloatArray:
         """d (n,): the stated variances times e^w below w = 0, plus a common one above."""
         if w <= 0.0:
             return self.square * float(np.exp(w))
         return self.square + self.typical * float(np.exp(w) - 1.0)
 
-    def _sums(self, left: FloatArray, right: FloatArray, weight: FloatArray) -> FloatArray:
+    def _compute_sums(self, left: FloatArray, right: FloatArray, weight: FloatArray) -> FloatArray:
         """Sums over each unit of left·weight·rightᵀ: (units, columns, columns)."""
         if not left.shape[1]:
             return np.zeros((self.seen.units, 0, right.shape[1]))
@@ -116,14 +116,14 @@ class _Likelihood:
         shape = (self.seen.units, left.shape[1], right.shape[1])
         return np.stack(sums, axis=1).reshape(shape).astype(np.float64)
 
-    def _weighted(self, w: float) -> _Weighted:
-        seen, d = self.seen, self.variance(w)
+    def _apply_weights(self, w: float) -> _Weighted:
+        seen, d = self.seen, self.compute_variance(w)
         weight, known = 1.0 / d, np.column_stack([self.seen.x, self.seen.y])
         return _Weighted(
             float(np.log(d).sum()),
             known.T @ (weight[:, None] * known),
-            self._sums(seen.z, seen.z, weight),
-            self._sums(seen.z, known, weight),
+            self._compute_sums(seen.z, seen.z, weight),
+            self._compute_sums(seen.z, known, weight),
         )
 
     def solve(self, parameters: FloatArray) -> _Solved:
@@ -141,12 +141,12 @@ class _Likelihood:
         deviance = float(logs + np.linalg.slogdet(information)[1] + rest)
         return _Solved(deviance, beta, information, middle, cross)
 
-    def deviance(self, parameters: FloatArray) -> float:
+    def compute_deviance(self, parameters: FloatArray) -> float:
         """Minus twice the restricted log-likelihood, to a constant."""
         return self.solve(parameters).deviance
 
 
-def fit(seen: Observations, *, intervals: bool = True) -> MixedFit:
+def fit_mixed_model(seen: Observations, *, intervals: bool = True) -> MixedFit:
     """Fit the model; y may have any scale. Needs n > p + q, and two units where q > 0.
 
     Without `intervals`, which take most of the time, `sigma_ci` is NaN.
@@ -158,18 +158,18 @@ def fit(seen: Observations, *, intervals: bool = True) -> MixedFit:
     centred = (seen.y - seen.x @ start) / scale
     scaled = Observations(centred, seen.std / scale, seen.unit, seen.x, seen.z)
     likelihood = _Likelihood(scaled)
-    best = _minimum(likelihood)
+    best = _find_minimum(likelihood)
     solved = likelihood.solve(best)
     sigma = np.where(np.exp(best[1:]) <= 2.0 * _SMALLEST, 0.0, np.exp(best[1:]))
     ci = np.full((sigma.size, 2), np.nan)
     if intervals:
         for k in range(sigma.size):
-            ci[k] = _profile(likelihood, best, 1 + k)
+            ci[k] = _find_profile_interval(likelihood, best, 1 + k)
     covariance = np.asarray(np.linalg.inv(solved.information), dtype=np.float64)
     free = (seen.units if sigma.size else seen.y.size) - seen.x.shape[1]
     quantile = float(t.ppf(0.975, max(free, 1)))
-    deviation, deviation_std = _deviations(solved, np.exp(best[1:]))
-    d = likelihood.variance(float(best[0]))
+    deviation, deviation_std = _predict_deviations(solved, np.exp(best[1:]))
+    d = likelihood.compute_variance(float(best[0]))
     effects = np.sum(scaled.z * deviation[scaled.unit], axis=1)
     residual = scaled.y - scaled.x @ solved.beta - effects
     return MixedFit(
@@ -186,36 +186,38 @@ def fit(seen: Observations, *, intervals: bool = True) -> MixedFit:
     )
 
 
-def _bounds(count: int) -> list[tuple[float, float]]:
+def _make_bounds(count: int) -> list[tuple[float, float]]:
     return [(-6.0, 12.0)] + count * [(np.log(_SMALLEST), np.log(_LARGEST))]
 
 
-def _minimum(likelihood: _Likelihood) -> FloatArray:
+def _find_minimum(likelihood: _Likelihood) -> FloatArray:
     """The best of a few starts: little and much spread over units."""
     count = likelihood.seen.z.shape[1]
     found = [
         minimize(
-            likelihood.deviance,
+            likelihood.compute_deviance,
             np.array([0.0, *[np.log(spread)] * count]),
             method="L-BFGS-B",
-            bounds=_bounds(count),
+            bounds=_make_bounds(count),
         )
         for spread in (0.1, 3.0)
     ]
     return np.asarray(min(found, key=lambda one: float(one.fun)).x)
 
 
-def _profile(likelihood: _Likelihood, best: FloatArray, place: int) -> tuple[float, float]:
+def _find_profile_interval(
+    likelihood: _Likelihood, best: FloatArray, place: int
+) -> tuple[float, float]:
     """Find where the profile deviance is 3.84 above its minimum: a 95 % interval of σ."""
     others = [k for k in range(best.size) if k != place]
-    bounds = [_bounds(best.size - 1)[k] for k in others]
-    lowest = likelihood.deviance(best)
+    bounds = [_make_bounds(best.size - 1)[k] for k in others]
+    lowest = likelihood.compute_deviance(best)
 
     def above(log_sigma: float) -> float:
         def deviance(free: FloatArray) -> float:
             parameters = np.empty_like(best)
             parameters[place], parameters[others] = log_sigma, free
-            return likelihood.deviance(parameters)
+            return likelihood.compute_deviance(parameters)
 
         found = minimize(deviance, best[others], method="L-BFGS-B", bounds=bounds)
         return float(found.fun) - lowest - _CHI2_95
@@ -227,7 +229,7 @@ def _profile(likelihood: _Likelihood, best: FloatArray, place: int) -> tuple[flo
     return below, beyond
 
 
-def _deviations(solved: _Solved, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _predict_deviations(solved: _Solved, root: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Best prediction of each unit's effects and its standard error, β's own error included."""
     inverse = np.linalg.inv(solved.middle)
     pulls = solved.pulls

@@ -33,7 +33,7 @@ class LogFacts:
 class Observed:
     """One parameter of the vehicles that one rule reads: `value` (n,) and `std` (n,) by log.
 
-    The values exclude design priors. `left_out` counts the logs without a value.
+    The values exclude design priors. `run_score_tests` counts the logs without a value.
     """
 
     parameter: str
@@ -44,10 +44,10 @@ class Observed:
     left_out: int
 
 
-def facts(store: Store) -> dict[str, tuple[str, LogFacts]]:
+def collect_facts(store: Store) -> dict[str, tuple[str, LogFacts]]:
     """Rule and facts of each log as its file was seen last; a log at several places once."""
     means: dict[str, dict[str, float]] = {}
-    columns = store.rows(RowKind.FIELD).select(["log", "name", "value"]).to_pydict()
+    columns = store.read_rows(RowKind.FIELD).select(["log", "name", "value"]).to_pydict()
     for log, name, value in zip(columns["log"], columns["name"], columns["value"], strict=True):
         means.setdefault(log, {})[name] = value
     found: dict[str, tuple[str, LogFacts]] = {}
@@ -61,7 +61,7 @@ def facts(store: Store) -> dict[str, tuple[str, LogFacts]]:
     return found
 
 
-def observed(store: Store, known: Mapping[str, tuple[str, LogFacts]]) -> list[Observed]:
+def collect_observations(store: Store, known: Mapping[str, tuple[str, LogFacts]]) -> list[Observed]:
     """All parameters with a value in some log, by rule, in the order of the first log.
 
     Fixed values of the card are omitted, because they contain no data of the fleet. Without any
@@ -69,18 +69,18 @@ def observed(store: Store, known: Mapping[str, tuple[str, LogFacts]]) -> list[Ob
     """
     import pyarrow.compute as pc
 
-    rows = store.rows(RowKind.PARAMETER)
+    rows = store.read_rows(RowKind.PARAMETER)
     found = []
     for name in dict.fromkeys(rows.column("name").to_pylist()):
         columns = rows.filter(pc.equal(rows.column("name"), name)).to_pydict()
         for rule in sorted({known[log][0] for log in columns["log"] if log in known}):
-            one = _one(name, rule, columns, known)
+            one = _collect_parameter(name, rule, columns, known)
             if one.value.size:
                 found.append(one)
     return found
 
 
-def _one(
+def _collect_parameter(
     name: str,
     rule: str,
     columns: Mapping[str, list[object]],
@@ -102,10 +102,12 @@ def _one(
         stds.append(std)
     numbers = np.array(values, dtype=float)
     errors = np.array(stds, dtype=float)
-    return Observed(name, rule, tuple(logs), numbers, _filled(numbers, errors), left_out)
+    return Observed(
+        name, rule, tuple(logs), numbers, _fill_missing_errors(numbers, errors), left_out
+    )
 
 
-def _filled(values: FloatArray, errors: FloatArray) -> FloatArray:
+def _fill_missing_errors(values: FloatArray, errors: FloatArray) -> FloatArray:
     """Errors (n,) with those that are not stated put in: the middle of the others, or the scatter
     of the values.
     """

@@ -25,17 +25,17 @@ _ROUGH = 8.0
 """Robust standard deviations beyond which a log does not take part in the first fit."""
 
 
-def limit(count: int) -> float:
+def compute_outlier_limit(count: int) -> float:
     """Standard deviations beyond which one of `count` is an outlier."""
     return max(_LEAST_LIMIT, float(norm.isf(0.5 * FALSE_ALARMS / max(count, 1))))
 
 
-def unit_limit(count: int) -> float:
+def compute_unit_limit(count: int) -> float:
     """Score beyond which one of `count` units is more than chance makes."""
-    return max(limit(count), float(np.interp(count, _FEW_UNITS, _FEW_LIMITS)))
+    return max(compute_outlier_limit(count), float(np.interp(count, _FEW_UNITS, _FEW_LIMITS)))
 
 
-def roughly_sound(values: FloatArray, unit: IntArray) -> NDArray[np.bool_]:
+def select_plausible(values: FloatArray, unit: IntArray) -> NDArray[np.bool_]:
     """Return the mask of the values (n,) near their unit's median, usable in a first fit."""
     middles = np.array([np.median(values[unit == k]) for k in range(int(unit.max()) + 1)])
     away = np.abs(values - middles[unit])
@@ -43,7 +43,7 @@ def roughly_sound(values: FloatArray, unit: IntArray) -> NDArray[np.bool_]:
     return np.asarray(away <= _ROUGH * scale) if scale > 0.0 else np.ones(values.size, np.bool_)
 
 
-def unit_scores(deviation: FloatArray) -> FloatArray:
+def compute_unit_scores(deviation: FloatArray) -> FloatArray:
     """Return the robust z-score (units,) of each unit's deviation.
 
     NaN if there are too few units.

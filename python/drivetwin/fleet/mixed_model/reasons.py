@@ -17,7 +17,7 @@ _WORST = 0.02
 """Share of the fleet with the poorest fits, in which a fit is a reason."""
 
 
-def reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEstimate]:
+def attach_reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEstimate]:
     """The estimates with a reason at each outlier: its distance, other parameters that are out
     too, a poor fit of the simulation, and the log's own warnings.
     """
@@ -27,18 +27,18 @@ def reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEstimate]
     for one in found:
         for outlier in one.outliers:
             also.setdefault(outlier.log, []).append(one.parameter)
-    fits = output_fits(store)
-    warnings = _warnings(store, also)
+    fits = collect_output_fits(store)
+    warnings = _collect_warnings(store, also)
 
     def told(one: JointEstimate, outlier: Outlier) -> Outlier:
         others = [name for name in also[outlier.log] if name != one.parameter]
         parts = [
-            f"{abs(outlier.score):.1f} standard deviations {_side(outlier)} what unit "
+            f"{abs(outlier.score):.1f} standard deviations {_describe_side(outlier)} what unit "
             f"{outlier.unit} lets expect"
         ]
         if others:
             parts.append(f"so are its {', '.join(others)}")
-        if poor := _poor(fits, outlier.log):
+        if poor := _describe_poor_fit(fits, outlier.log):
             parts.append(poor)
         parts += warnings.get(outlier.log, [])[:2]
         return replace(outlier, reason="; ".join(parts))
@@ -49,21 +49,21 @@ def reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEstimate]
     ]
 
 
-def _side(outlier: Outlier) -> str:
+def _describe_side(outlier: Outlier) -> str:
     return "above" if outlier.score > 0.0 else "below"
 
 
-def output_fits(store: Store) -> dict[str, float]:
+def collect_output_fits(store: Store) -> dict[str, float]:
     """Return the fit of the output torque [%] by log, for the logs that have one."""
     import pyarrow.compute as pc
 
-    rows = store.rows(RowKind.FIT)
+    rows = store.read_rows(RowKind.FIT)
     picked = rows.filter(pc.equal(rows.column("name"), _FIT)).to_pydict()
     pairs = zip(picked["log"], picked["value"], strict=True)
     return {log: value for log, value in pairs if value is not None}
 
 
-def _poor(fits: dict[str, float], log: str) -> str:
+def _describe_poor_fit(fits: dict[str, float], log: str) -> str:
     """Words for a fit that is among the poorest of the fleet; empty for another."""
     if log not in fits:
         return ""
@@ -76,8 +76,8 @@ def _poor(fits: dict[str, float], log: str) -> str:
     )
 
 
-def _warnings(store: Store, wanted: dict[str, list[str]]) -> dict[str, list[str]]:
-    rows = store.rows(RowKind.WARNING).select(["log", "reason"]).to_pydict()
+def _collect_warnings(store: Store, wanted: dict[str, list[str]]) -> dict[str, list[str]]:
+    rows = store.read_rows(RowKind.WARNING).select(["log", "reason"]).to_pydict()
     found: dict[str, list[str]] = {}
     for log, text in zip(rows["log"], rows["reason"], strict=True):
         if log in wanted:

@@ -13,9 +13,9 @@ import numpy as np
 
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.estimation.linear.friction_points import P0, stribeck
+from drivetwin.estimation.linear.friction_points import P0, evaluate_stribeck
 from drivetwin.estimation.result.estimate import FloatArray
-from drivetwin.estimation.result.prior_update import without_prior
+from drivetwin.estimation.result.prior_update import remove_prior
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _LAW_SIZE = P0
@@ -31,24 +31,24 @@ class FreeFriction:
     P0_std: float
 
 
-def free_friction(
+def remove_friction_prior(
     found: Identification, card: VehicleCard, element: str, slip: float
 ) -> FreeFriction | None:
     """Friction at `slip` [rad/s] and P0 of an element without the card's prior of P0.
 
     None if the method yields no covariance of the two, or the log has no data on P0 itself.
     """
-    posterior = _posterior(found, element)
+    posterior = _get_posterior(found, element)
     if posterior is None:
         return None
     theta, covariance = posterior
-    mu, slopes = stribeck(theta, np.array([slip]))
+    mu, slopes = evaluate_stribeck(theta, np.array([slip]))
     to_pair = np.zeros((2, _LAW_SIZE + 1))
     to_pair[0, :_LAW_SIZE] = slopes[:, 0]
     to_pair[1, P0] = 1.0
     pair = np.array([float(mu[0]), theta[P0]])
     prior = card.elements[element].P0
-    freed = without_prior(pair, to_pair @ covariance @ to_pair.T, 1, prior)
+    freed = remove_prior(pair, to_pair @ covariance @ to_pair.T, 1, prior)
     if freed is None:
         return None
     values, spread = freed
@@ -56,7 +56,7 @@ def free_friction(
     return FreeFriction(float(values[0]), float(stds[0]), float(values[1]), float(stds[1]))
 
 
-def _posterior(found: Identification, element: str) -> tuple[FloatArray, FloatArray] | None:
+def _get_posterior(found: Identification, element: str) -> tuple[FloatArray, FloatArray] | None:
     """Friction law and P0 (5,) of an element, and their covariance, by either linear method."""
     fit = found.evidence.likelihood
     if fit is not None:

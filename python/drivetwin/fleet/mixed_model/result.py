@@ -84,7 +84,8 @@ class JointEstimate:
     """Joint estimate of one parameter over the units of one rule.
 
     `value` is shared by all units, at the fields' references; `spread` (1 σ) how much units differ.
-    `excess` is the scatter of the logs over what they state. `left_out` logs tell nothing of it.
+    `excess` is the scatter of the logs over what they state. `run_score_tests` logs tell nothing of
+    it.
     """
 
     parameter: str
@@ -104,6 +105,6 @@ class JointEstimate:
     notes: tuple[str, ...]
     points: Points
 
-    def document(self) -> dict[str, Any]:
+    def to_document(self) -> dict[str, Any]:
         """For JSON, without the single points."""
         return {key: value for key, value in asdict(self).items() if key != "points"}

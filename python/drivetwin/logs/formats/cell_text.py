@@ -47,7 +47,7 @@ def is_number(cell: str, decimal: str = ".") -> bool:
     return pattern.fullmatch(cell.strip()) is not None
 
 
-def decimal_sign(rows: Sequence[Sequence[str]], file: str) -> str:
+def detect_decimal_sign(rows: Sequence[Sequence[str]], file: str) -> str:
     """Return `,` where numbers in `rows` are written with it, else `.`.
 
     Raises FileFormatError where both occur: then one of them groups thousands; and where each comma
@@ -60,9 +60,11 @@ def decimal_sign(rows: Sequence[Sequence[str]], file: str) -> str:
     pointed = next((c for row in rows for c in row if "." in c and is_number(c)), None)
     if pointed is not None:
         fault = f"numbers with point ({pointed.strip()!r}) and with comma ({example!r})"
-    elif _may_group(commas):
+    elif can_be_grouping(commas):
         fault = f"the comma in {example!r} and all others may stand for decimals or for thousands"
-    elif (grouped := next(filter(None, map(_grouped, zip(*rows, strict=True))), None)) is not None:
+    elif (
+        grouped := next(filter(None, map(_find_ambiguous_grouping, zip(*rows, strict=True))), None)
+    ) is not None:
         fault = f"a column with {grouped[0]!r} and {grouped[1]!r}: the comma may group thousands"
     else:
         return ","
@@ -70,16 +72,16 @@ def decimal_sign(rows: Sequence[Sequence[str]], file: str) -> str:
     raise FileFormatError(fault, remedy, Where(file=file))
 
 
-def _may_group(commas: Iterable[str]) -> bool:
+def can_be_grouping(commas: Iterable[str]) -> bool:
     """Return True if every comma in the cells may be a thousands separator."""
     return all(_THOUSANDS.fullmatch(cell.strip()) for cell in commas if is_number(cell, ","))
 
 
-def _grouped(column: Sequence[str]) -> tuple[str, str] | None:
+def _find_ambiguous_grouping(column: Sequence[str]) -> tuple[str, str] | None:
     """Return a number with comma and one without from a column whose commas may group thousands."""
     commas = [cell for cell in column if "," in cell]
     example = next((cell.strip() for cell in commas if is_number(cell, ",")), None)
-    if example is None or not _may_group(commas):
+    if example is None or not can_be_grouping(commas):
         return None
     whole = next((cell.strip() for cell in column if is_number(cell)), None)
     return None if whole is None else (example, whole)
@@ -91,13 +93,15 @@ def to_numbers(cells: Sequence[str], line_numbers: Sequence[int], decimal: str) 
     try:
         values = np.fromiter(map(float, plain), np.float64, len(plain))
     except ValueError:
-        return _one_by_one(cells, plain, line_numbers)
+        return _convert_cell_by_cell(cells, plain, line_numbers)
     if any("_" in cell for cell in plain):  # float() takes 1_000 for a number
-        return _one_by_one(cells, plain, line_numbers)
+        return _convert_cell_by_cell(cells, plain, line_numbers)
     return Numbers(values, np.ones(len(plain), dtype=np.bool_))
 
 
-def _one_by_one(cells: Sequence[str], plain: Sequence[str], line_numbers: Sequence[int]) -> Numbers:
+def _convert_cell_by_cell(
+    cells: Sequence[str], plain: Sequence[str], line_numbers: Sequence[int]
+) -> Numbers:
     values = np.full(len(cells), np.nan)
     present = np.ones(len(cells), dtype=np.bool_)
     fault = None

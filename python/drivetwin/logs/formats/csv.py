@@ -22,14 +22,19 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.channels.names import is_time_name, name_and_unit, time_index, time_indices
+from drivetwin.channels.names import (
+    find_time_index,
+    find_time_indices,
+    is_time_name,
+    split_name_and_unit,
+)
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.channels.units import is_unit, lookup, time_factor
+from drivetwin.channels.units import find_unit, get_time_factor, is_unit
 from drivetwin.errors import FileFormatError, TimeError, Where
-from drivetwin.logs.formats.cell_text import Numbers, decimal_sign, is_number, to_numbers
-from drivetwin.logs.origin import origin_of, origin_told, since
-from drivetwin.logs.quality.clock_drift import clock_seconds, is_clock
+from drivetwin.logs.formats.cell_text import Numbers, detect_decimal_sign, is_number, to_numbers
+from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
+from drivetwin.logs.quality.clock_drift import is_clock, parse_clock_column
 from drivetwin.logs.raw import RawChannel, RawLog
 
 _DATE_NAMES = frozenset(("date", "datum"))
@@ -89,13 +94,13 @@ def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
     Raises FileFormatError (empty, binary, no header, ragged rows), MissingChannelError (no time
     column), MappingError (several), UnitError and TimeError (time without unit or stamps).
     """
-    table = _table(_decode(data, file), time, file)
-    header = _header(table, time, file)
+    table = _parse_table(_decode_text(data, file), time, file)
+    header = _parse_header(table, time, file)
     body = table.rows[header.height :]
     if not body:
         raise FileFormatError("the file holds names but no samples", _EXPORT, Where(file=file))
     lines = table.lines[header.height :]
-    decimal = decimal_sign(body, file)
+    decimal = detect_decimal_sign(body, file)
     cells = list(zip(*body, strict=True))
     columns = [to_numbers(column, lines, decimal) for column in cells]
     days = next((i for i, name in enumerate(header.names) if name.casefold() in _DATE_NAMES), None)
@@ -103,21 +108,23 @@ def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
     where = Where(file=file, channel=header.names[first])
     told: tuple[str, ...] = ()
     if others:
-        stamps, told = _several_stamps(header, columns, lines, time, file)
+        stamps, told = _parse_several_stamps(header, columns, lines, time, file)
     elif is_clock(cells[first][0]):
         dates = None if days is None else cells[days]
-        seconds = _clock(cells[first], dates, lines, where)
+        seconds = _parse_clock(cells[first], dates, lines, where)
         stamps = {first: _Stamps(seconds, np.ones(len(body), np.bool_))}
     else:
-        counted = _stamps(columns[first], lines, where) * _factor(header, first, time, where)
-        origin = origin_of(counted[:1])
-        told = origin_told(origin)
-        stamps = {first: _Stamps(since(counted, origin), columns[first].present)}
-    channels, unreadable = _channels(header, columns, stamps, without={*stamps, days})
+        counted = _parse_stamps(columns[first], lines, where) * _get_time_factor(
+            header, first, time, where
+        )
+        origin = find_origin(counted[:1])
+        told = describe_origin(origin)
+        stamps = {first: _Stamps(subtract_origin(counted, origin), columns[first].present)}
+    channels, unreadable = _build_channels(header, columns, stamps, without={*stamps, days})
     return RawLog(tuple(channels), unreadable, (*table.warnings, *told), file)
 
 
-def _channels(
+def _build_channels(
     header: _Header,
     columns: Sequence[Numbers],
     stamps: Mapping[int, _Stamps],
@@ -141,7 +148,7 @@ def _channels(
     return channels, unreadable
 
 
-def _decode(data: bytes, file: str) -> str:
+def _decode_text(data: bytes, file: str) -> str:
     """Text of the file; cp1252 where it is no UTF-8, as older tools write ° and µ."""
     where = Where(file=file)
     if not data.strip():
@@ -157,7 +164,7 @@ def _decode(data: bytes, file: str) -> str:
         return data.decode("cp1252", errors="replace")
 
 
-def _table(text: str, time: TimeColumn, file: str) -> _Table:
+def _parse_table(text: str, time: TimeColumn, file: str) -> _Table:
     """Split into rows; comment and blank lines are left out."""
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     separators: Sequence[str] = _SEPARATORS
@@ -171,48 +178,50 @@ def _table(text: str, time: TimeColumn, file: str) -> _Table:
     ]
     if not kept:
         raise FileFormatError("the file holds only comments", _EXPORT, Where(file=file))
-    delimiter, start = _delimiter([line for _, line in kept], separators, time, file)
+    delimiter, start = _detect_delimiter([line for _, line in kept], separators, time, file)
     above, kept = kept[:start], kept[start:]
-    kept = _names_in_comments(lines[: kept[0][0] - 1], delimiter, kept[0][1]) + kept
+    kept = _find_commented_names(lines[: kept[0][0] - 1], delimiter, kept[0][1]) + kept
     numbers = [number for number, _ in kept]
     rows = []
     for number, line in kept:
         try:
-            rows.append(_fields(line, delimiter))
+            rows.append(_split_strictly(line, delimiter))
         except csv.Error as fault:
             what = f"line {number}: a quoted field does not end where it should ({fault})"
             raise FileFormatError(what, _EXPORT, Where(file=file)) from None
-    table = _even(rows, numbers, file)
+    table = _make_rectangular(rows, numbers, file)
     if not above:
         return table
     note = f"{len(above)} lines above the names left out, the first {above[0][1].strip()[:40]!r}"
     return replace(table, warnings=(note, *table.warnings))
 
 
-def _names_in_comments(lines: Sequence[str], delimiter: str, first: str) -> list[tuple[int, str]]:
+def _find_commented_names(
+    lines: Sequence[str], delimiter: str, first: str
+) -> list[tuple[int, str]]:
     """Find the comment lines with names, and units if present, above a table without a header.
 
     They split into as many fields as the `first` line; units are detected by their spelling.
     """
     with contextlib.suppress(csv.Error):
-        fields = [cell.strip() for cell in _fields(first, delimiter)]
+        fields = [cell.strip() for cell in _split_strictly(first, delimiter)]
         if not all(is_number(cell) or is_number(cell, ",") or is_clock(cell) for cell in fields):
             return []
         found: list[tuple[int, str]] = []
         for number, line in enumerate(lines, start=1):
             text = re.sub(r"^\s*(#|%|//)+\s*", "", line)
-            cells = _fields(text, delimiter)
+            cells = _split_strictly(text, delimiter)
             if len(cells) == len(fields) and not any(is_number(cell) for cell in cells):
                 found.append((number, text))
         if found and all(
-            is_unit(cell) or not cell.strip() for cell in _fields(found[-1][1], delimiter)
+            is_unit(cell) or not cell.strip() for cell in _split_strictly(found[-1][1], delimiter)
         ):
             return found[-2:]
         return found[-1:]
     return []
 
 
-def _fields(line: str, delimiter: str) -> list[str]:
+def _split_strictly(line: str, delimiter: str) -> list[str]:
     """Fields of one line; raises csv.Error where a quote does not close on it."""
     if delimiter == _BLANKS:
         return line.split()
@@ -222,7 +231,7 @@ def _fields(line: str, delimiter: str) -> list[str]:
     return next(reader)
 
 
-def _delimiter(
+def _detect_delimiter(
     lines: Sequence[str], separators: Sequence[str], time: TimeColumn, file: str
 ) -> tuple[str, int]:
     """The sign that splits most lines into equally many fields, and the line of the names.
@@ -231,9 +240,9 @@ def _delimiter(
     """
     lines = lines[:_LOOKED_AT]
     for sign in separators:
-        rows = [_split(line, sign) for line in lines]
-        data = [_is_data(line, sign) for line in lines]
-        start = _names_line(rows, data, time)
+        rows = [_split_line(line, sign) for line in lines]
+        data = [_is_data_line(line, sign) for line in lines]
+        start = _find_names_row(rows, data, time)
         if start is not None and (sign != _BLANKS or any(data)):
             return sign, start
     if len(separators) == 1:
@@ -246,7 +255,7 @@ def _delimiter(
     )
 
 
-def _names_line(
+def _find_names_row(
     rows: Sequence[Sequence[str]], data: Sequence[bool], time: TimeColumn
 ) -> int | None:
     """The row of the names above the `data`: the fullest with a name for time, else the first.
@@ -256,30 +265,30 @@ def _names_line(
     usual = max(Counter(map(len, rows)).items(), key=lambda item: (item[1], item[0]))[0]
     last = all(not row[-1].strip() for row in rows if len(row) == usual)
     above = rows[: max(1, data.index(True) if True in data else len(data))]
-    may = [index for index, row in enumerate(above) if _may_be_names(row, usual, last)]
-    timed = [index for index in may if _names_time(rows[index], time)]
-    return max(timed, key=lambda index: _filled(rows[index]), default=next(iter(may), None))
+    may = [index for index, row in enumerate(above) if _can_be_names_row(row, usual, last)]
+    timed = [index for index in may if _has_time_name(rows[index], time)]
+    return max(timed, key=lambda index: _count_cells(rows[index]), default=next(iter(may), None))
 
 
-def _names_time(row: Sequence[str], time: TimeColumn) -> bool:
+def _has_time_name(row: Sequence[str], time: TimeColumn) -> bool:
     """Return True if a row contains a name for time."""
-    names = (name_and_unit(cell.strip())[0] for cell in row)
+    names = (split_name_and_unit(cell.strip())[0] for cell in row)
     return any(is_time_name(name) if time.source is None else name == time.source for name in names)
 
 
-def _filled(row: Sequence[str]) -> int:
+def _count_cells(row: Sequence[str]) -> int:
     """Fields up to the last that is not blank."""
     return max((index for index, cell in enumerate(row, start=1) if cell.strip()), default=0)
 
 
-def _split(line: str, delimiter: str) -> list[str]:
+def _split_line(line: str, delimiter: str) -> list[str]:
     """Fields of a line; a single empty one where a quote does not close."""
     with contextlib.suppress(csv.Error):
-        return _fields(line, delimiter)
+        return _split_strictly(line, delimiter)
     return [""]
 
 
-def _may_be_names(row: Sequence[str], usual: int, last_empty: bool) -> bool:
+def _can_be_names_row(row: Sequence[str], usual: int, last_empty: bool) -> bool:
     """Return True if a row has the usual width, except for a separator at the line's end.
 
     `last_empty`: the rows of the `usual` width end in such a separator.
@@ -288,14 +297,14 @@ def _may_be_names(row: Sequence[str], usual: int, last_empty: bool) -> bool:
     return len(row) > 1 and (len(row) == usual or ends or (len(row) == usual - 1 and last_empty))
 
 
-def _is_data(line: str, delimiter: str) -> bool:
+def _is_data_line(line: str, delimiter: str) -> bool:
     """Return True if a line has several fields and starts with a number or a clock time."""
     cells = line.split() if delimiter == _BLANKS else line.split(delimiter)
     first = cells[0].strip()
     return len(cells) > 1 and (is_number(first) or is_number(first, ",") or is_clock(first))
 
 
-def _even(rows: list[list[str]], lines: Sequence[int], file: str) -> _Table:
+def _make_rectangular(rows: list[list[str]], lines: Sequence[int], file: str) -> _Table:
     """Rows as wide as the names: empty fields at line ends go, a cut last line is left out."""
     while len(rows[0]) > 1 and not rows[0][-1].strip():
         rows[0].pop()
@@ -317,7 +326,7 @@ def _even(rows: list[list[str]], lines: Sequence[int], file: str) -> _Table:
     return _Table(rows, lines, warnings)
 
 
-def _header(table: _Table, time: TimeColumn, file: str) -> _Header:
+def _parse_header(table: _Table, time: TimeColumn, file: str) -> _Header:
     cells = [cell.strip() for cell in table.rows[0]]
     if all(is_number(cell) or is_number(cell, ",") for cell in cells if cell):
         raise FileFormatError(
@@ -325,17 +334,19 @@ def _header(table: _Table, time: TimeColumn, file: str) -> _Header:
             _EXPORT,
             Where(file=file),
         )
-    split = [name_and_unit(cell) for cell in cells]
+    split = [split_name_and_unit(cell) for cell in cells]
     names = [name for name, _ in split]
     units = [unit for _, unit in split]
-    below = _rows_below(table, time_indices(names, units, time))
-    stated = max(below, key=_units_in, default=[])
+    below = _count_rows_below(table, find_time_indices(names, units, time))
+    stated = max(below, key=_count_units, default=[])
     if any(map(is_unit, stated)) or (stated and not any(units)):
-        units = [_unit(beside, under) for beside, under in zip(units, stated, strict=True)]
-    return _Header(names, units, _time_columns(names, units, time, file), height=1 + len(below))
+        units = [_select_unit(beside, under) for beside, under in zip(units, stated, strict=True)]
+    return _Header(
+        names, units, _assign_time_columns(names, units, time, file), height=1 + len(below)
+    )
 
 
-def _rows_below(table: _Table, times: Sequence[int]) -> list[list[str]]:
+def _count_rows_below(table: _Table, times: Sequence[int]) -> list[list[str]]:
     """Rows of units, comments or types between the names and the first row of numbers.
 
     Of units only the first may hold numbers: that of a fraction, `1`, but not for time.
@@ -351,7 +362,7 @@ def _rows_below(table: _Table, times: Sequence[int]) -> list[list[str]]:
     return below
 
 
-def _time_columns(
+def _assign_time_columns(
     names: Sequence[str], units: Sequence[str | None], time: TimeColumn, file: str
 ) -> list[int]:
     """The index of the time column of each column: the one, or of several the one before it.
@@ -359,41 +370,41 @@ def _time_columns(
     Several count where each stands before columns of its own and is named as the others but for
     digits, as `t1, EngTrq, t2, SpdIn`.
     """
-    found = time_indices(names, units, time)
+    found = find_time_indices(names, units, time)
     stems = {re.sub(r"[^a-z]", "", names[index].casefold()) for index in found}
     before_others = all(after - one > 1 for one, after in pairwise([*found, len(names)]))
     if len(found) > 1 and found[0] == 0 and len(stems) == 1 and before_others:
         return [max(one for one in found if one <= index) for index in range(len(names))]
-    return [time_index(names, units, time, file)] * len(names)
+    return [find_time_index(names, units, time, file)] * len(names)
 
 
-def _units_in(row: Sequence[str]) -> tuple[int, int]:
+def _count_units(row: Sequence[str]) -> tuple[int, int]:
     """Count the units in a row below the names: physical units first, then all units.
 
     Some tools fill a row of comments with `-`, so `-` alone is weak evidence of a row of units.
     """
-    return sum(map(_tells, row)), sum(map(is_unit, row))
+    return sum(map(_is_physical_unit, row)), sum(map(is_unit, row))
 
 
-def _tells(cell: str) -> bool:
+def _is_physical_unit(cell: str) -> bool:
     """Return True if a cell is a unit other than that of a dimensionless number."""
-    return is_unit(cell) and lookup(cell) != lookup("-")
+    return is_unit(cell) and find_unit(cell) != find_unit("-")
 
 
-def _unit(beside: str | None, under: str) -> str | None:
+def _select_unit(beside: str | None, under: str) -> str | None:
     """Unit of a column from its name and the row below, where a comment or a type may stand.
 
     If the row below has no unit, or a placeholder such as `-`, the unit in the name is used.
     """
-    tells = _tells(under)
+    tells = _is_physical_unit(under)
     return under if tells or (beside is None and under) else beside
 
 
-def _clock(
+def _parse_clock(
     cells: Sequence[str], dates: Sequence[str] | None, lines: Sequence[int], where: Where
 ) -> FloatArray:
     """Convert a column of clock times to seconds (n,) since the first row."""
-    seconds, count = clock_seconds(cells, dates)
+    seconds, count = parse_clock_column(cells, dates)
     if count < seconds.size:
         remedy = "export time as seconds since the start of the recording"
         cell, word = cells[count], "clock time"
@@ -405,13 +416,13 @@ def _clock(
     return seconds
 
 
-def _stamps(column: Numbers, lines: Sequence[int], where: Where) -> FloatArray:
-    if not _readable(column, where).present.all():
-        raise _no_stamp(lines[int(column.present.argmin())], where)
+def _parse_stamps(column: Numbers, lines: Sequence[int], where: Where) -> FloatArray:
+    if not _require_numbers(column, where).present.all():
+        raise _make_stamp_error(lines[int(column.present.argmin())], where)
     return column.values
 
 
-def _readable(column: Numbers, where: Where) -> Numbers:
+def _require_numbers(column: Numbers, where: Where) -> Numbers:
     """A time column; raises TimeError where it holds something else than numbers."""
     if column.fault is not None:
         remedy = "export time as seconds since the start of the recording"
@@ -419,11 +430,11 @@ def _readable(column: Numbers, where: Where) -> Numbers:
     return column
 
 
-def _no_stamp(line: int, where: Where) -> TimeError:
+def _make_stamp_error(line: int, where: Where) -> TimeError:
     return TimeError(f"line {line} has no time stamp", "remove the line", where)
 
 
-def _several_stamps(
+def _parse_several_stamps(
     header: _Header,
     columns: Sequence[Numbers],
     lines: Sequence[int],
@@ -437,21 +448,25 @@ def _several_stamps(
     counted: dict[int, FloatArray] = {}
     for clock in header.clocks:
         where = Where(file=file, channel=header.names[clock])
-        column = _readable(columns[clock], where)
-        counted[clock] = column.values * _factor(header, clock, time, where)
+        column = _require_numbers(columns[clock], where)
+        counted[clock] = column.values * _get_time_factor(header, clock, time, where)
     known = {clock: np.isfinite(stamps) for clock, stamps in counted.items()}
-    origin = origin_of(float(one) for clock in counted for one in counted[clock][known[clock]][:1])
+    origin = find_origin(
+        float(one) for clock in counted for one in counted[clock][known[clock]][:1]
+    )
     for index, column in enumerate(columns):
         bare = ~known[header.times[index]] & np.isfinite(column.values)
         if bare.any():
-            raise _no_stamp(
+            raise _make_stamp_error(
                 lines[int(bare.argmax())], Where(file=file, channel=header.names[index])
             )
     named = ", ".join(header.names[clock] for clock in header.clocks)
     note = f"several time columns, each for the columns that follow it: {named}"
-    stamps = {clock: _Stamps(since(counted[clock], origin), known[clock]) for clock in counted}
-    return stamps, (note, *origin_told(origin))
+    stamps = {
+        clock: _Stamps(subtract_origin(counted[clock], origin), known[clock]) for clock in counted
+    }
+    return stamps, (note, *describe_origin(origin))
 
 
-def _factor(header: _Header, clock: int, time: TimeColumn, where: Where) -> float:
-    return time_factor(time.unit if time.unit is not None else header.units[clock], where)
+def _get_time_factor(header: _Header, clock: int, time: TimeColumn, where: Where) -> float:
+    return get_time_factor(time.unit if time.unit is not None else header.units[clock], where)

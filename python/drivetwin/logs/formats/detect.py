@@ -59,10 +59,10 @@ def open_recording(
     except OSError as fault:
         what = f"cannot read the file: {fault.strerror}"
         raise FileFormatError(what, "check the path", Where(file=str(path))) from None
-    return _opener(head, path)(path, options or ReadOptions())
+    return _select_opener(head, path)(path, options or ReadOptions())
 
 
-def _opener(head: bytes, path: Path) -> Opener:
+def _select_opener(head: bytes, path: Path) -> Opener:
     for magic, opener in _BY_MAGIC.items():
         if head.startswith(magic):
             return opener

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.logs.origin import origin_of, since
+from drivetwin.logs.origin import find_origin, subtract_origin
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Frames:
     warnings: tuple[str, ...] = field(default=())
 
 
-def frame_table(
+def build_frames(
     stamps: Sequence[float],
     identifiers: Sequence[int],
     extended: Sequence[bool],
@@ -82,7 +82,7 @@ def frame_table(
     width = max(PAYLOAD, max(map(len, payloads), default=0))
     padded = b"".join(payload.ljust(width, b"\xff") for payload in payloads)
     return Frames(
-        time=since(time, origin_of(time[:1])),
+        time=subtract_origin(time, find_origin(time[:1])),
         identifier=np.array(identifiers, np.uint32),
         extended=np.array(extended, np.bool_),
         data=np.frombuffer(padded, np.uint8).reshape(-1, width),

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin._util.optional_dependencies import foreign_parser, require
+from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, MissingChannelError, Where
 from drivetwin.logs.formats.mat_integrity import check_blocks
 from drivetwin.logs.formats.mat_signals import Signals, find_signals
-from drivetwin.logs.origin import origin_of, origin_told, since
+from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.raw import RawLog, Recording
 
 _KIND = "a MATLAB file"
@@ -39,17 +39,17 @@ def open_mat(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """
     with path.open("rb") as file:
         is_hdf5 = file.read(10) == b"MATLAB 7.3"
-    with foreign_parser(_KIND, path):
-        tree = _hdf5_tree(path) if is_hdf5 else _tree(path)
+    with handle_parser_errors(_KIND, path):
+        tree = _read_hdf5_tree(path) if is_hdf5 else _read_tree(path)
         found = find_signals(tree, options.time, str(path))
     if not found.channels:
-        raise _nothing(tree, found, path)
-    origin = origin_of(channel.time[0] for channel in found.channels)
-    channels = tuple(replace(one, time=since(one.time, origin)) for one in found.channels)
-    yield RawLog(channels, found.unreadable, origin_told(origin), str(path))
+        raise _make_no_signal_error(tree, found, path)
+    origin = find_origin(channel.time[0] for channel in found.channels)
+    channels = tuple(replace(one, time=subtract_origin(one.time, origin)) for one in found.channels)
+    yield RawLog(channels, found.unreadable, describe_origin(origin), str(path))
 
 
-def _nothing(
+def _make_no_signal_error(
     tree: Mapping[str, Any], found: Signals, path: Path
 ) -> FileFormatError | MissingChannelError:
     where = Where(file=str(path))
@@ -60,36 +60,38 @@ def _nothing(
     return MissingChannelError(f"{what} ({reasons})" if reasons else what, _PLAIN, where)
 
 
-def _tree(path: Path) -> dict[str, Any]:
+def _read_tree(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
     check_blocks(path)
     content = loadmat(path, struct_as_record=False, squeeze_me=True, appendmat=False)
-    return {name: _plain(v) for name, v in content.items() if not name.startswith("__")}
+    return {name: _to_plain(v) for name, v in content.items() if not name.startswith("__")}
 
 
-def _plain(value: Any) -> Any:
+def _to_plain(value: Any) -> Any:
     """A struct as a dict, an array of structs as a list; other values as they are."""
     fields = getattr(value, "_fieldnames", None)
     if fields is not None:
-        return {name: _plain(getattr(value, name)) for name in fields}
+        return {name: _to_plain(getattr(value, name)) for name in fields}
     if isinstance(value, np.ndarray) and value.dtype == object:
-        return [_plain(item) for item in value.ravel()]
+        return [_to_plain(item) for item in value.ravel()]
     return value
 
 
-def _hdf5_tree(path: Path) -> dict[str, Any]:
-    require("h5py", "io", "a MATLAB 7.3 file", path)
-    pymatreader = require("pymatreader", "io", "a MATLAB 7.3 file", path)
+def _read_hdf5_tree(path: Path) -> dict[str, Any]:
+    import_extra("h5py", "io", "a MATLAB 7.3 file", path)
+    pymatreader = import_extra("pymatreader", "io", "a MATLAB 7.3 file", path)
     content: dict[str, Any] = pymatreader.read_mat(str(path))
-    return {name: _as_list(v) for name, v in content.items() if not name.startswith("__")}
+    return {
+        name: _split_struct_array(v) for name, v in content.items() if not name.startswith("__")
+    }
 
 
-def _as_list(value: Any) -> Any:
+def _split_struct_array(value: Any) -> Any:
     """An array of structs, which arrives as one struct of lists, as a list of structs."""
     if not isinstance(value, dict):
-        return [_as_list(item) for item in value] if isinstance(value, list) else value
-    value = {name: _as_list(item) for name, item in value.items()}
+        return [_split_struct_array(item) for item in value] if isinstance(value, list) else value
+    value = {name: _split_struct_array(item) for name, item in value.items()}
     lists = [item for item in value.values() if isinstance(item, list)]
     if lists and len(lists) == len(value) and len({len(item) for item in lists}) == 1:
         return [dict(zip(value, row, strict=True)) for row in zip(*lists, strict=True)]

@@ -42,31 +42,33 @@ def check_blocks(path: Path) -> None:
     with path.open("rb") as file:
         head = file.read(_HEADER)
         if is_version4(head):
-            _check4(file, size, path)
+            _check_version4(file, size, path)
             return
         if len(head) < _HEADER or head[126:128] not in (b"IM", b"MI"):
             return  # SciPy says what it is
         order = "<" if head[126:128] == b"IM" else ">"
-        for number, (kind, length) in enumerate(_elements(file, order), start=1):
+        for number, (kind, length) in enumerate(_iterate_elements(file, order), start=1):
             start = file.tell()
             if kind not in (_MATRIX, _COMPRESSED):
-                raise _damaged(f"variable {number} has the unknown type {kind}", path)
+                raise _make_damage_error(f"variable {number} has the unknown type {kind}", path)
             if start + length > size:
-                raise _damaged(f"variable {number} is cut at the end of the file", path)
-            if kind == _COMPRESSED and not _sound(file, length):
-                raise _damaged(f"variable {number} does not match its checksum", path)
-            if kind == _MATRIX and not _ordered(file, start + length, order):
-                raise _damaged(f"variable {number} has parts of no known type or length", path)
+                raise _make_damage_error(f"variable {number} is cut at the end of the file", path)
+            if kind == _COMPRESSED and not _is_complete_stream(file, length):
+                raise _make_damage_error(f"variable {number} does not match its checksum", path)
+            if kind == _MATRIX and not _has_valid_elements(file, start + length, order):
+                raise _make_damage_error(
+                    f"variable {number} has parts of no known type or length", path
+                )
             file.seek(start + length)
 
 
 def is_version4(head: bytes) -> bool:
     """Return True if a file that starts with `head` is one of version 4, which has no mark."""
-    variable = _variable4(head[:_HEAD4])
+    variable = _measure_variable4(head[:_HEAD4])
     return variable is not None and head[_HEAD4:][: variable[0]].find(b"\0") == variable[0] - 1
 
 
-def _variable4(head: bytes) -> tuple[int, int] | None:
+def _measure_variable4(head: bytes) -> tuple[int, int] | None:
     """Bytes of name and data of a variable of version 4; None where its head is none."""
     if len(head) < _HEAD4:
         return None
@@ -80,27 +82,27 @@ def _variable4(head: bytes) -> tuple[int, int] | None:
     return name, rows * columns * _BYTES4[number] * (1 + imaginary)
 
 
-def _check4(file: BinaryIO, size: int, path: Path) -> None:
+def _check_version4(file: BinaryIO, size: int, path: Path) -> None:
     place, number = 0, 0
     while place < size:
         file.seek(place)
         number += 1
-        variable = _variable4(file.read(_HEAD4))
+        variable = _measure_variable4(file.read(_HEAD4))
         if variable is None:
-            raise _damaged(f"variable {number} has no sound head", path)
+            raise _make_damage_error(f"variable {number} has no sound head", path)
         place += _HEAD4 + sum(variable)
     if place > size:
-        raise _damaged(f"variable {number} is cut at the end of the file", path)
+        raise _make_damage_error(f"variable {number} is cut at the end of the file", path)
 
 
-def _elements(file: BinaryIO, order: str) -> Iterator[tuple[int, int]]:
+def _iterate_elements(file: BinaryIO, order: str) -> Iterator[tuple[int, int]]:
     """Type and length of each element; the caller leaves the file where the next one starts."""
     while len(tag := file.read(8)) == 8:
         kind, length = struct.unpack(f"{order}II", tag)
         yield kind, length
 
 
-def _sound(file: BinaryIO, length: int) -> bool:
+def _is_complete_stream(file: BinaryIO, length: int) -> bool:
     """Return True if the next `length` bytes are one complete compressed stream."""
     stream = zlib.decompressobj()
     try:
@@ -114,7 +116,7 @@ def _sound(file: BinaryIO, length: int) -> bool:
     return stream.eof
 
 
-def _ordered(file: BinaryIO, end: int, order: str, depth: int = 0) -> bool:
+def _has_valid_elements(file: BinaryIO, end: int, order: str, depth: int = 0) -> bool:
     """Return True if a matrix up to `end` consists of complete elements of known types."""
     kinds: list[int] = []
     flags = 0
@@ -133,13 +135,17 @@ def _ordered(file: BinaryIO, end: int, order: str, depth: int = 0) -> bool:
                 return False
             (flags,) = struct.unpack(f"{order}I", file.read(4).rjust(4, b"\0"))
         kinds.append(kind)
-        if kind == _MATRIX and length and not _ordered(file, data + length, order, depth + 1):
+        if (
+            kind == _MATRIX
+            and length
+            and not _has_valid_elements(file, data + length, order, depth + 1)
+        ):
             return False
         file.seek(place + 8 if data == place + 4 else data + -(-length // 8) * 8)
-    return _complete(kinds, flags)
+    return _has_required_parts(kinds, flags)
 
 
-def _complete(kinds: list[int], flags: int) -> bool:
+def _has_required_parts(kinds: list[int], flags: int) -> bool:
     """Return True if an array has all elements required by its class and complex flag.
 
     The order is flags, sizes, name, numbers. SciPy itself checks classes that contain matrices.
@@ -151,7 +157,7 @@ def _complete(kinds: list[int], flags: int) -> bool:
     return len(kinds) == 3 + count and _MATRIX not in kinds
 
 
-def _damaged(what: str, path: Path) -> FileFormatError:
+def _make_damage_error(what: str, path: Path) -> FileFormatError:
     return FileFormatError(
         f"not readable as a MATLAB file: {what}",
         "the file is damaged or was not copied whole: export it again",

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.channels.names import is_time_name, may_be_time
+from drivetwin.channels.names import can_be_time, is_time_name
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.channels.units import time_factor
+from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import Where
 from drivetwin.logs.raw import RawChannel
 
@@ -42,7 +42,7 @@ def find_signals(tree: Mapping[str, Any], time: TimeColumn, file: str) -> Signal
     Fields of structs are named with dots. Raises UnitError for a time unit that is none.
     """
     search = _Search(time, file)
-    search.struct(tree, "", 0)
+    search.search_struct(tree, "", 0)
     return search.found
 
 
@@ -52,68 +52,76 @@ class _Search:
         self._file = file
         self.found = Signals()
 
-    def struct(self, tree: Mapping[str, Any], prefix: str, depth: int) -> None:
+    def search_struct(self, tree: Mapping[str, Any], prefix: str, depth: int) -> None:
         """Read the signals among the fields of a struct, then the signals of nested structs."""
         if depth > _DEPTH:
             self.found.unreadable[prefix] = "structs are nested too deep"
             return
-        vectors = {name: v for name, value in tree.items() if (v := _vector(value)) is not None}
-        clocks = {name for name in vectors if may_be_time(_unit(name, tree))}
-        times = self._times(vectors, clocks)
-        used = {name for name in vectors if self._is_time(name, vectors, clocks)}
+        vectors = {name: v for name, value in tree.items() if (v := _to_vector(value)) is not None}
+        clocks = {name for name in vectors if can_be_time(_get_unit(name, tree))}
+        times = self._match_times(vectors, clocks)
+        used = {name for name in vectors if self._is_time_vector(name, vectors, clocks)}
         for name, values in vectors.items():
             if name in used:
                 continue
             stamps_of = times.get(name)
             if stamps_of is None:
-                self._common(prefix + name, values, vectors, tree)
+                self._add_with_common_time(prefix + name, values, vectors, tree)
             else:
-                self._add(prefix + name, _unit(name, tree), (vectors[stamps_of], values),
-                          self._seconds(stamps_of, tree))  # fmt: skip
+                self._add_channel(prefix + name, _get_unit(name, tree), (vectors[stamps_of], values),
+                          self._get_seconds_factor(stamps_of, tree))  # fmt: skip
         for name, value in tree.items():
             if isinstance(value, Mapping):
-                self._inner(value, prefix + name, depth)
+                self._search_struct_field(value, prefix + name, depth)
             elif isinstance(value, list):
-                self._items(value, prefix + name, depth)
-            elif not used and (pair := _time_and_values(value)) is not None:
-                self._add(prefix + name, _unit(name, tree), pair, self._seconds(name, {}))
+                self._search_items(value, prefix + name, depth)
+            elif not used and (pair := _split_time_and_values(value)) is not None:
+                self._add_channel(
+                    prefix + name, _get_unit(name, tree), pair, self._get_seconds_factor(name, {})
+                )
             elif name not in vectors:
-                self._matrix(prefix + name, value, vectors, tree)
+                self._add_matrix(prefix + name, value, vectors, tree)
 
-    def _items(self, items: list[Any], path: str, depth: int) -> None:
+    def _search_items(self, items: list[Any], path: str, depth: int) -> None:
         for place, item in enumerate(items):
             if isinstance(item, Mapping):
-                own = next((_text(item[key]) for key in _NAME_FIELDS if _text(item.get(key))), None)
-                self._inner(item, own or f"{path}({place + 1})", depth)
+                own = next(
+                    (_to_text(item[key]) for key in _NAME_FIELDS if _to_text(item.get(key))), None
+                )
+                self._search_struct_field(item, own or f"{path}({place + 1})", depth)
 
-    def _inner(self, tree: Mapping[str, Any], path: str, depth: int) -> None:
+    def _search_struct_field(self, tree: Mapping[str, Any], path: str, depth: int) -> None:
         """A struct: one signal as {time, data, unit}, else a workspace of its own."""
-        stamps = next((n for n in tree if is_time_name(n) and _vector(tree[n]) is not None), None)
+        stamps = next(
+            (n for n in tree if is_time_name(n) and _to_vector(tree[n]) is not None), None
+        )
         data = next((name for name in _DATA_FIELDS if name in tree), None)
         if stamps is None or data is None:
-            self.struct(tree, path + ".", depth + 1)
+            self.search_struct(tree, path + ".", depth + 1)
             return
-        time, factor = _vector(tree[stamps]), self._seconds(stamps, tree)
+        time, factor = _to_vector(tree[stamps]), self._get_seconds_factor(stamps, tree)
         assert time is not None
         parts = tree[data] if isinstance(tree[data], list) else [tree[data]]
         for place, part in enumerate(parts):
-            name, unit, values = path, _field_unit(tree), part
+            name, unit, values = path, _get_field_unit(tree), part
             if isinstance(part, Mapping):  # Simulink: signals.values, one struct for each
-                label = next((_text(part[k]) for k in _NAME_FIELDS if _text(part.get(k))), None)
+                label = next(
+                    (_to_text(part[k]) for k in _NAME_FIELDS if _to_text(part.get(k))), None
+                )
                 name = label or (path if len(parts) == 1 else f"{path}({place + 1})")
-                unit = _field_unit(part) or unit
+                unit = _get_field_unit(part) or unit
                 values = next((part[key] for key in _DATA_FIELDS if key in part), None)
-            vector = _vector(values)
+            vector = _to_vector(values)
             if vector is not None:
-                self._add(name, unit, (time, vector), factor)
+                self._add_channel(name, unit, (time, vector), factor)
                 continue
-            columns = _columns(values, [time])
+            columns = _split_columns(values, [time])
             for number, column in enumerate(columns, start=1):
-                self._add(f"{name}({number})", unit, (time, column), factor)
+                self._add_channel(f"{name}({number})", unit, (time, column), factor)
             if not columns:
-                self._told(name, values)
+                self._record_unreadable(name, values)
 
-    def _common(
+    def _add_with_common_time(
         self,
         path: str,
         values: FloatArray,
@@ -121,12 +129,14 @@ class _Search:
         tree: Mapping[str, Any],
     ) -> None:
         """A vector without a time of its own: the one common time vector of its length."""
-        names = self._common_times(vectors, tree)
+        names = self._find_common_times(vectors, tree)
         fitting = [name for name in names if vectors[name].size == values.size]
         if len(fitting) == 1:
             own = path.rsplit(".", 1)[-1]
             pair = (vectors[fitting[0]], values)
-            self._add(path, _unit(own, tree), pair, self._seconds(fitting[0], tree))
+            self._add_channel(
+                path, _get_unit(own, tree), pair, self._get_seconds_factor(fitting[0], tree)
+            )
         elif fitting:
             self.found.unreadable[path] = f"several time vectors fit: {', '.join(fitting)}"
         elif values.size > 1:
@@ -134,7 +144,7 @@ class _Search:
                 f"no time vector of its {values.size} samples: neither {path}_t nor a common one"
             )
 
-    def _matrix(
+    def _add_matrix(
         self,
         path: str,
         value: Any,
@@ -142,23 +152,23 @@ class _Search:
         tree: Mapping[str, Any],
     ) -> None:
         """Columns over a common time vector, else no signal."""
-        times = [vectors[name] for name in self._common_times(vectors, tree)]
-        columns = _columns(value, times)
+        times = [vectors[name] for name in self._find_common_times(vectors, tree)]
+        columns = _split_columns(value, times)
         for number, column in enumerate(columns, start=1):
-            self._common(f"{path}({number})", column, vectors, tree)
+            self._add_with_common_time(f"{path}({number})", column, vectors, tree)
         if not columns:
-            self._told(path, value)
+            self._record_unreadable(path, value)
 
-    def _common_times(
+    def _find_common_times(
         self, vectors: Mapping[str, FloatArray], tree: Mapping[str, Any]
     ) -> list[str]:
         """The time vectors for all that have none of their own: as stated, else by name."""
         stated = self._stated.source
         if stated is not None and stated in vectors:
             return [stated]
-        return [one for one in vectors if is_time_name(one) and may_be_time(_unit(one, tree))]
+        return [one for one in vectors if is_time_name(one) and can_be_time(_get_unit(one, tree))]
 
-    def _times(self, vectors: Mapping[str, FloatArray], clocks: Set[str]) -> dict[str, str]:
+    def _match_times(self, vectors: Mapping[str, FloatArray], clocks: Set[str]) -> dict[str, str]:
         """The time vector of each name that has one of its own among `clocks`.
 
         What is stated for the whole file goes before it, where it fits.
@@ -171,24 +181,26 @@ class _Search:
             if name + suffix in clocks and (stated is None or stated.size != values.size)
         }
 
-    def _is_time(self, name: str, vectors: Mapping[str, FloatArray], clocks: Set[str]) -> bool:
+    def _is_time_vector(
+        self, name: str, vectors: Mapping[str, FloatArray], clocks: Set[str]
+    ) -> bool:
         owner = any(
             name.endswith(suffix) and name.removesuffix(suffix) in vectors
             for suffix in _TIME_SUFFIXES
         )
         return name == self._stated.source or (name in clocks and (owner or is_time_name(name)))
 
-    def _seconds(self, name: str, tree: Mapping[str, Any]) -> float:
+    def _get_seconds_factor(self, name: str, tree: Mapping[str, Any]) -> float:
         """Factor to seconds of a time vector; MATLAB's own unit is the second.
 
         A time series keeps another one in `TimeInfo`.
         """
         info = tree.get("TimeInfo")
-        told = _own_unit(info) if isinstance(info, Mapping) else None
-        unit = self._stated.unit or _unit(name, tree) or told or "s"
-        return time_factor(unit, Where(file=self._file, channel=name))
+        told = _get_struct_unit(info) if isinstance(info, Mapping) else None
+        unit = self._stated.unit or _get_unit(name, tree) or told or "s"
+        return get_time_factor(unit, Where(file=self._file, channel=name))
 
-    def _add(
+    def _add_channel(
         self, name: str, unit: str | None, pair: tuple[FloatArray, FloatArray], factor: float
     ) -> None:
         time, values = pair
@@ -197,7 +209,7 @@ class _Search:
         else:
             self.found.channels.append(RawChannel(name, unit, time * factor, values))
 
-    def _told(self, name: str, value: Any) -> None:
+    def _record_unreadable(self, name: str, value: Any) -> None:
         """Record why a variable is no signal, unless it is a text or a single number."""
         if isinstance(value, np.ndarray) and value.dtype.kind == "c" and value.size > 1:
             self.found.unreadable[name] = "complex numbers: export their real part"
@@ -208,7 +220,7 @@ class _Search:
             self.found.unreadable[name] = "a closed MATLAB object"
 
 
-def _vector(value: Any) -> FloatArray | None:
+def _to_vector(value: Any) -> FloatArray | None:
     """A real numeric vector of two or more samples as (n,) float64, else None."""
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufb":
         return None
@@ -216,7 +228,7 @@ def _vector(value: Any) -> FloatArray | None:
     return squeezed.astype(np.float64) if squeezed.ndim == 1 and squeezed.size > 1 else None
 
 
-def _columns(value: Any, times: Sequence[FloatArray]) -> list[FloatArray]:
+def _split_columns(value: Any, times: Sequence[FloatArray]) -> list[FloatArray]:
     """The columns of a matrix with a row for each sample of one of `times`, as Simulink writes.
 
     Returns None for a square matrix, and for a matrix whose first column is increasing (a possible
@@ -230,7 +242,7 @@ def _columns(value: Any, times: Sequence[FloatArray]) -> list[FloatArray]:
     return columns if np.any(np.diff(columns[0]) <= 0.0) else []
 
 
-def _time_and_values(value: Any) -> tuple[FloatArray, FloatArray] | None:
+def _split_time_and_values(value: Any) -> tuple[FloatArray, FloatArray] | None:
     """The columns of a matrix of two whose first one only grows, as CANape writes a signal."""
     matrix = isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim == 2
     if not matrix or value.shape[1] != 2 or value.shape[0] < _ENOUGH:
@@ -239,28 +251,28 @@ def _time_and_values(value: Any) -> tuple[FloatArray, FloatArray] | None:
     return (time, values) if np.all(np.diff(time) > 0.0) else None
 
 
-def _text(value: Any) -> str | None:
+def _to_text(value: Any) -> str | None:
     return value.strip() or None if isinstance(value, str) else None
 
 
-def _unit(name: str, tree: Mapping[str, Any]) -> str | None:
+def _get_unit(name: str, tree: Mapping[str, Any]) -> str | None:
     """Unit of a variable: `<name>_unit`, or its field in a struct `units`."""
     for suffix in _UNIT_SUFFIXES:
-        if text := _text(tree.get(name + suffix)):
+        if text := _to_text(tree.get(name + suffix)):
             return text
     tables: Iterator[Any] = (tree.get(key) for key in _UNIT_FIELDS)
     return next(
-        (t for table in tables if isinstance(table, Mapping) and (t := _text(table.get(name)))),
+        (t for table in tables if isinstance(table, Mapping) and (t := _to_text(table.get(name)))),
         None,
     )
 
 
-def _field_unit(tree: Mapping[str, Any]) -> str | None:
+def _get_field_unit(tree: Mapping[str, Any]) -> str | None:
     """Unit of a struct that is one signal; a time series keeps it in `DataInfo`."""
     info = tree.get("DataInfo")
-    return _own_unit(tree) or (_own_unit(info) if isinstance(info, Mapping) else None)
+    return _get_struct_unit(tree) or (_get_struct_unit(info) if isinstance(info, Mapping) else None)
 
 
-def _own_unit(tree: Mapping[str, Any]) -> str | None:
+def _get_struct_unit(tree: Mapping[str, Any]) -> str | None:
     """Return the unit stated in the struct itself."""
-    return next((text for key in _UNIT_FIELDS if (text := _text(tree.get(key)))), None)
+    return next((text for key in _UNIT_FIELDS if (text := _to_text(tree.get(key)))), None)

@@ -18,16 +18,16 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin._util.optional_dependencies import foreign_parser, require
+from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.channels.units import is_time_unit, time_factor
+from drivetwin.channels.units import get_time_factor, is_time_unit
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where
-from drivetwin.logs.formats.can.mdf_frames import bus_frames, holds_frames
-from drivetwin.logs.formats.can.open import bus_recording
+from drivetwin.logs.formats.can.mdf_frames import has_only_frames, read_bus_frames
+from drivetwin.logs.formats.can.open import decode_recording
 from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.formats.mdf_integrity import check_blocks
-from drivetwin.logs.origin import origin_of, origin_told, since
+from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.raw import Joined, RawChannel, Recording, Window
 
 _KIND = "an MDF file"
@@ -65,25 +65,25 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
 
     Raises MissingExtraError without asammdf, FileFormatError for a damaged file.
     """
-    asammdf = require("asammdf", "mdf", _KIND, path)
+    asammdf = import_extra("asammdf", "mdf", _KIND, path)
     check_blocks(path)
     with path.open("rb") as file:
         finished = file.read(8) == _FINISHED
         file.seek(0)
-        with foreign_parser(_KIND, path):
+        with handle_parser_errors(_KIND, path):
             # An unfinished file is completed in a copy, which asammdf makes of a named file only.
             mdf = asammdf.MDF(file if finished else path, **_OPTIONS)
             mdf.configure(read_fragment_size=_FRAGMENT)
         try:
-            with foreign_parser(_KIND, path):
+            with handle_parser_errors(_KIND, path):
                 signals = MdfRecording(mdf, path, options)
-                frames = bus_frames(mdf, signals.origin)
-            yield _with_bus(signals, frames, options, path)
+                frames = read_bus_frames(mdf, signals.origin)
+            yield _merge_bus_frames(signals, frames, options, path)
         finally:
             mdf.close()
 
 
-def _with_bus(
+def _merge_bus_frames(
     signals: MdfRecording, frames: Frames | None, options: ReadOptions, path: Path
 ) -> Recording:
     """The signals of a file and those of its raw frames.
@@ -92,7 +92,7 @@ def _with_bus(
     might stand in it twice. Raises MissingChannelError without any column.
     """
     if frames is not None and (options.bus.databases or not signals.columns):
-        return Joined((signals, bus_recording(frames, options, path)))
+        return Joined((signals, decode_recording(frames, options, path)))
     if frames is not None:
         note = "raw bus frames are not decoded: name their DBC files under [bus]"
         signals.warnings = (*signals.warnings, note)
@@ -118,68 +118,68 @@ class MdfRecording:
         self._asserted = options.time.unit
         self._factors: dict[int, float] = {}
         self.warnings: tuple[str, ...] = ()
-        names = _group_names(mdf.groups)
+        names = _make_group_names(mdf.groups)
         places: list[_Place] = []
         columns: list[Column] = []
         timeless: list[str] = []
         for number, group in enumerate(mdf.groups):
-            if not self._has_time(number, group, names[number]):
+            if not self._register_time(number, group, names[number]):
                 timeless.append(names[number])
                 continue
             self._check_size(group, names[number])
-            if holds_frames(group):
+            if has_only_frames(group):
                 continue
             empty = int(group.channel_group.cycles_nr) == 0
             for index, channel in enumerate(group.channels):
                 if index == mdf.masters_db[number]:
                     continue
-                unit = self._unit(number, index)
+                unit = self._get_unit(number, index)
                 places.append(_Place(number, index))
                 columns.append(Column(channel.name, unit, names[number], empty=empty))
         self._places = tuple(places)
         self.columns: Sequence[Column] = tuple(columns)
-        self.origin = self._found_origin()
+        self.origin = self._detect_origin()
         if timeless:
             left = f"groups without a time channel left out: {', '.join(timeless)}"
             self.warnings = (left, *self.warnings)
-        self.warnings = (*self.warnings, *origin_told(self.origin))
+        self.warnings = (*self.warnings, *describe_origin(self.origin))
 
-    def _has_time(self, number: int, group: Any, name: str) -> bool:
+    def _register_time(self, number: int, group: Any, name: str) -> bool:
         """Return True if a group is recorded over time; store its time channel and time unit.
 
         The standard unit is the second. Another stated unit is used, with a warning.
         """
-        master = _time_channel(group, self._mdf.masters_db.get(number))
+        master = _find_time_channel(group, self._mdf.masters_db.get(number))
         if master is None:
             return False
         self._mdf.masters_db[number] = master
-        stated, factor = self._unit(number, master), 1.0
+        stated, factor = self._get_unit(number, master), 1.0
         if self._asserted is not None:
-            factor = time_factor(self._asserted, Where(file=str(self._path)))
+            factor = get_time_factor(self._asserted, Where(file=str(self._path)))
         elif stated is not None and is_time_unit(stated):
-            factor = time_factor(stated, Where(file=str(self._path)))
+            factor = get_time_factor(stated, Where(file=str(self._path)))
             if factor != 1.0:
                 note = f"time of group {name!r} read in {stated!r}, as its unit says"
                 self.warnings = (*self.warnings, note)
         self._factors[number] = factor
         return True
 
-    def _unit(self, group: int, index: int) -> str | None:
+    def _get_unit(self, group: int, index: int) -> str | None:
         text: str = self._mdf.get_channel_unit(group=group, index=index)
         return text.strip() or None
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one channel, in a window only the records inside; see `Recording`."""
         place, column = self._places[index], self.columns[index]
-        with foreign_parser(_KIND, self._path):
-            time = self._time(place.group)
+        with handle_parser_errors(_KIND, self._path):
+            time = self._load_stamps(place.group)
             first, count = 0, time.size
             if window is not None:
                 first, last = np.searchsorted(time, window)
                 last += int(last < time.size and time[last] == window[1])
                 count = int(last - first)
                 time = time[first:last]
-            values, invalid, codes = self._samples(place, int(first), count)
+            values, invalid, codes = self._load_samples(place, int(first), count)
         where = Where(file=str(self._path), channel=str(column))
         if values.dtype.kind not in "iufb" or values.ndim != 1:
             raise DamagedChannelError(
@@ -202,27 +202,27 @@ class MdfRecording:
             time, numbers = time[~invalid], numbers[~invalid]
         return RawChannel(column.name, column.unit, time, numbers, column.group, notes)
 
-    def _found_origin(self) -> float:
+    def _detect_origin(self) -> float:
         """Origin of all groups; where the first one starts near zero, no other is looked at."""
-        starts = self._starts()
+        starts = self._iterate_first_stamps()
         first = [*islice(starts, 1)]
-        return origin_of([*first, *starts]) if origin_of(first) else 0.0
+        return find_origin([*first, *starts]) if find_origin(first) else 0.0
 
-    def _starts(self) -> Iterator[float]:
+    def _iterate_first_stamps(self) -> Iterator[float]:
         """Yield the first stamp [s] of each group; damaged groups fail later, when loaded."""
         for number, factor in self._factors.items():
             with contextlib.suppress(Exception):
                 first = self._mdf.get_master(number, record_offset=0, record_count=1)
                 yield from np.asarray(first, dtype=np.float64) * factor
 
-    def _time(self, group: int) -> FloatArray:
+    def _load_stamps(self, group: int) -> FloatArray:
         """Return the stamps [s] of a group; the stamps of the last group are cached."""
         if self._stamps is None or self._stamps[0] != group:
             master = np.asarray(self._mdf.get_master(group), dtype=np.float64)
-            self._stamps = (group, since(master * self._factors[group], self.origin))
+            self._stamps = (group, subtract_origin(master * self._factors[group], self.origin))
         return self._stamps[1]
 
-    def _samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
+    def _load_samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
         """Values with the conversion of the file, the recorder's marks for invalid ones, a note.
 
         A text among numbers, such as `not available`, becomes NaN. If all values are texts, their
@@ -241,24 +241,24 @@ class MdfRecording:
         note = ""
         samples, marks = self._mdf.get(raw=bool(formula), **wanted)
         if formula:
-            samples = self._evaluated(formula, samples, channel.name)
+            samples = self._evaluate_formula(formula, samples, channel.name)
         elif samples.dtype.kind in "SUO":
-            if _holds_numbers(channel.conversion):
+            if _has_numeric_codes(channel.conversion):
                 samples = np.full(samples.shape, np.nan)
             else:
                 samples, marks = self._mdf.get(raw=True, **wanted)
-                note = _codes(channel.conversion)
+                note = _describe_codes(channel.conversion)
         if getattr(channel, "flags", 0) & _ALL_INVALID:
             marks = np.ones(len(samples), dtype=np.bool_)
         return samples, None if marks is None else np.asarray(marks, dtype=np.bool_), note
 
-    def _evaluated(self, formula: str, raw: Any, name: str) -> Any:
+    def _evaluate_formula(self, formula: str, raw: Any, name: str) -> Any:
         """The physical values (n,) of a formula over the raw ones `X`, also named `X1`.
 
         asammdf takes raw values for physical ones where it cannot evaluate a formula, and computes
         with integers where they are, which overflow.
         """
-        numexpr = require("numexpr", "mdf", _KIND, self._path)
+        numexpr = import_extra("numexpr", "mdf", _KIND, self._path)
         try:
             numbers = np.asarray(raw, dtype=np.float64)
             names = {"X": numbers, "X1": numbers, "INF": np.inf, "NaN": np.nan}
@@ -286,7 +286,7 @@ class MdfRecording:
             )
 
 
-def _time_channel(group: Any, found: int | None) -> int | None:
+def _find_time_channel(group: Any, found: int | None) -> int | None:
     """The channel that holds the time of a group; None where it is recorded over something else.
 
     Of several over which it is recorded, as time and crank angle, asammdf has `found` the last.
@@ -302,9 +302,9 @@ def _time_channel(group: Any, found: int | None) -> int | None:
     return found if over_time else next(times, None)
 
 
-def _group_names(groups: Sequence[Any]) -> list[str]:
+def _make_group_names(groups: Sequence[Any]) -> list[str]:
     """Name of each group: of its acquisition, else its comment; with its number where repeated."""
-    names = [_group_name(group.channel_group) for group in groups]
+    names = [_get_group_name(group.channel_group) for group in groups]
     count = Counter(names)
     return [
         name if name and count[name] == 1 else f"{name} #{number}".strip()
@@ -312,19 +312,19 @@ def _group_names(groups: Sequence[Any]) -> list[str]:
     ]
 
 
-def _group_name(block: Any) -> str:
+def _get_group_name(block: Any) -> str:
     name = str(getattr(block, "acq_name", "") or "").strip()
     comment = str(block.comment or "").strip()
     return name or ("" if comment.startswith("<") else comment.partition("\n")[0])
 
 
-def _holds_numbers(conversion: Any) -> bool:
+def _has_numeric_codes(conversion: Any) -> bool:
     """Return True if a value-to-text conversion also has numeric values."""
     blocks = getattr(conversion, "referenced_blocks", None) or {}
     return any(hasattr(block, "convert") for block in blocks.values())
 
 
-def _codes(conversion: Any) -> str:
+def _describe_codes(conversion: Any) -> str:
     """Words for a table of texts: `codes of texts: 0 = off, 1 = on`."""
     blocks = getattr(conversion, "referenced_blocks", None) or {}
     pairs = []

@@ -50,15 +50,15 @@ def check_blocks(path: Path) -> None:
     """Raise FileFormatError where the blocks of an MDF file do not form sound chains."""
     size = path.stat().st_size
     if size < _HEADER4 + 64:
-        raise _fault(path, f"it ends after {size} bytes")
+        raise _make_fault(path, f"it ends after {size} bytes")
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         version = int.from_bytes(data[28:30], "little") or int.from_bytes(data[28:30], "big")
-        walk = _walk4(data) if 400 <= version < 500 else _walk3(data)
+        walk = _check_chains4(data) if 400 <= version < 500 else _check_chains3(data)
         for problem in walk:
-            raise _fault(path, problem)
+            raise _make_fault(path, problem)
 
 
-def _fault(path: Path, what: str) -> FileFormatError:
+def _make_fault(path: Path, what: str) -> FileFormatError:
     return FileFormatError(
         f"the MDF file is cut or damaged: {what}",
         "record or export the log again",
@@ -77,7 +77,7 @@ class _Block:
     end: int
 
 
-def _block(data: mmap.mmap, place: int, expected: bytes) -> _Block | str:
+def _parse_block(data: mmap.mmap, place: int, expected: bytes) -> _Block | str:
     """The block at a place, or what is wrong there."""
     if place % 8 or place + 24 > len(data):
         return f"a block should stand at byte {place} of {len(data)}"
@@ -92,7 +92,7 @@ def _block(data: mmap.mmap, place: int, expected: bytes) -> _Block | str:
     return _Block(place, kind, targets, body, min(place + length, len(data)))
 
 
-def _walk4(data: mmap.mmap) -> Iterator[str]:
+def _check_chains4(data: mmap.mmap) -> Iterator[str]:
     """Problems of the chains of an MDF 4 file."""
     seen: set[int] = set()
     waiting = [(_HEADER4, b"##HD", (0, 0))]
@@ -104,16 +104,16 @@ def _walk4(data: mmap.mmap) -> Iterator[str]:
             yield f"blocks at byte {place} form a circle"
             return
         seen.add(place)
-        block = _block(data, place, expected)
+        block = _parse_block(data, place, expected)
         if isinstance(block, str):
             yield block
             return
         if block.kind == b"##DG":
-            yield from _data_group(data, block)
+            yield from _check_data_group4(data, block)
         if block.kind == b"##CG":
-            record = _record(data, block)
+            record = _measure_record(data, block)
         if block.kind == b"##CN":
-            yield from _channel(data, block, record)
+            yield from _check_channel4(data, block, record)
         wanted = _LINKS4.get(block.kind, {})
         if block.kind == b"##CC":
             wanted = dict.fromkeys(range(4, len(block.links)), b"")
@@ -124,7 +124,7 @@ def _walk4(data: mmap.mmap) -> Iterator[str]:
         ]
 
 
-def _record(data: mmap.mmap, group: _Block) -> tuple[int, int]:
+def _measure_record(data: mmap.mmap, group: _Block) -> tuple[int, int]:
     """Bytes of a record: of its numbers, and of its marks for invalid ones."""
     if group.body + 32 > group.end:
         return 0, 0
@@ -132,7 +132,7 @@ def _record(data: mmap.mmap, group: _Block) -> tuple[int, int]:
     return numbers, marks
 
 
-def _channel(data: mmap.mmap, block: _Block, record: tuple[int, int]) -> Iterator[str]:
+def _check_channel4(data: mmap.mmap, block: _Block, record: tuple[int, int]) -> Iterator[str]:
     """A channel must lie inside the record of its group."""
     if block.body + 20 > block.end:
         yield f"the channel at byte {block.place} is cut short"
@@ -148,27 +148,27 @@ def _channel(data: mmap.mmap, block: _Block, record: tuple[int, int]) -> Iterato
         yield f"the channel at byte {block.place} has its mark outside the record"
 
 
-def _data_group(data: mmap.mmap, block: _Block) -> Iterator[str]:
+def _check_data_group4(data: mmap.mmap, block: _Block) -> Iterator[str]:
     """The samples must be as many as the one group of a sorted data group claims."""
     if len(block.links) < 3:
         yield f"the data group at byte {block.place} is cut short"
         return
     held = 0
     if block.links[2]:
-        held, problem = _held(data, block.links[2])
+        held, problem = _measure_data(data, block.links[2])
         if problem:
             yield problem
             return
-    group = _block(data, block.links[1], b"##CG") if block.links[1] else ""
+    group = _parse_block(data, block.links[1], b"##CG") if block.links[1] else ""
     if isinstance(group, str) or group.links[:1] != (0,) or group.body + 32 > group.end:
         return  # none, or unsorted: records of several groups mix
     records = struct.unpack_from("<Q", data, group.body + 8)[0]
-    needed = records * sum(_record(data, group))
+    needed = records * sum(_measure_record(data, group))
     if needed > held:
         yield f"{records} records need {needed} bytes, the file holds {held}"
 
 
-def _held(data: mmap.mmap, place: int) -> tuple[int, str]:
+def _measure_data(data: mmap.mmap, place: int) -> tuple[int, str]:
     """Bytes of samples in a data block, raw, packed or a list of such; and what is wrong."""
     lists: set[int] = set()
     total = 0
@@ -176,7 +176,7 @@ def _held(data: mmap.mmap, place: int) -> tuple[int, str]:
         if place in lists:
             return 0, f"the data list at byte {place} forms a circle"
         lists.add(place)
-        block = _block(data, place, b"")
+        block = _parse_block(data, place, b"")
         if isinstance(block, str):
             return 0, block
         if block.kind == b"##HL" and block.links:
@@ -184,7 +184,7 @@ def _held(data: mmap.mmap, place: int) -> tuple[int, str]:
             continue
         is_list = block.kind in (b"##DL", b"##LD")
         for part in block.links[1:] if is_list else (place,):
-            size = _size(data, part) if part else 0
+            size = _measure_block_data(data, part) if part else 0
             if isinstance(size, str):
                 return 0, size
             total += size
@@ -192,9 +192,9 @@ def _held(data: mmap.mmap, place: int) -> tuple[int, str]:
     return total, ""
 
 
-def _size(data: mmap.mmap, place: int) -> int | str:
+def _measure_block_data(data: mmap.mmap, place: int) -> int | str:
     """Bytes that a raw or packed data block holds, or what is wrong with it."""
-    block = _block(data, place, b"")
+    block = _parse_block(data, place, b"")
     if isinstance(block, str):
         return block
     if block.kind != b"##DZ":
@@ -207,7 +207,7 @@ def _size(data: mmap.mmap, place: int) -> int | str:
     return int(original)
 
 
-def _walk3(data: mmap.mmap) -> Iterator[str]:
+def _check_chains3(data: mmap.mmap) -> Iterator[str]:
     """Problems of the chains of an MDF 3 file."""
     order = ">" if data[24:26] not in (b"\0\0", b"  ") else "<"
     seen: set[int] = set()
@@ -222,18 +222,18 @@ def _walk3(data: mmap.mmap) -> Iterator[str]:
             yield f"no {expected.decode()} block at byte {place}"
             return
         if expected == b"DG":
-            yield from _data_group3(data, place, order)
+            yield from _check_data_group3(data, place, order)
         if expected == b"CG":
             record = struct.unpack_from(f"{order}H", data, place + 20)[0]
         if expected == b"CN":
-            yield from _channel3(data, place, order, record)
+            yield from _check_channel3(data, place, order, record)
         for offset, block in _LINKS3[expected].items():
             target = struct.unpack_from(f"{order}I", data, place + offset)[0]
             if target:
                 waiting.append((target, block, record))
 
 
-def _channel3(data: mmap.mmap, place: int, order: str, record: int) -> Iterator[str]:
+def _check_channel3(data: mmap.mmap, place: int, order: str, record: int) -> Iterator[str]:
     """A channel must lie inside the record of its group."""
     length = struct.unpack_from(f"{order}H", data, place + 2)[0]
     first, bits = struct.unpack_from(f"{order}HH", data, place + 186)
@@ -243,7 +243,7 @@ def _channel3(data: mmap.mmap, place: int, order: str, record: int) -> Iterator[
         yield f"the channel at byte {place} lies outside its record of {record} bytes"
 
 
-def _data_group3(data: mmap.mmap, place: int, order: str) -> Iterator[str]:
+def _check_data_group3(data: mmap.mmap, place: int, order: str) -> Iterator[str]:
     """The records of a data group must lie inside the file."""
     group, _, start = struct.unpack_from(f"{order}III", data, place + 8)
     marks = struct.unpack_from(f"{order}H", data, place + 22)[0]

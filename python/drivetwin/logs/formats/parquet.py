@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin._util.optional_dependencies import foreign_parser, require
-from drivetwin.channels.names import is_time_name, name_and_unit, time_index
+from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
+from drivetwin.channels.names import find_time_index, is_time_name, split_name_and_unit
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.channels.units import time_factor
+from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where
-from drivetwin.logs.origin import origin_of, origin_told, since
+from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.raw import RawChannel, Recording, Window
 
 _KIND = "a Parquet file"
@@ -37,11 +37,11 @@ def open_parquet(path: Path, options: ReadOptions) -> Iterator[Recording]:
     Raises MissingExtraError without pyarrow, FileFormatError for a damaged file,
     MissingChannelError, MappingError, UnitError and TimeError for its time column.
     """
-    parquet = require("pyarrow.parquet", "io", _KIND, path)
-    with foreign_parser(_KIND, path):
+    parquet = import_extra("pyarrow.parquet", "io", _KIND, path)
+    with handle_parser_errors(_KIND, path):
         table = parquet.ParquetFile(path)
     try:
-        with foreign_parser(_KIND, path):
+        with handle_parser_errors(_KIND, path):
             recording = ParquetRecording(table, path, options)
         yield recording
     finally:
@@ -56,14 +56,14 @@ class ParquetRecording:
         self._path = path
         self.warnings: tuple[str, ...] = ()
         schema = table.schema_arrow
-        units = _table_units(schema.metadata or {})
-        columns = [_column(field, units) for field in schema]
-        time = self._time_index(columns, options)
+        units = _parse_units(schema.metadata or {})
+        columns = [_make_column(field, units) for field in schema]
+        time = self._find_time_index(columns, options)
         self._fields = [index for index in range(len(columns)) if index != time]
         self.columns = tuple(columns[index] for index in self._fields)
-        self._seconds = self._stamps(time, columns[time], options.time.unit)
+        self._seconds = self._load_stamps(time, columns[time], options.time.unit)
 
-    def _time_index(self, columns: Sequence[Column], options: ReadOptions) -> int:
+    def _find_time_index(self, columns: Sequence[Column], options: ReadOptions) -> int:
         """The column with a name for time, else the only one whose type is a time."""
         import pyarrow as pa
 
@@ -78,20 +78,20 @@ class ParquetRecording:
         if not named and len(temporal) == 1:
             return temporal[0]
         units = [column.unit for column in columns]
-        return time_index(names, units, options.time, str(self._path))
+        return find_time_index(names, units, options.time, str(self._path))
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one column; rows without a value are no samples. See `Recording`."""
         column = self.columns[index]
         where = Where(file=str(self._path), channel=column.name)
-        values, present = self._numbers(self._fields[index], where)
+        values, present = self._load_numbers(self._fields[index], where)
         if values.size != self._seconds.size:
             what = f"{values.size} values for {self._seconds.size} time stamps"
             raise FileFormatError(what, "export the log again", where)
         channel = RawChannel(column.name, column.unit, self._seconds[present], values[present])
-        return channel.within(window)
+        return channel.select_window(window)
 
-    def _numbers(self, field: int, where: Where) -> tuple[FloatArray, Any]:
+    def _load_numbers(self, field: int, where: Where) -> tuple[FloatArray, Any]:
         import pyarrow as pa
         import pyarrow.compute as pc
 
@@ -99,13 +99,13 @@ class ParquetRecording:
         numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind)
         if not (numeric or pa.types.is_boolean(kind) or pa.types.is_decimal(kind)):
             raise DamagedChannelError(f"it holds {kind}, not numbers", "map another column", where)
-        with foreign_parser(_KIND, self._path):
-            data = self._values(field)
+        with handle_parser_errors(_KIND, self._path):
+            data = self._load_values(field)
             present = np.asarray(pc.is_valid(data).to_numpy(zero_copy_only=False), np.bool_)
             floats = pc.cast(data, pa.float64(), safe=False)
             return np.asarray(floats.to_numpy(zero_copy_only=False), np.float64), present
 
-    def _values(self, field: int) -> Any:
+    def _load_values(self, field: int) -> Any:
         """One column, picked by place among all of its name: names may repeat.
 
         By `a.b` a struct `a` with a field `b` is read as well.
@@ -115,54 +115,54 @@ class ParquetRecording:
         alike = read.schema.get_all_field_indices(names[field])
         return read.column(alike[names[:field].count(names[field])])
 
-    def _stamps(self, field: int, column: Column, asserted: str | None) -> FloatArray:
+    def _load_stamps(self, field: int, column: Column, asserted: str | None) -> FloatArray:
         import pyarrow as pa
 
         where = Where(file=str(self._path), channel=column.name)
         kind = self._table.schema_arrow.field(field).type
         if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            data = self._values(field)
+            data = self._load_values(field)
             stamps = np.asarray(data.to_numpy(zero_copy_only=False))
             if np.isnat(stamps).any():
                 raise TimeError("a row has no time stamp", "remove the row", where)
             passed = stamps - stamps[0] if stamps.size else stamps
             return passed.astype("timedelta64[ns]").astype(np.float64) * _NANOSECONDS
-        factor = time_factor(asserted if asserted is not None else column.unit, where)
-        values, present = self._numbers(field, where)
+        factor = get_time_factor(asserted if asserted is not None else column.unit, where)
+        values, present = self._load_numbers(field, where)
         if not present.all():
             row = int(present.argmin())
             raise TimeError(f"row {row} has no time stamp", "remove the row", where)
         stamps = values * factor
-        origin = origin_of(stamps[:1])
-        self.warnings = origin_told(origin)
-        return since(stamps, origin)
+        origin = find_origin(stamps[:1])
+        self.warnings = describe_origin(origin)
+        return subtract_origin(stamps, origin)
 
 
-def _column(field: Any, units: Mapping[str, str]) -> Column:
-    metadata = _texts(field.metadata or {})
-    name, in_name = name_and_unit(field.name)
+def _make_column(field: Any, units: Mapping[str, str]) -> Column:
+    metadata = _decode_metadata(field.metadata or {})
+    name, in_name = split_name_and_unit(field.name)
     stated = next((metadata[key] for key in _UNIT_KEYS if metadata.get(key, "").strip()), None)
     return Column(name, stated or units.get(field.name) or in_name)
 
 
-def _table_units(metadata: Mapping[bytes, bytes]) -> dict[str, str]:
+def _parse_units(metadata: Mapping[bytes, bytes]) -> dict[str, str]:
     """Units by column from the table's metadata; what is no JSON object of texts is passed over."""
-    texts = _texts(metadata)
-    units = next((_parsed(texts[key]) for key in _UNIT_KEYS if key in texts), None)
-    attributes = _parsed(texts.get(_PANDAS, ""))
+    texts = _decode_metadata(metadata)
+    units = next((_parse_json(texts[key]) for key in _UNIT_KEYS if key in texts), None)
+    attributes = _parse_json(texts.get(_PANDAS, ""))
     if units is None and isinstance(attributes, dict):
         units = next((attributes[key] for key in _UNIT_KEYS if key in attributes), None)
     return {k: v for k, v in units.items() if isinstance(v, str)} if isinstance(units, dict) else {}
 
 
-def _parsed(text: str) -> Any:
+def _parse_json(text: str) -> Any:
     try:
         return json.loads(text)
     except ValueError:
         return None
 
 
-def _texts(metadata: Mapping[bytes, bytes]) -> dict[str, str]:
+def _decode_metadata(metadata: Mapping[bytes, bytes]) -> dict[str, str]:
     return {
         key.decode("utf-8", "replace"): v.decode("utf-8", "replace") for key, v in metadata.items()
     }

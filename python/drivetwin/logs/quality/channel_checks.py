@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.channels.units import BAR, RPM, lookup, usual_units
+from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
 from drivetwin.logs.quality.outliers import (
     BEYOND,
     Damage,
-    beyond,
-    clipped,
-    dropouts,
-    longest_rest,
-    missing,
-    pulses,
-    resolution,
-    runs,
-    spikes,
-    stale,
-    stuck,
+    estimate_resolution,
+    find_clipping,
+    find_dropouts,
+    find_glitches,
+    find_longest_rest,
+    find_missing,
+    find_outliers,
+    find_spikes,
+    find_stale,
+    find_stuck,
+    find_true_runs,
 )
 from drivetwin.logs.quality.update_raster import find_raster
 
@@ -128,26 +128,34 @@ def check_channel(channel: Channel, file: str) -> Checked:
     check_order(channel.time, where)
     _check_count(channel, channel.time.size, where)
     _check_rate(channel, where)
-    warnings += _gaps(channel)
+    warnings += _describe_gaps(channel)
     total = channel.time.size
-    found = missing(channel.time, channel.values)
-    channel = _without(channel, found, warnings)
+    found = find_missing(channel.time, channel.values)
+    channel = _drop_damage(channel, found, warnings)
     _check_count(channel, total, where)
     _check_variation(channel, where)
-    for look in (_dropouts, _spikes, _stuck, _beyond, _pulses, _clipped, _stale):
-        channel = _without(channel, look(channel), warnings)
+    for look in (
+        _check_dropouts,
+        _check_spikes,
+        _check_stuck,
+        _check_outliers,
+        _check_glitches,
+        _check_clipping,
+        _check_stale,
+    ):
+        channel = _drop_damage(channel, look(channel), warnings)
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
     _check_sign(channel, where)
     _check_jumps(channel, where)
     _check_wraps(channel, where)
-    warnings += _at_limit(channel)
-    warnings += _at_rest(channel)
-    warnings += _coarse(channel)
+    warnings += _describe_limit(channel)
+    warnings += _describe_rest(channel)
+    warnings += _describe_rounding(channel)
     return Checked(channel, tuple(warnings))
 
 
-def _gaps(channel: Channel) -> list[str]:
+def _describe_gaps(channel: Channel) -> list[str]:
     """Words for the gaps that the file itself has."""
     if not channel.gaps:
         return []
@@ -156,14 +164,14 @@ def _gaps(channel: Channel) -> list[str]:
     return [f"channel {channel.source_name!r}: no samples from {spans}{more}"]
 
 
-def _at_limit(channel: Channel) -> list[str]:
+def _describe_limit(channel: Channel) -> list[str]:
     """Words for an engine torque that rests at its largest number alone; it may have reason to."""
     limit = float(channel.values[np.abs(channel.values).argmax()])
     at_limit = channel.values == limit
     share = float(np.mean(at_limit))
     if channel.role != "engine_torque" or not MAX_AT_LIMIT < share < 1.0:
         return []
-    rests = runs(np.diff(channel.values) == 0.0)
+    rests = find_true_runs(np.diff(channel.values) == 0.0)
     there, elsewhere = (
         max((channel.time[b] - channel.time[a] for a, b in rests if at_limit[a] == at), default=0.0)
         for at in (True, False)
@@ -173,17 +181,17 @@ def _at_limit(channel: Channel) -> list[str]:
         return []
     return [
         f"channel {channel.source_name!r}: at its largest number for {100 * share:.0f} % of the "
-        f"log, {_show(limit, channel.quantity)}; if it is saturated there, or none was received, "
+        f"log, {_format_value(limit, channel.quantity)}; if it is saturated there, or none was received, "
         "results that rest on it are wrong"
     ]
 
 
-def _at_rest(channel: Channel) -> list[str]:
+def _describe_rest(channel: Channel) -> list[str]:
     """Words for an engine torque that stays at one number where chance would have moved it."""
     if channel.role != "engine_torque":
         return []
     fresh = replace(channel, held=find_raster(channel) is not None).updates
-    span = longest_rest(fresh.time, fresh.values)
+    span = find_longest_rest(fresh.time, fresh.values)
     if span is None:
         return []
     return [
@@ -192,57 +200,63 @@ def _at_rest(channel: Channel) -> list[str]:
     ]
 
 
-def _coarse(channel: Channel) -> list[str]:
+def _describe_rounding(channel: Channel) -> list[str]:
     """Words for a measured channel that was rounded so much that nothing precise rests on it."""
     # Not from one sample to the next: along a ramp of a slow channel all may be many steps apart.
     numbers = np.unique(channel.values[np.isfinite(channel.values)])
-    step, largest = resolution(numbers), float(np.abs(numbers).max(initial=0.0))
-    if channel.quantity in AUXILIARY or step <= COARSE * largest or _switched(channel.values):
+    step, largest = estimate_resolution(numbers), float(np.abs(numbers).max(initial=0.0))
+    if channel.quantity in AUXILIARY or step <= COARSE * largest or _is_binary(channel.values):
         return []
     return [
-        f"channel {channel.source_name!r}: recorded in steps of {_show(step, channel.quantity)}, "
+        f"channel {channel.source_name!r}: recorded in steps of {_format_value(step, channel.quantity)}, "
         f"{100 * step / largest:.0f} % of its largest number; what rests on it may be as coarse"
     ]
 
 
-def _switched(values: FloatArray) -> bool:
+def _is_binary(values: FloatArray) -> bool:
     """Return True if a signal has only two values, such as the pressure of an on/off valve."""
     return bool(np.all((values == values.min()) | (values == values.max())))
 
 
-def _dropouts(channel: Channel) -> Damage | None:
+def _check_dropouts(channel: Channel) -> Damage | None:
     if channel.quantity not in (Quantity.SPEED, Quantity.TORQUE):
         return None
-    return _of_updates(channel, lambda fresh: dropouts(fresh.time, fresh.values))
+    return _check_updates(channel, lambda fresh: find_dropouts(fresh.time, fresh.values))
 
 
-def _spikes(channel: Channel) -> Damage | None:
-    return spikes(channel.time, channel.values, channel.quantity)
+def _check_spikes(channel: Channel) -> Damage | None:
+    return find_spikes(channel.time, channel.values, channel.quantity)
 
 
-def _pulses(channel: Channel) -> Damage | None:
+def _check_glitches(channel: Channel) -> Damage | None:
     """Find glitches of a measured torque. Engine torque is excluded: short cuts may be genuine."""
     if channel.role != "output_torque":
         return None
-    return _of_updates(channel, lambda fresh: pulses(fresh.time, fresh.values))
+    return _check_updates(channel, lambda fresh: find_glitches(fresh.time, fresh.values))
 
 
-def _stuck(channel: Channel) -> Damage | None:
+def _check_stuck(channel: Channel) -> Damage | None:
     """Stretches of one number; of an engine torque that a logger holds, in its fresh values."""
     if channel.role == "engine_torque":
-        return _of_updates(channel, lambda fresh: stuck(fresh.time, fresh.values, fresh.quantity))
-    return stuck(channel.time, channel.values, channel.quantity) if _measured(channel) else None
+        return _check_updates(
+            channel, lambda fresh: find_stuck(fresh.time, fresh.values, fresh.quantity)
+        )
+    return (
+        find_stuck(channel.time, channel.values, channel.quantity)
+        if _has_sensor_noise(channel)
+        else None
+    )
 
 
-def _beyond(channel: Channel) -> Damage | None:
+def _check_outliers(channel: Channel) -> Damage | None:
     """Numbers that stand for no value; what a pressure can be may be the pulse of a valve."""
     if channel.quantity in AUXILIARY:
         return None
     possible = _PLAUSIBLE[Quantity.PRESSURE][1] if channel.quantity is Quantity.PRESSURE else 0.0
-    return _of_updates(channel, lambda fresh: beyond(fresh.time, fresh.values, possible))
+    return _check_updates(channel, lambda fresh: find_outliers(fresh.time, fresh.values, possible))
 
 
-def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
+def _check_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
     """Apply `look` to the updated samples of a channel; include the samples that repeat them."""
     held = find_raster(channel) is not None
     fresh = replace(channel, held=held).updates
@@ -253,23 +267,23 @@ def _of_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> D
     return Damage(found.mask[np.clip(update, 0, None)], found.text)
 
 
-def _stale(channel: Channel) -> Damage | None:
+def _check_stale(channel: Channel) -> Damage | None:
     """Find values that a logger repeats while messages are lost."""
     if channel.quantity in AUXILIARY:
         return None
-    return _of_updates(channel, lambda fresh: stale(fresh.time, fresh.values))
+    return _check_updates(channel, lambda fresh: find_stale(fresh.time, fresh.values))
 
 
-def _clipped(channel: Channel) -> Damage | None:
-    return clipped(channel.time, channel.values) if _measured(channel) else None
+def _check_clipping(channel: Channel) -> Damage | None:
+    return find_clipping(channel.time, channel.values) if _has_sensor_noise(channel) else None
 
 
-def _measured(channel: Channel) -> bool:
+def _has_sensor_noise(channel: Channel) -> bool:
     """Return True if a channel is expected to have sensor noise."""
     return channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
 
 
-def _without(channel: Channel, damage: Damage | None, warnings: list[str]) -> Channel:
+def _drop_damage(channel: Channel, damage: Damage | None, warnings: list[str]) -> Channel:
     """Drop the damaged samples and add a warning."""
     if damage is None:
         return channel
@@ -294,12 +308,12 @@ def check_order(time: FloatArray, where: Where) -> None:
     how = "repeats the stamp before it" if step == 0 else f"lies {-step:.6g} s before the last"
     raise TimeError(
         f"time does not increase: sample {index} {how} ({backward.size} such samples)",
-        _time_remedy(time, backward),
+        _suggest_time_remedy(time, backward),
         Where(file=where.file, channel=where.channel, time=float(time[index])),
     )
 
 
-def _time_remedy(time: FloatArray, backward: NDArray[np.intp]) -> str:
+def _suggest_time_remedy(time: FloatArray, backward: NDArray[np.intp]) -> str:
     """Suggest a remedy for stamps that decrease, for example after a counter reset.
 
     Many repeated stamps without a decreasing one are a result of rounding.
@@ -374,8 +388,8 @@ def _check_jumps(channel: Channel, where: Where) -> None:
     if jumps.size:
         index = int(jumps[0]) + 1
         before, after = (
-            _show(float(channel.values[index - 1]), channel.quantity),
-            _show(float(channel.values[index]), channel.quantity),
+            _format_value(float(channel.values[index - 1]), channel.quantity),
+            _format_value(float(channel.values[index]), channel.quantity),
         )
         raise DamagedChannelError(
             f"jumps from {before} to {after} between two samples ({jumps.size} such jumps)",
@@ -407,8 +421,8 @@ def _check_wraps(channel: Channel, where: Where) -> None:
         least = WRAP_DRIFT * span
         if min(-np.sign(jump) * came, -np.sign(jump) * went) > least:
             raise DamagedChannelError(
-                f"goes on at {_show(float(values[index + 1]), channel.quantity)} after "
-                f"{_show(float(values[index]), channel.quantity)}, as a number that overflows does",
+                f"goes on at {_format_value(float(values[index + 1]), channel.quantity)} after "
+                f"{_format_value(float(values[index]), channel.quantity)}, as a number that overflows does",
                 "export the channel with more bits or another scale, or cut the log there",
                 Where(where.file, where.channel, float(channel.time[index])),
             )
@@ -429,7 +443,7 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
         return
     lowest, highest = _PLAUSIBLE[channel.quantity]
     if channel.role in _DRIVING:
-        unit = lookup(channel.source_unit)
+        unit = find_unit(channel.source_unit)
         lowest = _IDLE
         highest = _FASTEST if unit is not None and unit.factor == RPM else highest
     largest = float(np.abs(channel.values).max())
@@ -438,7 +452,7 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
     low, high = _TYPICAL[channel.quantity]
     fitting = [
         name
-        for name, factor in usual_units(channel.quantity, channel.source_unit)
+        for name, factor in list_usual_units(channel.quantity, channel.source_unit)
         if low <= factor * largest <= high
     ]
     side, limit = ("above", highest) if largest > highest else ("below", lowest)
@@ -450,14 +464,14 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
         else f"correct unit or scale of channels.{channel.role} in the channel mapping"
     )
     raise PlausibilityError(
-        f"largest {channel.quantity} is {_show(largest, channel.quantity)}, {side} "
-        f"{_show(limit, channel.quantity)}, with unit {channel.source_unit!r}",
+        f"largest {channel.quantity} is {_format_value(largest, channel.quantity)}, {side} "
+        f"{_format_value(limit, channel.quantity)}, with unit {channel.source_unit!r}",
         remedy,
         where,
     )
 
 
-def _show(value: float, quantity: Quantity) -> str:
+def _format_value(value: float, quantity: Quantity) -> str:
     """Value in the unit an engineer reads: bar, rpm, N·m."""
     factor, unit = {
         Quantity.PRESSURE: (1.0 / BAR, "bar"),
@@ -472,8 +486,8 @@ def _check_sign(channel: Channel, where: Where) -> None:
         lowest, highest = float(channel.values.min()), float(channel.values.max())
         if -lowest > max(highest, LEAST_SUCTION):
             raise PlausibilityError(
-                f"gauge pressure goes down to {_show(lowest, channel.quantity)}, but up to "
-                f"{_show(highest, channel.quantity)} only",
+                f"gauge pressure goes down to {_format_value(lowest, channel.quantity)}, but up to "
+                f"{_format_value(highest, channel.quantity)} only",
                 f"set the sign in the channel mapping: channels.{channel.role} = "
                 f'{{ source = "{channel.source_name}", sign = -1 }}',
                 where,

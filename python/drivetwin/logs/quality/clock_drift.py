@@ -31,10 +31,10 @@ _ZONE = re.compile(r"(Z|[+-]\d{2}:?\d{2})$")
 
 def is_clock(cell: str) -> bool:
     """Return True if a cell is a clock time, with or without a date before it."""
-    return _parse(cell, "") is not None
+    return _parse_clock_cell(cell, "") is not None
 
 
-def clock_seconds(cells: Sequence[str], dates: Sequence[str] | None) -> tuple[FloatArray, int]:
+def parse_clock_column(cells: Sequence[str], dates: Sequence[str] | None) -> tuple[FloatArray, int]:
     """Return seconds since the first stamp (n,) and the number of stamps that are readable.
 
     Reading stops at the first cell that is no clock time; `dates` (n,) hold the day where it stands
@@ -43,7 +43,7 @@ def clock_seconds(cells: Sequence[str], dates: Sequence[str] | None) -> tuple[Fl
     seconds = np.zeros(len(cells))
     written: list[str] = []
     for row, cell in enumerate(cells):
-        stamp = _parse(cell, "" if dates is None else dates[row])
+        stamp = _parse_clock_cell(cell, "" if dates is None else dates[row])
         if stamp is None:
             return seconds, row
         seconds[row] = stamp[1]
@@ -51,7 +51,7 @@ def clock_seconds(cells: Sequence[str], dates: Sequence[str] | None) -> tuple[Fl
     if not any(written):
         days = np.concatenate(([0.0], np.cumsum(np.diff(seconds) < -0.5 * _DAY)))[: len(cells)]
     else:
-        numbered = {text: _days(text) for text in dict.fromkeys(written)}
+        numbered = {text: _parse_days(text) for text in dict.fromkeys(written)}
         numbers = [0 if len(numbered) == 1 else numbered[text] for text in written]
         if None in numbers:
             return seconds, numbers.index(None)
@@ -59,7 +59,7 @@ def clock_seconds(cells: Sequence[str], dates: Sequence[str] | None) -> tuple[Fl
     return _DAY * (days - days[:1]) + (seconds - seconds[:1]), len(cells)
 
 
-def _parse(cell: str, day: str) -> tuple[str, float] | None:
+def _parse_clock_cell(cell: str, day: str) -> tuple[str, float] | None:
     """The date as written, blank without any, and seconds since midnight."""
     match = _STAMP.fullmatch(_ZONE.sub("", cell.strip()))
     if match is None:
@@ -72,12 +72,12 @@ def _parse(cell: str, day: str) -> tuple[str, float] | None:
     since = 3600.0 * hours + 60.0 * int(match["m"]) + int(match["s"])
     since += float(f"0.{match['fraction']}") if match["fraction"] else 0.0
     written = (match["date"] or day).strip()
-    if written and _days(written) is None and not _ONE_DAY.fullmatch(written):
+    if written and _parse_days(written) is None and not _ONE_DAY.fullmatch(written):
         return None
     return written, since
 
 
-def _days(text: str) -> int | None:
+def _parse_days(text: str) -> int | None:
     for pattern in _DATES:
         if match := pattern.fullmatch(text):
             try:

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from drivetwin.channels.roles import AUXILIARY, quantity_of
-from drivetwin.channels.shiftlog import Channel, open_ends
+from drivetwin.channels.roles import AUXILIARY, get_quantity
+from drivetwin.channels.shiftlog import Channel, find_uncovered_ends
 from drivetwin.errors import PlausibilityError, TimeError, Where
-from drivetwin.logs.quality.time_alignment import SIGNIFICANT, speed_ratio
+from drivetwin.logs.quality.time_alignment import SIGNIFICANT, estimate_speed_ratio
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 STARTS_APART = 0.05
@@ -60,9 +60,9 @@ def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
         )
 
 
-def partly_recorded(channels: Mapping[str, Channel]) -> list[str]:
+def check_coverage(channels: Mapping[str, Channel]) -> list[str]:
     """Return a warning for the channels that start later or end earlier than the log."""
-    measured = [one for role, one in channels.items() if quantity_of(role) not in AUXILIARY]
+    measured = [one for role, one in channels.items() if get_quantity(role) not in AUXILIARY]
     if not measured:
         return []
     whole = (
@@ -72,7 +72,7 @@ def partly_recorded(channels: Mapping[str, Channel]) -> list[str]:
     return [
         f"channel {channel.source_name!r}: no samples from {low:.3f} s to {high:.3f} s"
         for channel in measured
-        for low, high in open_ends(channel.updates.time, whole)
+        for low, high in find_uncovered_ends(channel.updates.time, whole)
         if high - low > STARTS_APART
     ]
 
@@ -114,12 +114,12 @@ def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str)
             )
 
 
-def final_drive_held(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+def check_final_drive(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
     """Return a warning if the ratio of output and wheel speed is not the final drive."""
     if "output_speed" not in channels or "wheel_speed" not in channels:
         return []
     outlet, wheel, final = channels["output_speed"], channels["wheel_speed"], card.final_drive
-    found = speed_ratio(outlet, wheel)
+    found = estimate_speed_ratio(outlet, wheel)
     if found is None or abs(found[0] - final) < FINAL_DRIVE_DRIFT * final + SIGNIFICANT * found[1]:
         return []
     return [
@@ -134,7 +134,7 @@ def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
     if "engine_torque" not in channels or "output_torque" not in channels:
         return
     engine, output = channels["engine_torque"], channels["output_torque"]
-    driven = output.at(engine.time)
+    driven = output.interpolate(engine.time)
     known = np.isfinite(driven)
     product = engine.values[known] * driven[known]
     size = float(np.sqrt(np.sum(engine.values[known] ** 2) * np.sum(driven[known] ** 2)))
@@ -148,13 +148,13 @@ def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
         )
 
 
-def torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+def check_torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
     """Return a warning if output and engine torque do not match the ratio of the engaged gear."""
     roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
     if not all(role in channels for role in roles):
         return []
     engine = channels["engine_torque"]
-    output, inlet, outlet = (channels[role].at(engine.time) for role in roles[1:])
+    output, inlet, outlet = (channels[role].interpolate(engine.time) for role in roles[1:])
     low, high = TORQUE_BALANCE
     texts = []
     loaded = (engine.values > LEAST_LOAD * engine.values.max()) & np.isfinite(output)
@@ -163,7 +163,7 @@ def torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[s
         held = loaded & (np.abs(inlet - expected) < IN_GEAR * np.abs(expected))
         if np.count_nonzero(held) < LEAST_SAMPLES:
             continue
-        driving = card.ratio(gear.name) * float(engine.values[held].sum())
+        driving = card.compute_ratio(gear.name) * float(engine.values[held].sum())
         share = float(output[held].sum()) / driving
         if not low <= share <= high:
             texts.append(

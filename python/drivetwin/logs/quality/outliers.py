@@ -119,28 +119,28 @@ class Damage:
     text: str
 
 
-def runs(mask: Mask) -> list[tuple[int, int]]:
+def find_true_runs(mask: Mask) -> list[tuple[int, int]]:
     """Return first index and end (one past the last) of each stretch of True."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def missing(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_missing(time: FloatArray, values: FloatArray) -> Damage | None:
     """Samples without a number."""
     mask = ~np.isfinite(values)
     if not mask.any():
         return None
-    found = runs(mask)
+    found = find_true_runs(mask)
     if all(end - start <= _CLIPPED_SAMPLES for start, end in found):
         first = float(time[found[0][0]])
         return Damage(
             mask,
             f"{int(mask.sum())} samples without a number left out, the first at {first:.3f} s",
         )
-    return Damage(mask, f"no number {_spans(time, found)}")
+    return Damage(mask, f"no number {_describe_runs(time, found)}")
 
 
-def spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
     """Up to three samples that leave the signal and return to it, far beyond its usual steps."""
     mask = np.zeros(values.size, np.bool_)
     if quantity is Quantity.STATE or values.size < 4 * _SURROUNDINGS:
@@ -154,14 +154,19 @@ def spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage |
     for width in range(1, _SPIKE_WIDTH + 1):
         if quantity is not Quantity.SPEED and width * interval > _SPIKE_TIME:
             break
-        for start in _spike_starts(values, steps, width, least):
+        for start in _find_spike_starts(values, steps, width, least):
             mask[start : start + width] = True
     if not mask.any():
         return None
-    return Damage(mask, f"{len(runs(mask))} spikes left out, {_spans(time, runs(mask))}")
+    return Damage(
+        mask,
+        f"{len(find_true_runs(mask))} spikes left out, {_describe_runs(time, find_true_runs(mask))}",
+    )
 
 
-def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: float) -> list[int]:
+def _find_spike_starts(
+    values: FloatArray, steps: FloatArray, width: int, least: float
+) -> list[int]:
     """First samples of spikes of one width: both neighbours agree, the rest around is calm."""
     before, after = values[: -width - 1], values[width + 1 :]
     base, apart = 0.5 * (before + after), np.abs(after - before)
@@ -179,7 +184,7 @@ def _spike_starts(values: FloatArray, steps: FloatArray, width: int, least: floa
     return (np.flatnonzero(found) + 1).tolist()
 
 
-def pulses(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches, longer than spikes, that a calm torque jumps to and back from in one sample each.
 
     In between it goes on as it would have without the jump, as where an amplifier is disturbed. A
@@ -206,10 +211,12 @@ def pulses(time: FloatArray, values: FloatArray) -> Damage | None:
             mask[first + 1 : last + 1] = True
     if not mask.any():
         return None
-    return Damage(mask, f"jumped up or down and back {_spans(time, runs(mask))}, left out")
+    return Damage(
+        mask, f"jumped up or down and back {_describe_runs(time, find_true_runs(mask))}, left out"
+    )
 
 
-def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
     """Stretches in which a varying signal repeats one number as it never does elsewhere.
 
     Noise stops at the start or comes back at the end, or it is a speed, which cannot jump, and
@@ -219,7 +226,7 @@ def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | 
     steps = np.diff(values)
     same, moving = steps == 0.0, np.abs(steps)
     usual = float(np.median(moving[~same])) if (~same).any() else np.inf
-    long = [(start, end) for start, end in runs(same) if end - start >= _STUCK_SAMPLES]
+    long = [(start, end) for start, end in find_true_runs(same) if end - start >= _STUCK_SAMPLES]
     outside = steps.size - sum(end - start for start, end in long)
     fine = outside >= _ENOUGH and np.count_nonzero(~same) > _MOVING * outside
     mask = np.zeros(values.size, np.bool_)
@@ -229,17 +236,19 @@ def stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | 
         slow = quantity is Quantity.SPEED and time[end] - time[start] >= _STUCK_TIME
         released = end < moving.size and moving[end] > _STUCK_RELEASE * usual
         beside = (steps[max(0, start - _BEFORE) : start], steps[end : end + _BEFORE])
-        noisy = any(_restless(some, usual) for some in beside)
+        noisy = any(_is_noisy(some, usual) for some in beside)
         if (slow and released) or (fine and noisy):
             # The first is the last that was measured, unless the signal jumped to it.
             jumped = start == 0 or moving[start - 1] > _STUCK_RELEASE * usual
             mask[start if jumped else start + 1 : end + 1] = True
     if not mask.any():
         return None
-    return Damage(mask, f"stuck at one number {_spans(time, runs(mask))}, left out")
+    return Damage(
+        mask, f"stuck at one number {_describe_runs(time, find_true_runs(mask))}, left out"
+    )
 
 
-def stale(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_stale(time: FloatArray, values: FloatArray) -> Damage | None:
     """Updates (n,) that repeat the one before while the signal moves on and then catches up.
 
     Lost messages cause such repeats. Where the signal turns or rests, a repeat may be genuine.
@@ -249,8 +258,8 @@ def stale(time: FloatArray, values: FloatArray) -> Damage | None:
     if values.size < 4 * _SURROUNDINGS:
         return None
     noise = float(np.median(np.abs(np.diff(values, 3)))) / _THIRD_DIFFERENCE
-    size, least = np.abs(steps), _MOVES * max(resolution(np.unique(values)), noise)
-    for start, end in runs(steps == 0.0):
+    size, least = np.abs(steps), _MOVES * max(estimate_resolution(np.unique(values)), noise)
+    for start, end in find_true_runs(steps == 0.0):
         if start == 0 or end == steps.size or end - start > _LOST:
             continue
         before, after, lost = size[start - 1], size[end], end - start
@@ -265,24 +274,24 @@ def stale(time: FloatArray, values: FloatArray) -> Damage | None:
     return Damage(
         mask,
         f"{count} {what} the one before while the signal moves on, as where a message is lost: "
-        f"left out, {_spans(time, runs(mask))}",
+        f"left out, {_describe_runs(time, find_true_runs(mask))}",
     )
 
 
-def _restless(steps: FloatArray, usual: float) -> bool:
+def _is_noisy(steps: FloatArray, usual: float) -> bool:
     """Return True if successive steps are as large as usual and turn as noise does."""
     turns = np.count_nonzero(np.diff(np.sign(steps)))
     return bool(turns >= _RESTLESS and np.median(np.abs(steps)) > _ALIVE * usual)
 
 
-def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | None:
+def find_longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | None:
     """Longest span [s] of one number, if a signal that jitters would not rest so by itself.
 
     Noise below the resolution rests where the true value lies in the middle between two changes of
     the rounded one, so that is what the chance of so long a rest is reckoned for.
     """
     still = np.diff(values) == 0.0
-    found = runs(still)
+    found = find_true_runs(still)
     if not found or still.all():
         return None
     start, end = max(found, key=lambda run: run[1] - run[0])
@@ -290,26 +299,26 @@ def longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, float] | 
     moving = np.diff(elsewhere) != 0.0
     if values[start] == 0.0 or moving.size < _ENOUGH or np.mean(moving) < _JITTER:
         return None
-    noise = _noise(elsewhere / resolution(elsewhere))
+    noise = _estimate_noise(elsewhere / estimate_resolution(elsewhere))
     unlikely = (end - start) * np.log(erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
     return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
 
 
-def resolution(values: FloatArray) -> float:
+def estimate_resolution(values: FloatArray) -> float:
     """Smallest step between two samples in a row; 0 where there is none."""
     steps = np.abs(np.diff(values))
     return float(steps[steps > 0.0].min()) if steps.any() else 0.0
 
 
-def staircase(values: FloatArray) -> float:
+def detect_quantization(values: FloatArray) -> float:
     """Resolution of a signal that goes in stairs, being rounded beyond its noise; else 0."""
-    step = resolution(values)
+    step = estimate_resolution(values)
     if step == 0.0 or np.mean(np.diff(values) == 0.0) < _REPEATING:
         return 0.0
-    return step if _noise(values / step) < _DITHER else 0.0
+    return step if _estimate_noise(values / step) < _DITHER else 0.0
 
 
-def _noise(codes: FloatArray) -> float:
+def _estimate_noise(codes: FloatArray) -> float:
     """Standard deviation of the noise before rounding to whole `codes` (n,), in their unit.
 
     Alternation between two adjacent codes is no evidence of noise, since the true value may lie
@@ -321,12 +330,12 @@ def _noise(codes: FloatArray) -> float:
     return float(np.interp(np.mean(turns & wide), _WIDE_TURNS, _NOISES))
 
 
-def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches of exact zeros that the signal falls to, and leaves, in one step."""
     level = float(np.percentile(np.abs(values), 98.0))
     moving = np.abs(np.diff(values))
     mask = np.zeros(values.size, np.bool_)
-    for start, end in runs(values == 0.0):
+    for start, end in find_true_runs(values == 0.0):
         if start == 0 or end == values.size:
             continue
         least = _DROP * level
@@ -339,10 +348,10 @@ def dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
             mask[start:end] = True
     if not mask.any():
         return None
-    return Damage(mask, f"fell to zero {_spans(time, runs(mask))}, left out")
+    return Damage(mask, f"fell to zero {_describe_runs(time, find_true_runs(mask))}, left out")
 
 
-def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
+def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
     """Short stretches of one number far beyond all others, entered and left in one step.
 
     Numbers that stand for no value, as -9999, and those of a message that was not received; at the
@@ -356,17 +365,19 @@ def beyond(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damag
     far = np.flatnonzero(sizes[1:] > BEYOND * sizes[:-1])
     for largest in sizes[far[sizes[far] >= np.median(size)]]:
         mask = size > largest
-        found = runs(mask)
+        found = find_true_runs(mask)
         if (
             np.unique(values[~mask]).size >= _OTHERS
-            and _are_put_in(time, values, found, float(largest))
-            and not any(_may_be_commanded(values, run, possible) for run in found)
+            and _has_only_inserted_runs(time, values, found, float(largest))
+            and not any(_can_be_fill_pulse(values, run, possible) for run in found)
         ):
-            return Damage(mask, f"far beyond all other numbers {_spans(time, found)}, left out")
+            return Damage(
+                mask, f"far beyond all other numbers {_describe_runs(time, found)}, left out"
+            )
     return None
 
 
-def _are_put_in(
+def _has_only_inserted_runs(
     time: FloatArray, values: FloatArray, found: Sequence[tuple[int, int]], largest: float
 ) -> bool:
     """Return True if each stretch is constant, short, and surrounded by other values.
@@ -381,7 +392,7 @@ def _are_put_in(
     )
 
 
-def _may_be_commanded(values: FloatArray, run: tuple[int, int], possible: float) -> bool:
+def _can_be_fill_pulse(values: FloatArray, run: tuple[int, int], possible: float) -> bool:
     """Return True if a constant stretch may be a clutch fill pulse or is cut off by the log's ends.
 
     A fill pulse starts from rest and ends at a higher pressure. After an invalid-value code the
@@ -393,16 +404,16 @@ def _may_be_commanded(values: FloatArray, run: tuple[int, int], possible: float)
     if start == 0 or end == values.size:
         return True
     before = values[max(0, start - max(end - start, _SURROUNDINGS)) : start]
-    usual = max(float(np.ptp(before)), resolution(values))
+    usual = max(float(np.ptp(before)), estimate_resolution(values))
     return float(values[end] - values[start - 1]) > _LIFT * usual
 
 
-def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_clipping(time: FloatArray, values: FloatArray) -> Damage | None:
     """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
-    same = runs(np.diff(values) == 0.0)
+    same = find_true_runs(np.diff(values) == 0.0)
     for limit in (float(values.max()), float(values.min())):
         at_limit = values == limit
-        rests = [run for run in runs(at_limit) if run[1] - run[0] >= _CLIPPED_SAMPLES]
+        rests = [run for run in find_true_runs(at_limit) if run[1] - run[0] >= _CLIPPED_SAMPLES]
         elsewhere = sum(
             end - start + 1 >= _CLIPPED_SAMPLES for start, end in same if values[start] != limit
         )
@@ -410,11 +421,11 @@ def clipped(time: FloatArray, values: FloatArray) -> Damage | None:
             mask = np.zeros(values.size, np.bool_)
             for start, end in rests:
                 mask[start:end] = True
-            return Damage(mask, f"saturated at one number {_spans(time, rests)}, left out")
+            return Damage(mask, f"saturated at one number {_describe_runs(time, rests)}, left out")
     return None
 
 
-def _spans(time: FloatArray, found: Sequence[tuple[int, int]]) -> str:
+def _describe_runs(time: FloatArray, found: Sequence[tuple[int, int]]) -> str:
     """`from 0.200 s to 0.290 s` of the first stretches, and how many more."""
     parts = [
         f"at {time[start]:.3f} s"

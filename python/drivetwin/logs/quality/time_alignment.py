@@ -62,7 +62,7 @@ class Fit:
     covariance: FloatArray
 
 
-def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> Delay | None:
+def estimate_speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> Delay | None:
     """Return how late `slower` is against `faster` where their ratio is one of `ratios`.
 
     Least squares of ω_f - i·ω_s = δ_g·ω_s + i·(τ + d·t)·dω_s/dt over all samples in gear g: the
@@ -74,9 +74,9 @@ def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> De
     if not _LEAST_TIME <= end - start <= LONGEST * max(faster.time.size, slower.time.size) * GRID:
         return None
     time = np.arange(start, end, GRID)
-    fast, slow = averaged(faster, time), averaged(slower, time)
+    fast, slow = smooth_at_times(faster, time), smooth_at_times(slower, time)
     rate = np.gradient(slow, GRID)
-    gear = _gears(fast, slow, ratios, round(SMOOTH / GRID))
+    gear = _classify_gears(fast, slow, ratios, round(SMOOTH / GRID))
     known = (gear >= 0) & np.isfinite(rate) & np.isfinite(fast)
     if np.count_nonzero(known) * GRID < _LEAST_TIME:
         return None
@@ -85,14 +85,14 @@ def speed_delay(faster: Channel, slower: Channel, ratios: Sequence[float]) -> De
     used = np.unique(gear[known])
     columns = [np.where(gear[known] == one, slow[known], 0.0) for one in used]
     design = np.column_stack([*columns, ratio * rate[known], ratio * rate[known] * t])
-    fit = least_squares(design, fast[known] - ratio * slow[known])
+    fit = fit_least_squares(design, fast[known] - ratio * slow[known])
     if fit is None:
         return None
     (value, drift), (sigma, drift_sigma) = fit.solution[-2:], np.sqrt(np.diag(fit.covariance))[-2:]
     return Delay(float(value), float(sigma), float(drift), float(drift_sigma), float(np.ptp(t)))
 
 
-def speed_ratio(faster: Channel, slower: Channel) -> tuple[float, float] | None:
+def estimate_speed_ratio(faster: Channel, slower: Channel) -> tuple[float, float] | None:
     """Ratio of two speeds that are always geared to each other, and its standard deviation.
 
     Least squares of ω_f = i·ω_s + i·τ·dω_s/dt: a delay τ between the two is no error of the ratio.
@@ -102,16 +102,16 @@ def speed_ratio(faster: Channel, slower: Channel) -> tuple[float, float] | None:
     if not _LEAST_TIME <= end - start <= LONGEST * max(faster.time.size, slower.time.size) * GRID:
         return None
     time = np.arange(start, end, GRID)
-    fast, slow = averaged(faster, time), averaged(slower, time)
+    fast, slow = smooth_at_times(faster, time), smooth_at_times(slower, time)
     rate = np.gradient(slow, GRID)
     known = np.isfinite(rate) & np.isfinite(fast)
     if np.count_nonzero(known) * GRID < _LEAST_TIME:
         return None
-    fit = least_squares(np.column_stack([slow[known], rate[known]]), fast[known])
+    fit = fit_least_squares(np.column_stack([slow[known], rate[known]]), fast[known])
     return None if fit is None else (float(fit.solution[0]), float(np.sqrt(fit.covariance[0, 0])))
 
 
-def means(channel: Channel, time: FloatArray) -> FloatArray:
+def sample_means(channel: Channel, time: FloatArray) -> FloatArray:
     """Means (n,) of a channel over GRID around each `time` (n,), from all samples there are.
 
     NaN outside its span and in its gaps.
@@ -122,22 +122,22 @@ def means(channel: Channel, time: FloatArray) -> FloatArray:
     sums = np.interp(edges, channel.time, total)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.diff(sums) / np.diff(edges)
-    return np.where(np.isfinite(channel.at(time)), mean, np.nan)
+    return np.where(np.isfinite(channel.interpolate(time)), mean, np.nan)
 
 
-def averaged(channel: Channel, time: FloatArray) -> FloatArray:
+def smooth_at_times(channel: Channel, time: FloatArray) -> FloatArray:
     """Means (n,) of a channel over SMOOTH around each `time` (n,), which are GRID apart.
 
     NaN outside its span and where they touch a gap.
     """
-    width, values = round(SMOOTH / GRID), means(channel, time)
+    width, values = round(SMOOTH / GRID), sample_means(channel, time)
     unknown = ~np.isfinite(values)
     smooth = uniform_filter1d(np.where(unknown, 0.0, values), width, mode="nearest")
     touched = uniform_filter1d(unknown.astype(np.float64), width, mode="nearest") > 1e-9
     return np.where(touched, np.nan, smooth)
 
 
-def _gears(
+def _classify_gears(
     fast: FloatArray, slow: FloatArray, ratios: Sequence[float], width: int
 ) -> np.typing.NDArray[np.intp]:
     """Index of the gear held at each sample, -1 for none; clear of the edges of each stretch."""
@@ -150,7 +150,7 @@ def _gears(
     return gear
 
 
-def least_squares(design: FloatArray, target: FloatArray) -> Fit | None:
+def fit_least_squares(design: FloatArray, target: FloatArray) -> Fit | None:
     """Fit `design` (n, p) to `target` (n,), rows GRID apart of signals averaged over SMOOTH.
 
     None where a column is none of its own.
@@ -167,7 +167,7 @@ def least_squares(design: FloatArray, target: FloatArray) -> Fit | None:
     return Fit(solution / scale, float(residual @ residual) / independent * covariance)
 
 
-def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
+def check_speed_clocks(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
     """Return warnings for significant delays and drifts of speeds against the input speed."""
     if "input_speed" not in channels:
         return []
@@ -175,17 +175,17 @@ def clock_warnings(channels: Mapping[str, Channel], card: VehicleCard) -> list[s
     texts: list[str] = []
     if "output_speed" in channels:
         outlet = channels["output_speed"].updates
-        found = speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
-        texts += _told(found, outlet, inlet)
+        found = estimate_speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
+        texts += _describe_delay(found, outlet, inlet)
     if "engine_speed" in channels:
         engine = channels["engine_speed"].updates
-        found = speed_delay(engine, inlet, [card.i_in])
+        found = estimate_speed_delay(engine, inlet, [card.i_in])
         turned = None if found is None else replace(found, value=-found.value, drift=-found.drift)
-        texts += _told(turned, engine, inlet)
+        texts += _describe_delay(turned, engine, inlet)
     return texts
 
 
-def beyond_doubt(delay: Delay, one: Channel, other: Channel) -> bool:
+def is_significant_delay(delay: Delay, one: Channel, other: Channel) -> bool:
     """Return True if a delay exceeds the effects of noise and sampling of both channels.
 
     Encoders on a bus may send the mean over a period. Such a sample is half a period late although
@@ -196,17 +196,17 @@ def beyond_doubt(delay: Delay, one: Channel, other: Channel) -> bool:
     return abs(delay.value) > _LEAST_DELAY and beyond > SIGNIFICANT * delay.sigma
 
 
-def _least(one: Channel, other: Channel) -> float:
+def _compute_min_delay(one: Channel, other: Channel) -> float:
     return max(_LEAST_DELAY, 0.5 * one.step, 0.5 * other.step)
 
 
-def _told(delay: Delay | None, other: Channel, reference: Channel) -> list[str]:
+def _describe_delay(delay: Delay | None, other: Channel, reference: Channel) -> list[str]:
     """Words for the delay of `other` against `reference`, if it is large and certain enough."""
     if delay is None:
         return []
-    least = _least(other, reference)
+    least = _compute_min_delay(other, reference)
     texts = []
-    if beyond_doubt(delay, other, reference):
+    if is_significant_delay(delay, other, reference):
         side = "late" if delay.value > 0.0 else "early"
         texts.append(
             f"channel {other.source_name!r} is {1e3 * abs(delay.value):.1f} ms {side} against "

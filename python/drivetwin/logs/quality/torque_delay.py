@@ -19,9 +19,9 @@ from drivetwin.logs.quality.time_alignment import (
     SMOOTH,
     Delay,
     Fit,
-    beyond_doubt,
-    least_squares,
-    means,
+    fit_least_squares,
+    is_significant_delay,
+    sample_means,
 )
 
 SLOW = 1.0
@@ -39,7 +39,7 @@ ALIKE = 0.5
 SPEEDS = ("wheel_speed", "output_speed")
 
 
-def torque_delay(torque: Channel, speed: Channel) -> Delay | None:
+def estimate_torque_delay(torque: Channel, speed: Channel) -> Delay | None:
     """Return how late `speed` is against `torque`; None where the log does not show it.
 
     Least squares of ω = g·(∫T_o dt - τ·T_o) + s·T_o' + d·T_o'' + c, all averaged over SMOOTH less
@@ -50,32 +50,35 @@ def torque_delay(torque: Channel, speed: Channel) -> Delay | None:
     if not SLOW < end - start <= LONGEST * max(torque.time.size, speed.time.size) * GRID:
         return None
     time = np.arange(start, end, GRID)
-    drive, motion = means(torque, time), means(speed, time)
+    drive, motion = sample_means(torque, time), sample_means(speed, time)
     unknown = ~(np.isfinite(drive) & np.isfinite(motion))
-    clear = uniform_filter1d(unknown.astype(float), _width(SLOW), mode="constant", cval=1.0) < 1e-9
+    clear = (
+        uniform_filter1d(unknown.astype(float), _convert_to_width(SLOW), mode="constant", cval=1.0)
+        < 1e-9
+    )
     if np.count_nonzero(clear) * GRID < LEAST_TIME:
         return None
     drive, motion = np.where(unknown, 0.0, drive), np.where(unknown, 0.0, motion)
     impulse = GRID * (np.cumsum(drive) - 0.5 * drive)
     rate = np.gradient(drive, GRID)
     terms = (impulse, -drive, rate, np.gradient(rate, GRID))
-    columns = [_band(one)[clear] for one in terms]
+    columns = [_filter_band(one)[clear] for one in terms]
     design = np.column_stack([*columns, np.ones(columns[0].size)])
-    fit = least_squares(design, _band(motion)[clear])
-    return None if fit is None else _delay(fit)
+    fit = fit_least_squares(design, _filter_band(motion)[clear])
+    return None if fit is None else _estimate_delay(fit)
 
 
-def _width(seconds: float) -> int:
+def _convert_to_width(seconds: float) -> int:
     return round(seconds / GRID)
 
 
-def _band(values: FloatArray) -> FloatArray:
+def _filter_band(values: FloatArray) -> FloatArray:
     """Average over SMOOTH less the average over SLOW: straight lines vanish."""
-    fast, slow = (uniform_filter1d(values, _width(span)) for span in (SMOOTH, SLOW))
+    fast, slow = (uniform_filter1d(values, _convert_to_width(span)) for span in (SMOOTH, SLOW))
     return np.asarray(fast - slow)
 
 
-def _delay(fit: Fit) -> Delay | None:
+def _estimate_delay(fit: Fit) -> Delay | None:
     """τ = (g·τ)/g with its standard deviation; None where the speed does not follow the torque."""
     gain, shifted = fit.solution[:2]
     if not gain > DRIVEN * np.sqrt(fit.covariance[0, 0]):
@@ -85,7 +88,7 @@ def _delay(fit: Fit) -> Delay | None:
     return Delay(value, float(np.sqrt(slope @ fit.covariance[:2, :2] @ slope)))
 
 
-def torque_warnings(channels: Mapping[str, Channel]) -> list[str]:
+def check_torque_delays(channels: Mapping[str, Channel]) -> list[str]:
     """Return warnings for a significant delay between output torque and speeds.
 
     A delay against all speeds is attributed to the torque, else to the speed. Only the first sample
@@ -95,19 +98,22 @@ def torque_warnings(channels: Mapping[str, Channel]) -> list[str]:
         return []
     torque = channels["output_torque"].updates
     speeds = [channels[role].updates for role in SPEEDS if role in channels]
-    found = [(speed, delay) for speed in speeds if (delay := torque_delay(torque, speed))]
-    late = [(speed, one.value) for speed, one in found if beyond_doubt(one, torque, speed)]
+    found = [(speed, delay) for speed in speeds if (delay := estimate_torque_delay(torque, speed))]
+    late = [(speed, one.value) for speed, one in found if is_significant_delay(one, torque, speed)]
     if not late:
         return []
     values = np.array([one.value for _, one in found])
     mean = float(values.mean())
     if np.all(np.abs(values - mean) < ALIKE * abs(mean)):
         names = " and ".join(repr(speed.source_name) for speed, _ in found)
-        return [_told(torque, -mean, names, mean < 0.0)]
-    return [_told(speed, value, repr(torque.source_name), value < 0.0) for speed, value in late]
+        return [_describe_torque_delay(torque, -mean, names, mean < 0.0)]
+    return [
+        _describe_torque_delay(speed, value, repr(torque.source_name), value < 0.0)
+        for speed, value in late
+    ]
 
 
-def _told(channel: Channel, value: float, others: str, torque_last: bool) -> str:
+def _describe_torque_delay(channel: Channel, value: float, others: str, torque_last: bool) -> str:
     """Words for a channel that is `value` [s] late; tyre slip too puts a speed before a torque."""
     side = "late" if value > 0.0 else "early"
     doubt = "tyre slip looks the same; " if torque_last else ""

@@ -25,7 +25,7 @@ def find_raster(channel: Channel) -> UpdateRaster | None:
     return update_raster.find_raster(channel.time, channel.values)
 
 
-def shown_late(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
+def mark_late_samples(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
     """Mark channels as `late` that a coarse table repeats; return them by role, and warnings.
 
     The arrival of their messages within a row is unknown. Channels with stamps of their own have

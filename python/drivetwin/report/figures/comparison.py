@@ -9,18 +9,18 @@ import numpy as np
 import plotly.graph_objects as go
 
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
-from drivetwin.report.figures.friction import band
-from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.figures.friction import draw_band
+from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import OUTPUTS
 from drivetwin.report.find_reports import Agreement, Trial
-from drivetwin.report.labels import parameter_label
-from drivetwin.report.style import MEASURED, axis, candidate_style, layout
+from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.style import MEASURED, get_candidate_style, make_axis, make_layout
 
 _ROW = 0.7
 """Share of the height of a row that the candidates of one parameter take up."""
 
 
-def agreement_figure(names: Sequence[str], found: Sequence[Agreement]) -> go.Figure:
+def plot_agreement(names: Sequence[str], found: Sequence[Agreement]) -> go.Figure:
     """Deviation of each candidate from the common mean, with 95 % intervals, by parameter.
 
     In standard deviations of the parameter (the median of the candidates'), so that narrow and wide
@@ -29,9 +29,9 @@ def agreement_figure(names: Sequence[str], found: Sequence[Agreement]) -> go.Fig
     shown = [one for one in found if one.apart is not None]
     figure = go.Figure()
     for k, name in enumerate(names):
-        style = candidate_style(k)
+        style = get_candidate_style(k)
         points = [
-            (row + _ROW * ((k + 0.5) / len(names) - 0.5), *_standardised(one, k), one)
+            (row + _ROW * ((k + 0.5) / len(names) - 0.5), *_standardise(one, k), one)
             for row, one in enumerate(shown)
             if (estimate := one.estimates[k]) is not None and estimate.value is not None
         ]
@@ -46,27 +46,27 @@ def agreement_figure(names: Sequence[str], found: Sequence[Agreement]) -> go.Fig
             },
             mode="markers",
             name=name,
-            text=[parameter_label(one.id) for _, _, _, one in points],
+            text=[get_parameter_label(one.id) for _, _, _, one in points],
             marker={"color": style.colour, "symbol": style.symbol, "size": 9},
             hovertemplate="%{text}: %{x:+.2f} σ<extra>" + name + "</extra>",
         )
     ticks = {
         "tickvals": list(range(len(shown))),
-        "ticktext": [parameter_label(one.id) for one in shown],
+        "ticktext": [get_parameter_label(one.id) for one in shown],
         "range": [len(shown) - 0.4, -0.6],
     }
     figure.add_vline(x=0.0, line={"color": "rgba(128,128,128,0.7)", "width": 1})
     figure.update_layout(
-        layout(
+        make_layout(
             120 + (18 + 12 * len(names)) * len(shown),
-            xaxis=axis("deviation from the common mean, with 95 % interval [σ]"),
-            yaxis=axis("", **ticks),
+            xaxis=make_axis("deviation from the common mean, with 95 % interval [σ]"),
+            yaxis=make_axis("", **ticks),
         )
     )
     return figure
 
 
-def _standardised(one: Agreement, k: int) -> tuple[float, float]:
+def _standardise(one: Agreement, k: int) -> tuple[float, float]:
     """Deviation of the `k`-th value from the mean and its 95 % half width, over the median σ."""
     stds = [each.std_total for each in one.estimates if each is not None and each.std_total]
     unit = float(np.median(stds))
@@ -76,7 +76,7 @@ def _standardised(one: Agreement, k: int) -> tuple[float, float]:
     return (estimate.value - one.mean) / unit, Z95 * (estimate.std_total or 0.0) / unit
 
 
-def friction_overlay(
+def plot_friction_overlay(
     element: str, curves: Mapping[str, FrictionCurve], order: Sequence[str]
 ) -> go.Figure:
     """μ over slip of one element as each candidate has it, with 95 % bands.
@@ -85,8 +85,8 @@ def friction_overlay(
     """
     figure = go.Figure()
     for name, curve in curves.items():
-        style = candidate_style(order.index(name))
-        figure.add_trace(band(curve, style.fill, legendgroup=name, showlegend=False))
+        style = get_candidate_style(order.index(name))
+        figure.add_trace(draw_band(curve, style.fill, legendgroup=name, showlegend=False))
         figure.add_scatter(
             x=curve.slip,
             y=curve.mu,
@@ -96,25 +96,25 @@ def friction_overlay(
             line={"color": style.colour, "width": 2.0, "dash": style.dash},
         )
     figure.update_layout(
-        layout(
+        make_layout(
             400,
-            xaxis=axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
-            yaxis=axis("friction coefficient μ [–]"),
+            xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
+            yaxis=make_axis("friction coefficient μ [–]"),
             hovermode="x",
         )
     )
     return figure
 
 
-def trial_figure(trial: Trial, order: Sequence[str]) -> go.Figure:
+def plot_trial(trial: Trial, order: Sequence[str]) -> go.Figure:
     """One shift as measured and as each candidate simulates it, residuals below."""
-    panels = trial_panels(trial, order)
+    panels = build_trial_panels(trial, order)
     phases = next(iter(trial.runs.values())).phases
-    return stacked(panels, phases, height=140 + 170 * len(panels))
+    return stack_panels(panels, phases, height=140 + 170 * len(panels))
 
 
-def trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
-    """Return the panels of `trial_figure` from top to bottom; `order` lists all candidates."""
+def build_trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
+    """Return the panels of `plot_trial` from top to bottom; `order` lists all candidates."""
     first = next(iter(trial.runs.values()))
     panels = []
     for name, (title, display, weight) in OUTPUTS.items():
@@ -124,7 +124,7 @@ def trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
         over = [Curve("measured", seen.time, seen.measured, MEASURED, width=2.4)]
         left = []
         for candidate, run in trial.runs.items():
-            trace, style = run.traces[name], candidate_style(order.index(candidate))
+            trace, style = run.traces[name], get_candidate_style(order.index(candidate))
             over.append(
                 Curve(candidate, trace.time, trace.simulated, style.colour, 1.3, style.dash)
             )
@@ -134,7 +134,7 @@ def trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
     return panels
 
 
-def fit_matrix(
+def plot_fit_matrix(
     rows: Sequence[str], columns: Sequence[str], percent: Sequence[Sequence[float | None]]
 ) -> go.Figure:
     """Fit [%] of the output torque: candidates over the logs that they simulate."""
@@ -153,10 +153,10 @@ def fit_matrix(
         )
     )
     figure.update_layout(
-        layout(
+        make_layout(
             130 + 34 * len(rows),
-            xaxis=axis("log and shift", ticks="", side="top"),
-            yaxis=axis("", ticks="", autorange="reversed"),
+            xaxis=make_axis("log and shift", ticks="", side="top"),
+            yaxis=make_axis("", ticks="", autorange="reversed"),
         )
     )
     return figure

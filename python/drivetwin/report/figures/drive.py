@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 
 from drivetwin._util.display_units import BAR, NM, RPM, Display
 from drivetwin.drive.result import DriveRun, Maneuver
-from drivetwin.report.figures.stack import Curve, Panel, over_time, whole
+from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import (
     ACCENT,
     COMPARED,
@@ -18,8 +18,8 @@ from drivetwin.report.style import (
     MUTED,
     SECOND,
     SIMULATED,
-    axis,
-    layout,
+    make_axis,
+    make_layout,
 )
 from drivetwin.simulation.dual_clutch import FloatArray
 
@@ -29,18 +29,18 @@ _BEFORE, _AFTER = 0.1, 0.6
 """What a figure of one shift shows around it, s."""
 
 
-def motion_figure(run: DriveRun) -> go.Figure:
+def plot_motion(run: DriveRun) -> go.Figure:
     """Speeds, torques, converter and pressures over the whole drive."""
-    panels = motion_panels(run)
-    return over_time(panels, whole(panels), 760)
+    panels = build_motion_panels(run)
+    return plot_over_time_axis(panels, compute_full_range(panels), 760)
 
 
-def motion_panels(run: DriveRun) -> list[Panel]:
-    """Return the panels of `motion_figure` from top to bottom."""
+def build_motion_panels(run: DriveRun) -> list[Panel]:
+    """Return the panels of `plot_motion` from top to bottom."""
     time = run.time
     return [
-        Panel("speed", RPM, _speeds(run, slice(None)), weight=1.3),
-        Panel("torque", NM, _torques(run, slice(None)), weight=1.3),
+        Panel("speed", RPM, _build_speed_curves(run, slice(None)), weight=1.3),
+        Panel("torque", NM, _build_torque_curves(run, slice(None)), weight=1.3),
         Panel(
             "converter",
             _RATIO,
@@ -50,32 +50,34 @@ def motion_panels(run: DriveRun) -> list[Panel]:
                 Curve("pedal", time, run.pedal, MUTED, dash="dot"),
             ],
         ),
-        Panel("pressure", BAR, _by_element(run.pressure, time, slice(None), run.pressure)),
+        Panel(
+            "pressure", BAR, _build_element_curves(run.pressure, time, slice(None), run.pressure)
+        ),
     ]
 
 
-def shift_figure(run: DriveRun, maneuver: Maneuver) -> go.Figure:
+def plot_maneuver(run: DriveRun, maneuver: Maneuver) -> go.Figure:
     """One shift: input speed, output torque, pressures and friction power of both elements."""
-    panels = maneuver_panels(run, maneuver)
-    return over_time(panels, whole(panels), 560)
+    panels = build_maneuver_panels(run, maneuver)
+    return plot_over_time_axis(panels, compute_full_range(panels), 560)
 
 
-def maneuver_panels(run: DriveRun, maneuver: Maneuver) -> list[Panel]:
-    """Return the panels of `shift_figure` from top to bottom."""
+def build_maneuver_panels(run: DriveRun, maneuver: Maneuver) -> list[Panel]:
+    """Return the panels of `plot_maneuver` from top to bottom."""
     action = maneuver.action
     first, last = np.searchsorted(run.time, (action.start - _BEFORE, action.end + _AFTER))
     inside = slice(int(first), int(last))
     time = run.time[inside]
     power = {name: run.slip[name] * run.torque[name] for name in action.elements}
     return [
-        Panel("speed", RPM, _speeds(run, inside)[:2]),
-        Panel("torque", NM, _torques(run, inside)),
-        Panel("pressure", BAR, _by_element(run.pressure, time, inside, action.elements)),
-        Panel("power", Display("kW", 1e-3), _by_element(power, time, inside, power)),
+        Panel("speed", RPM, _build_speed_curves(run, inside)[:2]),
+        Panel("torque", NM, _build_torque_curves(run, inside)),
+        Panel("pressure", BAR, _build_element_curves(run.pressure, time, inside, action.elements)),
+        Panel("power", Display("kW", 1e-3), _build_element_curves(power, time, inside, power)),
     ]
 
 
-def energy_figure(run: DriveRun) -> go.Figure:
+def plot_energy(run: DriveRun) -> go.Figure:
     """Friction work by element and converter heat as bars."""
     parts = {"torque converter": run.audit.converter, **run.work}
     figure = go.Figure(
@@ -87,12 +89,12 @@ def energy_figure(run: DriveRun) -> go.Figure:
             hovertemplate="%{y}: %{x:.1f} kJ<extra></extra>",
         )
     )
-    options = {"xaxis": axis("heat [kJ]"), "yaxis": axis("", autorange="reversed")}
-    figure.update_layout(layout(120 + 30 * len(parts), **options))
+    options = {"xaxis": make_axis("heat [kJ]"), "yaxis": make_axis("", autorange="reversed")}
+    figure.update_layout(make_layout(120 + 30 * len(parts), **options))
     return figure
 
 
-def _speeds(run: DriveRun, inside: slice) -> list[Curve]:
+def _build_speed_curves(run: DriveRun, inside: slice) -> list[Curve]:
     time = run.time[inside]
     return [
         Curve("engine", time, run.engine_speed[inside], MEASURED),
@@ -101,7 +103,7 @@ def _speeds(run: DriveRun, inside: slice) -> list[Curve]:
     ]
 
 
-def _torques(run: DriveRun, inside: slice) -> list[Curve]:
+def _build_torque_curves(run: DriveRun, inside: slice) -> list[Curve]:
     time = run.time[inside]
     return [
         Curve("output shaft", time, run.shaft_torque[inside], SIMULATED),
@@ -109,7 +111,7 @@ def _torques(run: DriveRun, inside: slice) -> list[Curve]:
     ]
 
 
-def _by_element(
+def _build_element_curves(
     values: Mapping[str, FloatArray], time: FloatArray, inside: slice, names: Iterable[str]
 ) -> list[Curve]:
     return [

@@ -10,12 +10,12 @@ import plotly.graph_objects as go
 
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.report.decimate import MAX_POINTS
-from drivetwin.report.style import COMPARED, FITTED, MEASURED, axis, layout
+from drivetwin.report.style import COMPARED, FITTED, MEASURED, make_axis, make_layout
 
 _BAND = "rgba(213,94,0,0.18)"
 
 
-def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
+def plot_friction(element: str, curve: FrictionCurve) -> go.Figure:
     """Points, smoothed curve with band, and the fitted Stribeck law of one element."""
     figure = go.Figure()
     if curve.points_slip.size:
@@ -27,7 +27,7 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
             name="points from the log",
             marker={"color": MEASURED, "size": 4, "opacity": 0.45},
         )
-    bounds = band(curve, _BAND, name="95 % band, sensors included")
+    bounds = draw_band(curve, _BAND, name="95 % band, sensors included")
     if len(bounds.x):
         figure.add_trace(bounds)
     figure.add_scatter(
@@ -40,23 +40,25 @@ def friction_figure(element: str, curve: FrictionCurve) -> go.Figure:
     if curve.stribeck is not None:
         figure.add_scatter(
             x=curve.slip,
-            y=curve.stribeck.at(curve.slip),
+            y=curve.stribeck.evaluate(curve.slip),
             mode="lines",
             name="Stribeck law",
             line={"color": COMPARED, "width": 1.6, "dash": "dash"},
         )
     figure.update_layout(
-        layout(
+        make_layout(
             420,
-            xaxis=axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
-            yaxis=axis(f"friction coefficient {curve.symbol} [–]", range=_mu_range(curve)),
+            xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
+            yaxis=make_axis(
+                f"friction coefficient {curve.symbol} [–]", range=_compute_mu_range(curve)
+            ),
             hovermode="x",
         )
     )
     return figure
 
 
-def band(curve: FrictionCurve, colour: str, **options: Any) -> go.Scatter:
+def draw_band(curve: FrictionCurve, colour: str, **options: Any) -> go.Scatter:
     """Area between the bounds of a curve; empty if the curve has no bounds."""
     known = np.isfinite(curve.mu_lo) & np.isfinite(curve.mu_hi)
     slip = curve.slip[known]
@@ -72,7 +74,7 @@ def band(curve: FrictionCurve, colour: str, **options: Any) -> go.Scatter:
     )
 
 
-def _mu_range(curve: FrictionCurve) -> tuple[float, float]:
+def _compute_mu_range(curve: FrictionCurve) -> tuple[float, float]:
     """Range that shows curve and band whole; stray points at vanishing pressure may lie outside."""
     values = np.concatenate((curve.mu, curve.mu_lo, curve.mu_hi))
     values = values[np.isfinite(values)]

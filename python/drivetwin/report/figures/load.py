@@ -7,10 +7,10 @@ import numpy as np
 import plotly.graph_objects as go
 
 from drivetwin.estimation.linear.load_balance import LoadFit
-from drivetwin.report.style import FITTED, MEASURED, axis, layout
+from drivetwin.report.style import FITTED, MEASURED, make_axis, make_layout
 
 
-def load_figure(fit: LoadFit, final_drive: float | None) -> go.Figure:
+def plot_load(fit: LoadFit, final_drive: float | None) -> go.Figure:
     """Surplus torque over wheel acceleration, one point per window, with the slope J3/i_f.
 
     Without `final_drive` only the points are drawn.
@@ -33,10 +33,10 @@ def load_figure(fit: LoadFit, final_drive: float | None) -> go.Figure:
             line={"color": FITTED, "width": 1.8},
         )
     figure.update_layout(
-        layout(
+        make_layout(
             400,
-            xaxis=axis("wheel acceleration ω_w′, window mean [rad/s²]"),
-            yaxis=axis("T_o − T_v/i_f, window mean [Nm]"),
+            xaxis=make_axis("wheel acceleration ω_w′, window mean [rad/s²]"),
+            yaxis=make_axis("T_o − T_v/i_f, window mean [Nm]"),
         )
     )
     return figure

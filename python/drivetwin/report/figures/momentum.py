@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from drivetwin.estimation.linear.momentum_balance import MomentumFit
-from drivetwin.report.style import COMPARED, FITTED, MEASURED, SECOND, axis, layout
+from drivetwin.report.style import COMPARED, FITTED, MEASURED, SECOND, make_axis, make_layout
 
 _STRETCHES = {
     "before": ("gear before the shift", MEASURED),
@@ -21,7 +21,7 @@ _SCAN_VIEW = 0.025
 """Ages shown on either side of the best one [s]."""
 
 
-def momentum_figure(fit: MomentumFit) -> go.Figure:
+def plot_momentum(fit: MomentumFit) -> go.Figure:
     """Driving against fitted inertia torque, one point per window; what is left; delay scan."""
     figure = make_subplots(
         rows=2,
@@ -50,12 +50,12 @@ def momentum_figure(fit: MomentumFit) -> go.Figure:
     ends = [float(both.min()), float(both.max())]
     line = {"color": FITTED, "width": 1.6}
     figure.add_scatter(x=ends, y=ends, mode="lines", name="balance", line=line, row=1, col=1)
-    figure.update_layout(layout(560))
+    figure.update_layout(make_layout(560))
     figure.update_layout(
-        xaxis=axis("inertia torque Σ J·ω′, window mean [Nm]"),
-        yaxis=axis("η·T_e − T_o/i,<br>window mean [Nm]"),
-        xaxis3=axis("time [s]"),
-        yaxis3=axis("difference [Nm]"),
+        xaxis=make_axis("inertia torque Σ J·ω′, window mean [Nm]"),
+        yaxis=make_axis("η·T_e − T_o/i,<br>window mean [Nm]"),
+        xaxis3=make_axis("time [s]"),
+        yaxis3=make_axis("difference [Nm]"),
     )
     _add_scan(figure, fit)
     return figure
@@ -67,8 +67,8 @@ def _add_scan(figure: go.Figure, fit: MomentumFit) -> None:
     if scan.best is not None:
         shown = np.abs(scan.delay - scan.best) <= _SCAN_VIEW
     figure.update_layout(
-        xaxis2=axis("assumed age of T_e [ms]"),
-        yaxis2=axis("misfit Q − min Q [–]", rangemode="tozero"),
+        xaxis2=make_axis("assumed age of T_e [ms]"),
+        yaxis2=make_axis("misfit Q − min Q [–]", rangemode="tozero"),
     )
     figure.add_scatter(
         x=1e3 * scan.delay[shown],

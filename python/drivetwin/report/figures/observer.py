@@ -13,11 +13,11 @@ BAND_FILL, BAND_EDGE = "rgba(213,94,0,0.28)", "rgba(213,94,0,0.6)"
 """Area and edges of a band, in the colour of the curve within."""
 
 
-def observer_panels(one: Observation, log: ShiftLog) -> list[Panel]:
+def build_observer_panels(one: Observation, log: ShiftLog) -> list[Panel]:
     """Build a panel for each torque; add the measured output torque if the log has one."""
     panels = []
     for name, band in one.bands.items():
-        curves = _curves(one.time, band)
+        curves = _build_band_curves(one.time, band)
         if name in log:
             channel = log[name]
             inside = (channel.time >= one.time[0]) & (channel.time <= one.time[-1])
@@ -27,7 +27,7 @@ def observer_panels(one: Observation, log: ShiftLog) -> list[Panel]:
     return panels
 
 
-def _curves(time: FloatArray, band: Band) -> list[Curve]:
+def _build_band_curves(time: FloatArray, band: Band) -> list[Curve]:
     name, edge = "95 % band", BAND_EDGE
     return [
         Curve(name, time, band.lower, edge, width=0.7, listed=False, says="from"),

@@ -9,14 +9,14 @@ import numpy as np
 import plotly.graph_objects as go
 
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, Verdict
-from drivetwin.report.labels import parameter_label
-from drivetwin.report.style import DIVERGING, MUTED, VERDICT_COLOURS, axis, layout
+from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.style import DIVERGING, MUTED, VERDICT_COLOURS, make_axis, make_layout
 
 _TICKS = [scale * 10.0**power for power in range(-4, 4) for scale in (1.0, 2.0, 5.0)]
 """Labelled values of the logarithmic axis [%]."""
 
 
-def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
+def plot_intervals(estimates: Mapping[str, Estimate]) -> go.Figure:
     """Half width of the 95 % interval relative to the value, total and noise alone, log axis.
 
     Parameters without an interval, design values, and times, which may be zero, are left out.
@@ -26,13 +26,13 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
         for one in estimates.values()
         if one.verdict is not Verdict.DESIGN
         and one.unit != "s"
-        and half_width_percent(one.value, one.std_total) is not None
+        and compute_half_width_percent(one.value, one.std_total) is not None
     ]
     figure = go.Figure()
-    names = [parameter_label(one.id) for one in shown]
+    names = [get_parameter_label(one.id) for one in shown]
     figure.add_scatter(
         y=names,
-        x=[half_width_percent(one.value, one.std_total) for one in shown],
+        x=[compute_half_width_percent(one.value, one.std_total) for one in shown],
         mode="markers",
         name="total: noise and sensor tolerances",
         marker={"color": [VERDICT_COLOURS[one.verdict] for one in shown], "size": 11},
@@ -40,33 +40,33 @@ def interval_figure(estimates: Mapping[str, Estimate]) -> go.Figure:
     )
     figure.add_scatter(
         y=names,
-        x=[half_width_percent(one.value, one.std_noise) for one in shown],
+        x=[compute_half_width_percent(one.value, one.std_noise) for one in shown],
         mode="markers",
         name="noise alone",
         marker={"color": MUTED, "symbol": "line-ns-open", "size": 12, "line": {"width": 2.5}},
         hovertemplate="%{y}: ±%{x:.2g} % from noise<extra></extra>",
     )
     figure.update_layout(
-        layout(
+        make_layout(
             90 + 26 * len(shown),
-            xaxis=axis(
+            xaxis=make_axis(
                 "half width of the 95 % interval [% of the value]",
                 type="log",
                 tickvals=_TICKS,
                 ticktext=[f"{tick:g}" for tick in _TICKS],
             ),
-            yaxis=axis("", autorange="reversed"),
+            yaxis=make_axis("", autorange="reversed"),
         )
     )
     return figure
 
 
-def half_width_percent(value: float | None, std: float | None) -> float | None:
+def compute_half_width_percent(value: float | None, std: float | None) -> float | None:
     """Return the half width of the 95 % interval in per cent of the value; None if undefined."""
     return 196.0 * abs(std / value) if value and std else None
 
 
-def correlation_figure(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
+def plot_correlation(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
     """Correlation matrix (n, n) of the estimates; pairs near ±1 are hard to separate.
 
     A fixed parameter has no correlation and is omitted.
@@ -74,7 +74,7 @@ def correlation_figure(ids: Sequence[str], correlation: FloatArray) -> go.Figure
     shown = np.count_nonzero(correlation, axis=0) > 1
     ids = [one for one, kept in zip(ids, shown, strict=True) if kept]
     correlation = correlation[np.ix_(shown, shown)]
-    names = [parameter_label(one) for one in ids]
+    names = [get_parameter_label(one) for one in ids]
     figure = go.Figure(
         go.Heatmap(
             x=names,
@@ -88,6 +88,8 @@ def correlation_figure(ids: Sequence[str], correlation: FloatArray) -> go.Figure
         )
     )
     figure.update_layout(
-        layout(140 + 34 * len(ids), xaxis=axis(""), yaxis=axis("", autorange="reversed"))
+        make_layout(
+            140 + 34 * len(ids), xaxis=make_axis(""), yaxis=make_axis("", autorange="reversed")
+        )
     )
     return figure

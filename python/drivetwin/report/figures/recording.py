@@ -9,18 +9,18 @@ import plotly.graph_objects as go
 
 from drivetwin._util.display_units import BAR, NM, RPM, Display
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.report.figures.shift_phases import shift_spans
+from drivetwin.report.figures.shift_phases import get_shift_spans
 from drivetwin.report.figures.stack import (
     Curve,
     Panel,
-    over_time,
+    build_zoom_buttons,
+    compute_full_range,
+    compute_shift_view,
+    plot_over_time_axis,
     shade_phases,
-    shift_view,
-    whole,
     write_above,
-    zoom_buttons,
 )
-from drivetwin.report.labels import channel_label
+from drivetwin.report.labels import get_channel_label
 from drivetwin.report.style import ACCENT, COMPARED, MEASURED, MUTED, SECOND, SIMULATED
 from drivetwin.shifts.shift import Shift
 
@@ -36,40 +36,40 @@ QUANTITIES: dict[Quantity, tuple[str, Display]] = {
 _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 
 
-def log_figure(log: ShiftLog, shifts: Sequence[Shift] = ()) -> go.Figure:
+def plot_log(log: ShiftLog, shifts: Sequence[Shift] = ()) -> go.Figure:
     """All channels by quantity; `shifts` are shaded and named, with a button for each.
 
     A shift is too short in a whole log for the numbers of its phases to stand side by side.
     """
-    panels = log_panels(log)
-    figure = over_time(panels, whole(panels), 120 + 170 * len(panels))
-    zooms = {"whole": whole(panels)}
+    panels = build_log_panels(log)
+    figure = plot_over_time_axis(panels, compute_full_range(panels), 120 + 170 * len(panels))
+    zooms = {"whole": compute_full_range(panels)}
     for shift in shifts:
-        spans = shift_spans(shift)
+        spans = get_shift_spans(shift)
         name = f"{shift.start_gear}→{shift.end_gear}"
         shade_phases(figure, spans)
         write_above(figure, 0.5 * (spans["torque"][0] + spans["inertia"][1]), name)
-        zooms[f"{name}, {shift.lockup_time:.1f} s"] = shift_view(spans)
+        zooms[f"{name}, {shift.lockup_time:.1f} s"] = compute_shift_view(spans)
     if shifts:
-        figure.update_layout(updatemenus=[zoom_buttons(panels, zooms)], margin={"t": 64})
+        figure.update_layout(updatemenus=[build_zoom_buttons(panels, zooms)], margin={"t": 64})
     return figure
 
 
-def log_panels(log: ShiftLog) -> list[Panel]:
-    """Return the panels of `log_figure`: one panel for each quantity in the log."""
+def build_log_panels(log: ShiftLog) -> list[Panel]:
+    """Return the panels of `plot_log`: one panel for each quantity in the log."""
     panels = []
     for quantity, (title, display) in QUANTITIES.items():
         channels = [one for one in log.channels.values() if one.quantity is quantity]
         if channels:
-            curves = [_curve(one, k) for k, one in enumerate(channels)]
+            curves = [_build_curve(one, k) for k, one in enumerate(channels)]
             panels.append(Panel(title, display, curves))
     return panels
 
 
-def _curve(channel: Channel, k: int) -> Curve:
+def _build_curve(channel: Channel, k: int) -> Curve:
     held = channel.held or channel.quantity is Quantity.STATE
     return Curve(
-        channel_label(channel.role),
+        get_channel_label(channel.role),
         channel.time,
         channel.values,
         _COLOURS[k % len(_COLOURS)],

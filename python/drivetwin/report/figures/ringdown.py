@@ -7,16 +7,16 @@ import plotly.graph_objects as go
 
 from drivetwin._util.display_units import NM
 from drivetwin.estimation.linear.ringdown import RingDown
-from drivetwin.report.figures.stack import Curve, Panel, over_time, whole
+from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import FITTED, MEASURED, MUTED
 
 
-def ringdown_figure(ring: RingDown) -> go.Figure:
+def plot_ringdown(ring: RingDown) -> go.Figure:
     """Measured output torque with the extremes read from it, or with the fit and its residual."""
-    panels = ringdown_panels(ring)
+    panels = build_ringdown_panels(ring)
     if not ring.extremes_time.size:
-        return over_time(panels, whole(panels), 460)
-    figure = over_time(panels, whole(panels), 360)
+        return plot_over_time_axis(panels, compute_full_range(panels), 460)
+    figure = plot_over_time_axis(panels, compute_full_range(panels), 360)
     figure.add_scatter(
         x=ring.extremes_time,
         y=ring.extremes_torque,
@@ -29,8 +29,8 @@ def ringdown_figure(ring: RingDown) -> go.Figure:
     return figure.update_traces(showlegend=True)
 
 
-def ringdown_panels(ring: RingDown) -> list[Panel]:
-    """The curves over time that `ringdown_figure` shows, from top to bottom."""
+def build_ringdown_panels(ring: RingDown) -> list[Panel]:
+    """The curves over time that `plot_ringdown` shows, from top to bottom."""
     measured = Curve("measured", ring.time, ring.torque, MEASURED, 1.1)
     if ring.extremes_time.size:
         return [Panel("output torque", NM, [measured])]

@@ -7,7 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from drivetwin._util.display_units import display_of, significant
+from drivetwin._util.display_units import format_significant, get_display_unit
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     AGE,
     FRICTION,
@@ -15,9 +15,9 @@ from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     Sensitivity,
 )
 from drivetwin.estimation.result.estimate import FloatArray
-from drivetwin.parameters import spec_of
-from drivetwin.report.labels import channel_symbol, channel_unit, parameter_label
-from drivetwin.report.style import DIVERGING, axis, layout
+from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.labels import get_channel_symbol, get_channel_unit, get_parameter_label
+from drivetwin.report.style import DIVERGING, make_axis, make_layout
 
 _KINDS = {
     "gain": f"gain + {100 * SIZE:g} %",
@@ -33,21 +33,21 @@ _UPRIGHT = 9
 """Letters of a sensor's name that fit above its column; longer ones are turned."""
 
 
-def sensitivity_figure(found: Sensitivity) -> go.Figure:
+def plot_sensitivity(found: Sensitivity) -> go.Figure:
     """Change of each result [%] by sensor: of gain errors, of offsets, of older values."""
-    names = [_label(one, found) for one in found.ids]
-    change = _shown(found)
-    symbols = [channel_symbol(error.rsplit(" ", 1)[0]) for error in found.errors]
+    names = [_format_label(one, found) for one in found.ids]
+    change = _scale_changes(found)
+    symbols = [get_channel_symbol(error.rsplit(" ", 1)[0]) for error in found.errors]
     angle = -90 if max(map(len, symbols)) > _UPRIGHT else 0
     figure = make_subplots(cols=len(_KINDS), shared_yaxes=True, horizontal_spacing=0.02)
     for column, (kind, title) in enumerate(_KINDS.items(), start=1):
         chosen = [k for k, error in enumerate(found.errors) if error.endswith(kind)]
         figure.add_trace(
             go.Heatmap(
-                x=[_sensor(found, k) for k in chosen],
+                x=[_describe_sensor(found, k) for k in chosen],
                 y=names,
                 z=np.sign(change[:, chosen]) * np.sqrt(np.abs(change[:, chosen])),
-                text=[[_number(value) for value in row] for row in change[:, chosen]],
+                text=[[_format_number(value) for value in row] for row in change[:, chosen]],
                 texttemplate="%{text}",
                 zmin=-np.sqrt(_FULL_COLOUR),
                 zmax=np.sqrt(_FULL_COLOUR),
@@ -58,17 +58,19 @@ def sensitivity_figure(found: Sensitivity) -> go.Figure:
             row=1,
             col=column,
         )
-        figure.update_xaxes(axis(title, side="top", tickangle=angle, ticks=""), col=column)
-    figure.update_layout(layout(170 + 27 * len(names)))
+        figure.update_xaxes(make_axis(title, side="top", tickangle=angle, ticks=""), col=column)
+    figure.update_layout(make_layout(170 + 27 * len(names)))
     figure.update_yaxes(autorange="reversed", ticks="")
-    figure.update_layout(yaxis=axis("", autorange="reversed", ticks=""), margin={"t": 80, "b": 20})
+    figure.update_layout(
+        yaxis=make_axis("", autorange="reversed", ticks=""), margin={"t": 80, "b": 20}
+    )
     return figure
 
 
-def _shown(found: Sensitivity) -> FloatArray:
+def _scale_changes(found: Sensitivity) -> FloatArray:
     """Change (q, e) in per cent of the value; of times in ms."""
     rows = [
-        1e3 * change if _is_time(name) else _percent(change, value)
+        1e3 * change if _is_time(name) else _convert_to_percent(change, value)
         for name, value, change in zip(found.ids, found.values, found.change, strict=True)
     ]
     return np.array(rows)
@@ -76,36 +78,36 @@ def _shown(found: Sensitivity) -> FloatArray:
 
 def _is_time(result_id: str) -> bool:
     """Return True if a result is a time. A time may be zero, so its change is given in ms."""
-    return spec_of(result_id).unit == "s"
+    return get_parameter_spec(result_id).unit == "s"
 
 
-def _percent(change: FloatArray, value: float) -> FloatArray:
+def _convert_to_percent(change: FloatArray, value: float) -> FloatArray:
     """Convert a change (e,) to per cent of the value; undefined for 0 unless the change is 0."""
     if value == 0.0:
         return np.where(change == 0.0, 0.0, np.nan)
     return 100.0 * change / abs(value)
 
 
-def _label(result_id: str, found: Sensitivity) -> str:
+def _format_label(result_id: str, found: Sensitivity) -> str:
     if _is_time(result_id):
-        return f"{parameter_label(result_id)} [ms]"
+        return f"{get_parameter_label(result_id)} [ms]"
     if result_id.startswith(FRICTION):
         element = result_id.removeprefix(FRICTION)
         return f"μ ({element}) at {found.slips[element]:.0f} rad/s [%]"
-    return f"{parameter_label(result_id)} [%]"
+    return f"{get_parameter_label(result_id)} [%]"
 
 
-def _sensor(found: Sensitivity, k: int) -> str:
+def _describe_sensor(found: Sensitivity, k: int) -> str:
     """Name of the sensor, and the size of its offset below it."""
     role, kind = found.errors[k].rsplit(" ", 1)
     if kind != "offset":
-        return channel_symbol(role)
-    display = display_of(channel_unit(role))
-    size = significant(found.sizes[k] * display.factor, 2)
-    return f"{channel_symbol(role)}<br>{size}<br>{display.label}"
+        return get_channel_symbol(role)
+    display = get_display_unit(get_channel_unit(role))
+    size = format_significant(found.sizes[k] * display.factor, 2)
+    return f"{get_channel_symbol(role)}<br>{size}<br>{display.label}"
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     if not np.isfinite(value):
         return "–"
     if abs(value) < _DOT:

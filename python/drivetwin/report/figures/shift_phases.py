@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from drivetwin._util.display_units import BAR, NM, RPM
 from drivetwin.channels.shiftlog import Channel, ShiftLog
-from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.style import ACCENT, COMPARED, MEASURED, SECOND
 from drivetwin.shifts.shift import Shift
 
@@ -19,31 +19,33 @@ _SPEEDS = {
 }
 
 
-def shift_phases(log: ShiftLog, shift: Shift) -> go.Figure:
+def plot_shift_phases(log: ShiftLog, shift: Shift) -> go.Figure:
     """Engine torque, pressures, output torque and speeds over time, as measured."""
-    return stacked(shift_panels(log, shift), shift_spans(shift), height=760)
+    return stack_panels(build_shift_panels(log, shift), get_shift_spans(shift), height=760)
 
 
-def shift_panels(log: ShiftLog, shift: Shift) -> list[Panel]:
-    """Return the panels of `shift_phases` from top to bottom."""
+def build_shift_panels(log: ShiftLog, shift: Shift) -> list[Panel]:
+    """Return the panels of `plot_shift_phases` from top to bottom."""
     pressures = [
-        _curve(f"{shift.offgoing} (off-going)", log.pressure(shift.offgoing), COMPARED),
-        _curve(f"{shift.oncoming} (on-coming)", log.pressure(shift.oncoming), SECOND),
+        _build_curve(f"{shift.offgoing} (off-going)", log.get_pressure(shift.offgoing), COMPARED),
+        _build_curve(f"{shift.oncoming} (on-coming)", log.get_pressure(shift.oncoming), SECOND),
     ]
     panels = [
-        Panel("engine torque", NM, [_curve("T_e", log["engine_torque"], MEASURED)], 0.8),
+        Panel("engine torque", NM, [_build_curve("T_e", log["engine_torque"], MEASURED)], 0.8),
         Panel("pressure", BAR, pressures),
     ]
     if "output_torque" in log:
-        curve = _curve("T_o", log["output_torque"], MEASURED)
+        curve = _build_curve("T_o", log["output_torque"], MEASURED)
         panels.append(Panel("output torque", NM, [curve], 1.3))
     speeds = [
-        _curve(name, log[role], colour) for role, (name, colour) in _SPEEDS.items() if role in log
+        _build_curve(name, log[role], colour)
+        for role, (name, colour) in _SPEEDS.items()
+        if role in log
     ]
     return [*panels, Panel("speed", RPM, speeds, 1.2)]
 
 
-def shift_spans(shift: Shift) -> dict[str, tuple[float, float]]:
+def get_shift_spans(shift: Shift) -> dict[str, tuple[float, float]]:
     """Intervals of the four phases [s]."""
     return {
         "before": shift.before,
@@ -53,5 +55,5 @@ def shift_spans(shift: Shift) -> dict[str, tuple[float, float]]:
     }
 
 
-def _curve(name: str, channel: Channel, colour: str) -> Curve:
+def _build_curve(name: str, channel: Channel, colour: str) -> Curve:
     return Curve(name, channel.time, channel.values, colour, step=channel.held)

@@ -17,8 +17,8 @@ import plotly.graph_objects as go
 
 from drivetwin._util.display_units import Display
 from drivetwin.estimation.result.estimate import FloatArray
-from drivetwin.report.decimate import focused
-from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, axis, layout
+from drivetwin.report.decimate import decimate_around
+from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, make_axis, make_layout
 
 Phases = Mapping[str, tuple[float, float]]
 
@@ -62,28 +62,32 @@ class Panel:
     weight: float = 1.0
 
 
-def stacked(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
+def stack_panels(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
     """Draw panels from top to bottom over a common time axis [s].
 
     `phases` maps `before`, `torque`, `inertia`, `after` to intervals [s]; the view opens on the
     shift, buttons zoom to the phases.
     """
-    view = shift_view(phases)
-    figure = over_time(panels, view, height)
-    figure.update_layout(updatemenus=[zoom_buttons(panels, _zooms(panels, phases, view))])
+    view = compute_shift_view(phases)
+    figure = plot_over_time_axis(panels, view, height)
+    figure.update_layout(
+        updatemenus=[build_zoom_buttons(panels, _compute_zooms(panels, phases, view))]
+    )
     figure.update_layout(margin={"t": 64})
     mark_phases(figure, phases)
     return figure
 
 
-def over_time(panels: Sequence[Panel], view: tuple[float, float], height: int) -> go.Figure:
+def plot_over_time_axis(
+    panels: Sequence[Panel], view: tuple[float, float], height: int
+) -> go.Figure:
     """Draw panels from top to bottom over a common time axis [s] that opens on `view`."""
     figure = go.Figure()
-    domains = _domains([panel.weight for panel in panels])
+    domains = _compute_domains([panel.weight for panel in panels])
     options: dict[str, Any] = {}
     for number, (panel, domain) in enumerate(zip(panels, domains, strict=True), start=1):
         suffix = "" if number == 1 else str(number)
-        options[f"yaxis{suffix}"] = _y_axis(panel, domain)
+        options[f"yaxis{suffix}"] = _build_y_axis(panel, domain)
         options[f"legend{suffix}"] = {
             "x": 1.01,
             "y": domain[1],
@@ -91,8 +95,8 @@ def over_time(panels: Sequence[Panel], view: tuple[float, float], height: int) -
             "bgcolor": "rgba(0,0,0,0)",
         }
         for curve in panel.curves:
-            figure.add_trace(_trace(curve, panel, suffix, view))
-    options["xaxis"] = axis(
+            figure.add_trace(_build_trace(curve, panel, suffix, view))
+    options["xaxis"] = make_axis(
         "time [s]",
         anchor=f"y{len(panels)}" if len(panels) > 1 else "y",
         range=view,
@@ -102,9 +106,9 @@ def over_time(panels: Sequence[Panel], view: tuple[float, float], height: int) -
         spikedash="dot",
         spikecolor="#8a8f98",
     )
-    figure.update_layout(layout(height, **options))
+    figure.update_layout(make_layout(height, **options))
     figure.update_layout(
-        {f"{name}.range": span for name, span in y_ranges(panels, view).items()},
+        {f"{name}.range": span for name, span in compute_y_ranges(panels, view).items()},
         margin={"r": 150},
         hovermode="x unified",
         hoversubplots="axis",
@@ -112,14 +116,16 @@ def over_time(panels: Sequence[Panel], view: tuple[float, float], height: int) -
     return figure
 
 
-def y_ranges(panels: Sequence[Panel], view: tuple[float, float]) -> dict[str, tuple[float, float]]:
+def compute_y_ranges(
+    panels: Sequence[Panel], view: tuple[float, float]
+) -> dict[str, tuple[float, float]]:
     """Range in display units by y axis (`yaxis`, `yaxis2`, ...) that shows what is in `view` [s].
 
     A panel without a sample in view has none.
     """
     found = {}
     for number, panel in enumerate(panels, start=1):
-        parts = [panel.display.of(_inside(curve, view)) for curve in panel.curves]
+        parts = [panel.display.to_display(_select_in_view(curve, view)) for curve in panel.curves]
         values = np.concatenate([part[np.isfinite(part)] for part in parts] or [np.empty(0)])
         if values.size:
             low, high = float(values.min()), float(values.max())
@@ -129,19 +135,19 @@ def y_ranges(panels: Sequence[Panel], view: tuple[float, float]) -> dict[str, tu
     return found
 
 
-def _inside(curve: Curve, view: tuple[float, float]) -> FloatArray:
+def _select_in_view(curve: Curve, view: tuple[float, float]) -> FloatArray:
     """Samples in view: of held values with the one before it, of others with the one after."""
     first, last = np.searchsorted(curve.time, view)
     return curve.values[max(0, first - 1) : last] if curve.step else curve.values[first : last + 1]
 
 
-def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
+def _build_y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
     ticks = 3 + round(12 * (domain[1] - domain[0]))
     title = f"{panel.quantity}<br>[{panel.display.label}]"
-    return axis(title, domain=domain, anchor="x", nticks=ticks)
+    return make_axis(title, domain=domain, anchor="x", nticks=ticks)
 
 
-def _domains(weights: Sequence[float]) -> list[tuple[float, float]]:
+def _compute_domains(weights: Sequence[float]) -> list[tuple[float, float]]:
     """Vertical extents from top to bottom, in shares of the plot's height."""
     usable = 1.0 - _GAP * (len(weights) - 1)
     domains, top = [], 1.0
@@ -152,11 +158,11 @@ def _domains(weights: Sequence[float]) -> list[tuple[float, float]]:
     return domains
 
 
-def _trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -> go.Scatter:
-    time, values = focused(curve.time, curve.values, view)
+def _build_trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -> go.Scatter:
+    time, values = decimate_around(curve.time, curve.values, view)
     return go.Scatter(
         x=time.astype("float32" if np.abs(time).max(initial=0.0) < _FINE else "float64"),
-        y=panel.display.of(values).astype("float32"),
+        y=panel.display.to_display(values).astype("float32"),
         name=curve.name,
         mode="lines",
         line={
@@ -175,17 +181,17 @@ def _trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -
     )
 
 
-def shift_view(phases: Phases) -> tuple[float, float]:
+def compute_shift_view(phases: Phases) -> tuple[float, float]:
     """The shift with half a second before and one second after it."""
     start, end = phases["torque"][0], phases["inertia"][1]
     return max(phases["before"][0], start - 0.5), min(phases["after"][1], end + 1.0)
 
 
-def _zooms(
+def _compute_zooms(
     panels: Sequence[Panel], phases: Phases, view: tuple[float, float]
 ) -> dict[str, tuple[float, float]]:
     """Views to choose from, by label."""
-    zooms = {"shift": view, "whole": whole(panels)}
+    zooms = {"shift": view, "whole": compute_full_range(panels)}
     for phase, label in _ZOOMS.items():
         start, end = phases[phase]
         end = min(end, start + 1.0)
@@ -194,19 +200,21 @@ def _zooms(
     return zooms
 
 
-def whole(panels: Sequence[Panel]) -> tuple[float, float]:
+def compute_full_range(panels: Sequence[Panel]) -> tuple[float, float]:
     """Time that the curves cover together [s]."""
     times = [curve.time for panel in panels for curve in panel.curves if curve.time.size]
     return float(min(time[0] for time in times)), float(max(time[-1] for time in times))
 
 
-def zoom_buttons(
+def build_zoom_buttons(
     panels: Sequence[Panel], zooms: Mapping[str, tuple[float, float]]
 ) -> dict[str, Any]:
     """Buttons above the panels, one for each labelled view [s]; each fits the y axes too."""
     buttons = []
     for label, span in zooms.items():
-        fitted = {f"{name}.range": list(two) for name, two in y_ranges(panels, span).items()}
+        fitted = {
+            f"{name}.range": list(two) for name, two in compute_y_ranges(panels, span).items()
+        }
         change = {"xaxis.range": list(span), **fitted}
         buttons.append({"label": label, "method": "relayout", "args": [change]})
     return {

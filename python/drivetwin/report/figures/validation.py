@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from drivetwin._util.display_units import BAR, NM, RPM, Display
 from drivetwin.estimation.result.validation import SignalTrace, Validation
-from drivetwin.report.figures.stack import Curve, Panel, stacked
+from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.style import COMPARED, MEASURED, MUTED, SECOND, SIMULATED
 
 OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
@@ -20,13 +20,13 @@ OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
 """Compared signals: axis title, unit and panel height."""
 
 
-def validation_figure(validation: Validation) -> go.Figure:
+def plot_validation(validation: Validation) -> go.Figure:
     """Inputs that drove the model, then each output as measured and as simulated."""
-    return stacked(validation_panels(validation), validation.phases, height=1180)
+    return stack_panels(build_validation_panels(validation), validation.phases, height=1180)
 
 
-def validation_panels(validation: Validation) -> list[Panel]:
-    """Return the panels of `validation_figure` from top to bottom."""
+def build_validation_panels(validation: Validation) -> list[Panel]:
+    """Return the panels of `plot_validation` from top to bottom."""
     shift = validation.shift
     torque = validation.engine_torque
     pressures = [
@@ -40,17 +40,17 @@ def validation_panels(validation: Validation) -> list[Panel]:
     for name, (title, display, weight) in OUTPUTS.items():
         if name in validation.traces:
             trace = validation.traces[name]
-            panels.append(Panel(title, display, _pair(trace), weight))
-            panels.append(Panel("residual", display, [_residual(trace)], 0.5))
+            panels.append(Panel(title, display, _build_pair(trace), weight))
+            panels.append(Panel("residual", display, [_build_residual(trace)], 0.5))
     return panels
 
 
-def _pair(trace: SignalTrace) -> list[Curve]:
+def _build_pair(trace: SignalTrace) -> list[Curve]:
     return [
         Curve("measured", trace.time, trace.measured, MEASURED, width=2.4),
         Curve("simulated", trace.time, trace.simulated, SIMULATED, width=1.2),
     ]
 
 
-def _residual(trace: SignalTrace) -> Curve:
+def _build_residual(trace: SignalTrace) -> Curve:
     return Curve("measured − simulated", trace.time, trace.measured - trace.simulated, MUTED, 1.0)

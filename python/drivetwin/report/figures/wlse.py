@@ -11,7 +11,7 @@ from plotly.subplots import make_subplots
 
 from drivetwin.estimation.paper.wlse import GridFit
 from drivetwin.estimation.result.estimate import FloatArray
-from drivetwin.report.style import COMPARED, FITTED, MEASURED, MUTED, axis, layout
+from drivetwin.report.style import COMPARED, FITTED, MEASURED, MUTED, make_axis, make_layout
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class WlseLabels:
     inertia: str
 
 
-def wlse_figure(fit: GridFit, labels: WlseLabels) -> go.Figure:
+def plot_wlse(fit: GridFit, labels: WlseLabels) -> go.Figure:
     """Scatter with the fitted line at the best grid value; RMS error over the grid next to it."""
     figure = make_subplots(cols=2, column_widths=[0.62, 0.38], horizontal_spacing=0.12)
     first = fit.rows[0].value
@@ -45,10 +45,10 @@ def wlse_figure(fit: GridFit, labels: WlseLabels) -> go.Figure:
             row=1,
             col=1,
         )
-    ends = _ends(fit.acceleration)
+    ends = _get_ends(fit.acceleration)
     figure.add_scatter(
         x=ends,
-        y=ends * _slope(fit),
+        y=ends * _compute_slope(fit),
         mode="lines",
         name=f"{labels.inertia} = {fit.best.inertia:.4g} kg·m²",
         line={"color": FITTED, "width": 2},
@@ -75,21 +75,21 @@ def wlse_figure(fit: GridFit, labels: WlseLabels) -> go.Figure:
         row=1,
         col=2,
     )
-    figure.update_layout(layout(430))
+    figure.update_layout(make_layout(430))
     figure.update_layout(
-        xaxis=axis(labels.acceleration),
-        yaxis=axis(labels.torque),
-        xaxis2=axis(f"{labels.grid} [{labels.unit}]"),
-        yaxis2=axis("RMS error at the output shaft [Nm]", rangemode="tozero"),
+        xaxis=make_axis(labels.acceleration),
+        yaxis=make_axis(labels.torque),
+        xaxis2=make_axis(f"{labels.grid} [{labels.unit}]"),
+        yaxis2=make_axis("RMS error at the output shaft [Nm]", rangemode="tozero"),
     )
     return figure
 
 
-def _slope(fit: GridFit) -> float:
+def _compute_slope(fit: GridFit) -> float:
     """Weighted least-squares slope of the scatter: J′ for eq. 10, J3/i_f for eq. 11."""
     normal = float(fit.weights @ fit.acceleration**2)
     return float(fit.weights @ (fit.acceleration * fit.torque)) / normal
 
 
-def _ends(values: FloatArray) -> FloatArray:
+def _get_ends(values: FloatArray) -> FloatArray:
     return np.array([min(0.0, float(values.min())), max(0.0, float(values.max()))])

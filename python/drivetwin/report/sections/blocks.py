@@ -111,11 +111,11 @@ class Section:
         return not any(isinstance(one, FigureBlock) for one in self.blocks)
 
 
-def link_of(shift: Shift) -> str:
+def make_link(shift: Shift) -> str:
     """The `link` of all figures of one shift."""
     return f"{shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.3f} s"
 
 
-def cells(*texts: str, number: bool = False) -> tuple[Cell, ...]:
+def make_cells(*texts: str, number: bool = False) -> tuple[Cell, ...]:
     """Plain cells of one row."""
     return tuple(Cell(text, number=number) for text in texts)

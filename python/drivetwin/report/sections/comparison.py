@@ -6,17 +6,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from drivetwin._util.display_units import Display, display_of, significant, with_uncertainty
+from drivetwin._util.display_units import (
+    Display,
+    format_significant,
+    format_uncertainty,
+    get_display_unit,
+)
 from drivetwin.estimation.result.estimate import Z95, Estimate
 from drivetwin.report.figures.comparison import (
-    agreement_figure,
-    fit_matrix,
-    friction_overlay,
-    trial_figure,
-    trial_panels,
+    build_trial_panels,
+    plot_agreement,
+    plot_fit_matrix,
+    plot_friction_overlay,
+    plot_trial,
 )
-from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, agreements
-from drivetwin.report.labels import parameter_label
+from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
+from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -27,45 +32,45 @@ from drivetwin.report.sections.blocks import (
     Tile,
     TilesBlock,
     Tone,
-    cells,
+    make_cells,
 )
-from drivetwin.report.sections.parameters import PHASES, SIGNALS, fit_cell
+from drivetwin.report.sections.parameters import PHASES, SIGNALS, make_fit_cell
 from drivetwin.shifts.shift import Shift
 
 
-def agreement_section(candidates: Sequence[Candidate]) -> Section:
+def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
     """Build the section that compares the parameters and tests their agreement."""
-    found = agreements(candidates)
+    found = compare_estimates(candidates)
     judged = [one for one in found if one.agrees is not None]
     differing = [one for one in judged if not one.agrees]
-    blocks: list[Block] = [TilesBlock(_tiles(candidates, judged, differing))]
+    blocks: list[Block] = [TilesBlock(_build_tiles(candidates, judged, differing))]
     if differing:
         texts = [
-            f"{parameter_label(one.id)}: {significant(one.apart or 0.0, 2)} standard deviations"
+            f"{get_parameter_label(one.id)}: {format_significant(one.apart or 0.0, 2)} standard deviations"
             for one in differing
         ]
         blocks.append(NotesBlock("Differ by more than their uncertainty", texts, Tone.DOUBTFUL))
-    blocks.append(_parameter_table(candidates, found))
+    blocks.append(_build_parameter_table(candidates, found))
     if judged:
         blocks.append(
             FigureBlock(
-                agreement_figure([one.name for one in candidates], judged),
+                plot_agreement([one.name for one in candidates], judged),
                 "Each value against the mean of all (weighted by their uncertainty) with its total "
                 "95 % interval, in standard deviations of the parameter. Intervals that do not "
                 "overlap are a difference that needs a reason.",
             )
         )
-    return Section("agreement", "Do they agree?", _headline(judged, differing), blocks)
+    return Section("agreement", "Do they agree?", _write_headline(judged, differing), blocks)
 
 
-def _headline(judged: Sequence[Agreement], differing: Sequence[Agreement]) -> str:
+def _write_headline(judged: Sequence[Agreement], differing: Sequence[Agreement]) -> str:
     if not judged:
         return "No parameter that two of them tell has an uncertainty."
     text = f"{len(judged) - len(differing)} of {len(judged)} common parameters agree"
     return f"{text} within their total uncertainty ({DIFFER} standard deviations)."
 
 
-def _tiles(
+def _build_tiles(
     candidates: Sequence[Candidate], judged: Sequence[Agreement], differing: Sequence[Agreement]
 ) -> list[Tile]:
     tone = Tone.DOUBTFUL if differing else Tone.GOOD
@@ -84,18 +89,20 @@ def _tiles(
     return tiles
 
 
-def _parameter_table(candidates: Sequence[Candidate], found: Sequence[Agreement]) -> TableBlock:
+def _build_parameter_table(
+    candidates: Sequence[Candidate], found: Sequence[Agreement]
+) -> TableBlock:
     rows = []
     for one in found:
         told = next(each for each in one.estimates if each is not None)
-        display = display_of(told.unit)
+        display = get_display_unit(told.unit)
         rows.append(
             (
-                Cell(parameter_label(one.id), note=one.id),
-                *(value_cell(each, display) for each in one.estimates),
+                Cell(get_parameter_label(one.id), note=one.id),
+                *(make_value_cell(each, display) for each in one.estimates),
                 Cell(display.label),
-                Cell("–" if one.apart is None else significant(one.apart, 2), number=True),
-                _verdict(one, candidates),
+                Cell("–" if one.apart is None else format_significant(one.apart, 2), number=True),
+                _make_verdict_cell(one, candidates),
             )
         )
     head = (
@@ -108,16 +115,16 @@ def _parameter_table(candidates: Sequence[Candidate], found: Sequence[Agreement]
     return TableBlock("Parameters side by side.", head, rows)
 
 
-def value_cell(one: Estimate | None, display: Display) -> Cell:
+def make_value_cell(one: Estimate | None, display: Display) -> Cell:
     """Format a value with its total 95 % half width below; a dash without a value."""
     if one is None or one.value is None:
         return Cell("–", number=True, note="" if one is None else one.verdict.value)
     half = None if one.std_total is None else Z95 * one.std_total * display.factor
-    value, width = with_uncertainty(one.value * display.factor, half)
+    value, width = format_uncertainty(one.value * display.factor, half)
     return Cell(value, number=True, note=f"± {width}" if width else "")
 
 
-def _verdict(one: Agreement, candidates: Sequence[Candidate]) -> Cell:
+def _make_verdict_cell(one: Agreement, candidates: Sequence[Candidate]) -> Cell:
     bare = ", ".join(candidates[k].name for k in one.bare)
     note = f"no interval: {bare}" if bare else ""
     if one.agrees is None:
@@ -127,13 +134,13 @@ def _verdict(one: Agreement, candidates: Sequence[Candidate]) -> Cell:
     return Cell(word, badge=True, tone=tone, note=note)
 
 
-def friction_overlay_section(candidates: Sequence[Candidate]) -> Section:
+def build_friction_overlay_section(candidates: Sequence[Candidate]) -> Section:
     """μ over slip of every element, one curve per candidate."""
     order = [one.name for one in candidates]
     elements = dict.fromkeys(element for one in candidates for element in one.friction)
     blocks = [
         FigureBlock(
-            friction_overlay(
+            plot_friction_overlay(
                 element,
                 {c.name: c.friction[element] for c in candidates if element in c.friction},
                 order,
@@ -145,13 +152,13 @@ def friction_overlay_section(candidates: Sequence[Candidate]) -> Section:
     return Section("friction", "Friction", "Bands hold 95 %, sensors included.", blocks)
 
 
-def trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> list[Section]:
+def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> list[Section]:
     """Every log simulated by every candidate: the fit of all, then shift by shift."""
     if not trials:
         return []
     order = [one.name for one in candidates]
     matrix = FigureBlock(
-        fit_matrix(order, [one.label for one in trials], _percent(order, trials)),
+        plot_fit_matrix(order, [one.label for one in trials], _collect_fit_percent(order, trials)),
         "Fit [%] of the output torque over the whole shift; a dash where the log has none or the "
         "simulation was not possible.",
     )
@@ -161,13 +168,13 @@ def trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> 
             shift = next(iter(trial.runs.values())).shift
             shifts.append(
                 FigureBlock(
-                    trial_figure(trial, order),
+                    plot_trial(trial, order),
                     f"{trial.label}: measured, and simulated from the measured inputs by each.",
-                    trial_panels(trial, order),
+                    build_trial_panels(trial, order),
                     trial.label,
                 )
             )
-            shifts.append(_trial_table(trial, shift))
+            shifts.append(_build_trial_table(trial, shift))
         if trial.refused:
             texts = [f"{name}: {why}" for name, why in trial.refused.items()]
             shifts.append(NotesBlock(f"Not simulated: {trial.label}", texts, Tone.DOUBTFUL))
@@ -182,7 +189,7 @@ def trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> 
     ]
 
 
-def _percent(order: Sequence[str], trials: Sequence[Trial]) -> list[list[float | None]]:
+def _collect_fit_percent(order: Sequence[str], trials: Sequence[Trial]) -> list[list[float | None]]:
     rows: list[list[float | None]] = []
     for name in order:
         fits = [
@@ -195,12 +202,15 @@ def _percent(order: Sequence[str], trials: Sequence[Trial]) -> list[list[float |
     return rows
 
 
-def _trial_table(trial: Trial, shift: Shift) -> TableBlock:
-    head = (*cells("model", "signal"), *(Cell(label, number=True) for label in PHASES.values()))
+def _build_trial_table(trial: Trial, shift: Shift) -> TableBlock:
+    head = (
+        *make_cells("model", "signal"),
+        *(Cell(label, number=True) for label in PHASES.values()),
+    )
     rows = [
         (
-            *cells(name, label),
-            *(fit_cell(run.fit[signal].get(phase), display) for phase in PHASES),
+            *make_cells(name, label),
+            *(make_fit_cell(run.fit[signal].get(phase), display) for phase in PHASES),
         )
         for name, run in trial.runs.items()
         for signal, (label, display) in SIGNALS.items()
@@ -212,14 +222,14 @@ def _trial_table(trial: Trial, shift: Shift) -> TableBlock:
     return TableBlock(caption, head, rows)
 
 
-def origin_section(candidates: Sequence[Candidate]) -> Section:
+def build_origin_section(candidates: Sequence[Candidate]) -> Section:
     """List the source files of each candidate."""
     rows = [
-        cells(one.name, one.method, one.version, file, digest)
+        make_cells(one.name, one.method, one.version, file, digest)
         for one in candidates
         for file, digest in one.inputs.items()
     ]
-    head = cells("identification", "method", "version", "input", "SHA-256")
+    head = make_cells("identification", "method", "version", "input", "SHA-256")
     return Section(
         "origin", "Origin", "What each identification was made from.", [TableBlock("", head, rows)]
     )

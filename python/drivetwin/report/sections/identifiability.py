@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
-from drivetwin._util.display_units import Display, display_of, significant
+from drivetwin._util.display_units import Display, format_significant, get_display_unit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.estimation.result.suggestion import Suggestion
-from drivetwin.estimation.result.verdict import advice_for
-from drivetwin.report.figures.parameters import correlation_figure, half_width_percent
-from drivetwin.report.labels import parameter_label
+from drivetwin.estimation.result.suggestion import ExperimentRanking
+from drivetwin.estimation.result.verdict import get_advice
+from drivetwin.report.figures.parameters import compute_half_width_percent, plot_correlation
+from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -20,7 +20,7 @@ from drivetwin.report.sections.blocks import (
     NotesBlock,
     Section,
     TableBlock,
-    cells,
+    make_cells,
 )
 from drivetwin.report.sections.parameters import TONES
 
@@ -37,19 +37,23 @@ _LEAST_KNOWN = 5
 """How many parameters are listed with the experiment that would narrow them."""
 
 
-def limits_section(found: Identification) -> Section:
+def build_limits_section(found: Identification) -> Section:
     """Build the section on parameters that the log cannot determine, and helpful experiments."""
     suggestions = found.evidence.suggestions
-    narrower = _suggested(suggestions, found) if suggestions else _least_known(found)
-    blocks: list[Block] = [*_remarks(found), *narrower]
+    narrower = (
+        _build_suggestion_tables(suggestions, found)
+        if suggestions
+        else _build_uncertainty_tables(found)
+    )
+    blocks: list[Block] = [*_build_remark_tables(found), *narrower]
     blocks.append(NotesBlock("Not separable from any one shift", _INSEPARABLE))
     if found.correlation is not None:
-        pairs = list(_close_pairs(found))
+        pairs = list(_list_correlated_pairs(found))
         if pairs:
             blocks.append(NotesBlock("Known together better than apart", pairs))
         blocks.append(
             FigureBlock(
-                correlation_figure(found.correlation_ids, found.correlation),
+                plot_correlation(found.correlation_ids, found.correlation),
                 "Correlation of the estimates: near +1 their errors go up and down together, "
                 "near −1 one is too high where the other is too low.",
             )
@@ -62,12 +66,12 @@ def limits_section(found: Identification) -> Section:
     )
 
 
-def _remarks(found: Identification) -> Iterator[TableBlock]:
+def _build_remark_tables(found: Identification) -> Iterator[TableBlock]:
     """Build a table with one row for each reason of a verdict."""
     remarked: dict[tuple[Verdict, str], list[str]] = {}
     for one in found.estimates.values():
         if one.reason:
-            remarked.setdefault((one.verdict, one.reason), []).append(parameter_label(one.id))
+            remarked.setdefault((one.verdict, one.reason), []).append(get_parameter_label(one.id))
     if remarked:
         rows = [
             (
@@ -79,28 +83,30 @@ def _remarks(found: Identification) -> Iterator[TableBlock]:
         ]
         yield TableBlock(
             "Parameters that call for a remark.",
-            cells("parameter", "verdict", "remark: why, and which experiment would help"),
+            make_cells("parameter", "verdict", "remark: why, and which experiment would help"),
             rows,
         )
 
 
-def _suggested(suggestions: Sequence[Suggestion], found: Identification) -> Iterator[TableBlock]:
+def _build_suggestion_tables(
+    suggestions: Sequence[ExperimentRanking], found: Identification
+) -> Iterator[TableBlock]:
     """Tabulate the simulated gain of the best experiment for each uncertain parameter."""
     rows = []
     for one in suggestions:
-        display = display_of(found.estimates[one.parameter].unit)
+        display = get_display_unit(found.estimates[one.parameter].unit)
         then = None if one.best is None else one.best.half_width
         rows.append(
             (
-                Cell(parameter_label(one.parameter)),
+                Cell(get_parameter_label(one.parameter)),
                 Cell(one.verdict.value, badge=True, tone=TONES[one.verdict]),
-                Cell(_half_width(one.half_width, display), number=True),
+                Cell(_format_half_width(one.half_width, display), number=True),
                 Cell(one.text),
-                Cell("–" if then is None else _half_width(then, display), number=True),
+                Cell("–" if then is None else _format_half_width(then, display), number=True),
             )
         )
     head = (
-        *cells("parameter", "verdict"),
+        *make_cells("parameter", "verdict"),
         Cell("now", number=True, note="± 95 %"),
         Cell("experiment that would narrow it"),
         Cell("then", number=True, note="± 95 %, to expect"),
@@ -113,16 +119,16 @@ def _suggested(suggestions: Sequence[Suggestion], found: Identification) -> Iter
     )
 
 
-def _half_width(value: float, display: Display) -> str:
+def _format_half_width(value: float, display: Display) -> str:
     if not isfinite(value):
         return "open"
-    return f"± {significant(value * display.factor, 2)} {display.label}".removesuffix(" –")
+    return f"± {format_significant(value * display.factor, 2)} {display.label}".removesuffix(" –")
 
 
-def _least_known(found: Identification) -> Iterator[TableBlock]:
+def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
     """The parameters of widest relative interval, and what to record for a narrower one."""
     widths = {
-        one.id: half_width_percent(one.value, one.std_total)
+        one.id: compute_half_width_percent(one.value, one.std_total)
         for one in found.estimates.values()
         if one.verdict in (Verdict.IDENTIFIED, Verdict.WEAK) and one.unit != "s"
     }
@@ -130,10 +136,10 @@ def _least_known(found: Identification) -> Iterator[TableBlock]:
     if ranked:
         rows = [
             (
-                Cell(parameter_label(name)),
-                Cell(f"± {significant(width, 2)} %", number=True),
-                Cell(_sensor_share(found.estimates[name]), number=True),
-                Cell(_advice(found.estimates[name])),
+                Cell(get_parameter_label(name)),
+                Cell(f"± {format_significant(width, 2)} %", number=True),
+                Cell(_describe_sensor_share(found.estimates[name]), number=True),
+                Cell(_write_advice(found.estimates[name])),
             )
             for width, name in ranked
         ]
@@ -151,17 +157,17 @@ def _least_known(found: Identification) -> Iterator[TableBlock]:
         )
 
 
-def _advice(one: Estimate) -> str:
-    return advice_for(one.id, one.std_noise or 0.0, one.std_systematic)
+def _write_advice(one: Estimate) -> str:
+    return get_advice(one.id, one.std_noise or 0.0, one.std_systematic)
 
 
-def _sensor_share(one: Estimate) -> str:
+def _describe_sensor_share(one: Estimate) -> str:
     if not one.std_total or one.std_systematic is None:
         return "not stated"
     return f"{100.0 * (one.std_systematic / one.std_total) ** 2:.0f} %"
 
 
-def _close_pairs(found: Identification) -> Iterator[str]:
+def _list_correlated_pairs(found: Identification) -> Iterator[str]:
     """Pairs of estimates whose errors go together, in words."""
     ids, matrix = found.correlation_ids, found.correlation
     assert matrix is not None
@@ -170,4 +176,4 @@ def _close_pairs(found: Identification) -> Iterator[str]:
             if abs(matrix[i, j]) >= _CLOSE:
                 way = "rise and fall together" if matrix[i, j] > 0 else "go against each other"
                 number = f"{matrix[i, j]:+.2f}".replace("-", "−")
-                yield f"{parameter_label(one)} and {parameter_label(ids[j])} {way} ({number})."
+                yield f"{get_parameter_label(one)} and {get_parameter_label(ids[j])} {way} ({number})."

@@ -6,23 +6,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from drivetwin._util.display_units import significant
+from drivetwin._util.display_units import format_significant
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.coloured_noise import BLOCK
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
-    EXCESS,
+    MAX_EXCESS_POWER,
     SIGNIFICANT,
     ResidualTest,
-    residual_tests,
-    white_residuals,
+    compute_white_residuals,
+    run_residual_tests,
 )
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import sensitivity
-from drivetwin.report.figures.residuals import residual_figure, residual_panels
-from drivetwin.report.figures.sensitivity import sensitivity_figure
-from drivetwin.report.figures.shift_phases import shift_spans
-from drivetwin.report.labels import channel_label
+from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensitivity
+from drivetwin.report.figures.residuals import build_residual_panels, plot_residuals
+from drivetwin.report.figures.sensitivity import plot_sensitivity
+from drivetwin.report.figures.shift_phases import get_shift_spans
+from drivetwin.report.labels import get_channel_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -30,27 +30,27 @@ from drivetwin.report.sections.blocks import (
     Section,
     TableBlock,
     Tone,
-    link_of,
+    make_link,
 )
-from drivetwin.shifts.shift import shift_labels
+from drivetwin.shifts.shift import make_shift_labels
 
 
-def likelihood_sections(found: Identification) -> list[Section]:
+def build_likelihood_sections(found: Identification) -> list[Section]:
     """Build the sections on goodness of fit and sensor sensitivity; empty without a fit."""
     fit = found.evidence.likelihood
     if fit is None:
         return []
-    return [_fit_section(found, fit), _sensor_section(found, fit)]
+    return [_build_fit_section(found, fit), _build_sensor_section(found, fit)]
 
 
-def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
-    labels = _labels(found.evidence.signals)
-    tests = residual_tests(fit).values()
-    blocks: list[Block] = [_test_table(list(zip(labels, tests, strict=True)))]
+def _build_fit_section(found: Identification, fit: LikelihoodFit) -> Section:
+    labels = _list_labels(found.evidence.signals)
+    tests = run_residual_tests(fit).values()
+    blocks: list[Block] = [_build_test_table(list(zip(labels, tests, strict=True)))]
     for label, shift, residuals in zip(
-        labels, found.shifts, white_residuals(fit).values(), strict=True
+        labels, found.shifts, compute_white_residuals(fit).values(), strict=True
     ):
-        phases = shift_spans(shift)
+        phases = get_shift_spans(shift)
         text = (
             f"Shift {label}: residual of each output, averaged over "
             f"{1e3 * BLOCK:.0f} ms and divided by what noise alone would leave. A stretch outside "
@@ -58,7 +58,10 @@ def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
         )
         blocks.append(
             FigureBlock(
-                residual_figure(residuals, phases), text, residual_panels(residuals), link_of(shift)
+                plot_residuals(residuals, phases),
+                text,
+                build_residual_panels(residuals),
+                make_link(shift),
             )
         )
     return Section(
@@ -71,16 +74,16 @@ def _fit_section(found: Identification, fit: LikelihoodFit) -> Section:
     )
 
 
-def _labels(signals: Sequence[ShiftSignals]) -> list[str]:
+def _list_labels(signals: Sequence[ShiftSignals]) -> list[str]:
     """List the shifts, with their logs if there are several."""
     labels = []
     for log, group in groupby(signals, key=lambda one: one.log):
-        names = shift_labels([one.shift for one in group])
+        names = make_shift_labels([one.shift for one in group])
         labels += [f"{name} of log {log}" if log else name for name in names]
     return labels
 
 
-def _test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> TableBlock:
+def _build_test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> TableBlock:
     """Excess power and correlation with the inputs, by shift and output."""
     sources = dict.fromkeys(
         source for _, group in tests for test in group for source in test.correlation
@@ -94,35 +97,37 @@ def _test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> TableBlo
     rows = [
         (
             Cell(label),
-            Cell(channel_label(test.output)),
-            _judged(significant(test.excess, 2), good=test.excess <= EXCESS),
-            *(_correlation(test.correlation.get(source)) for source in sources),
+            Cell(get_channel_label(test.output)),
+            _make_test_cell(
+                format_significant(test.excess, 2), good=test.excess <= MAX_EXCESS_POWER
+            ),
+            *(_make_correlation_cell(test.correlation.get(source)) for source in sources),
         )
         for label, group in tests
         for test in group
     ]
     return TableBlock(
         f"Tests of what is left. Slow part: power of means over {1e3 * BLOCK:.0f} ms against that "
-        f"of white noise, doubtful above {EXCESS:g}. Correlation with an input in standard "
+        f"of white noise, doubtful above {MAX_EXCESS_POWER:g}. Correlation with an input in standard "
         f"deviations of chance, doubtful beyond ±{SIGNIFICANT:g}.",
         head,
         rows,
     )
 
 
-def _correlation(size: float | None) -> Cell:
+def _make_correlation_cell(size: float | None) -> Cell:
     """Format the correlation with one input; a dash if the shift lacks that input."""
     if size is None:
         return Cell("–", number=True)
-    return _judged(f"{size:+.1f}".replace("-", "−"), good=abs(size) <= SIGNIFICANT)
+    return _make_test_cell(f"{size:+.1f}".replace("-", "−"), good=abs(size) <= SIGNIFICANT)
 
 
-def _judged(text: str, *, good: bool) -> Cell:
+def _make_test_cell(text: str, *, good: bool) -> Cell:
     return Cell(text, number=True, badge=True, tone=Tone.GOOD if good else Tone.DOUBTFUL)
 
 
-def _sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
-    change = sensitivity(fit, found.evidence.signals, found.friction)
+def _build_sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
+    change = compute_sensitivity(fit, found.evidence.signals, found.friction)
     text = (
         "Change of each result, in per cent of its value, by an error of one sensor: a gain error "
         "of 1 %, an offset of 1 % of the sensor's largest reading, values 1 ms older than their "
@@ -135,5 +140,5 @@ def _sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
         "sensors",
         "What a sensor error would do",
         "Noise averages out over a log; an error of a sensor's gain, offset or age does not.",
-        [FigureBlock(sensitivity_figure(change), text)],
+        [FigureBlock(plot_sensitivity(change), text)],
     )

@@ -11,16 +11,16 @@ from drivetwin._util.display_units import (
     NM,
     RPM,
     Display,
-    display_of,
-    significant,
-    with_uncertainty,
+    format_significant,
+    format_uncertainty,
+    get_display_unit,
 )
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.diagnostics.residual_tests import residual_tests
+from drivetwin.estimation.likelihood.diagnostics.residual_tests import run_residual_tests
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
-from drivetwin.parameters import spec_of
-from drivetwin.report.figures.parameters import interval_figure
-from drivetwin.report.labels import parameter_label
+from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.figures.parameters import plot_intervals
+from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -58,28 +58,28 @@ UNEVEN = 1.5
 """... in every phase too that has an error so many times that of the whole."""
 
 
-def trust_section(found: Identification) -> Section:
+def build_parameters_section(found: Identification) -> Section:
     """Verdicts, agreement and warnings at a glance, then the parameter table."""
-    blocks: list[Block] = [TilesBlock(_tiles(found))]
+    blocks: list[Block] = [TilesBlock(_build_tiles(found))]
     if found.warnings:
         blocks.append(NotesBlock("Warnings", found.warnings, Tone.DOUBTFUL))
-    blocks.append(parameter_table(found))
+    blocks.append(build_parameter_table(found))
     if found.fit:
-        blocks.append(fit_table(found))
+        blocks.append(build_fit_table(found))
     blocks.append(
         FigureBlock(
-            interval_figure(found.estimates),
+            plot_intervals(found.estimates),
             "How narrowly each parameter is known. Dots: sensor noise together with the sensors' "
             "tolerances on the vehicle card and values shown late; bars: noise alone.",
         )
     )
-    return Section("trust", "Can I trust this model?", _headline(found), blocks)
+    return Section("trust", "Can I trust this model?", _write_headline(found), blocks)
 
 
-def _headline(found: Identification) -> str:
-    count = _verdicts(found)
+def _write_headline(found: Identification) -> str:
+    count = _count_verdicts(found)
     identified = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)}"
-    text = f"{_answer(found)} {identified} parameters are identified"
+    text = f"{_write_answer(found)} {identified} parameters are identified"
     if count[Verdict.WEAK]:
         text += f", {count[Verdict.WEAK]} only weakly"
     if count[Verdict.NOT_IDENTIFIABLE]:
@@ -91,18 +91,18 @@ def _headline(found: Identification) -> str:
     if fit is not None and math.isfinite(fit.fit_percent):
         text += (
             f" Driven by the measured inputs alone, the model reproduces the output torque with a "
-            f"fit of {significant(fit.fit_percent, 3)} %."
+            f"fit of {format_significant(fit.fit_percent, 3)} %."
         )
     return text
 
 
-def _answer(found: Identification) -> str:
+def _write_answer(found: Identification) -> str:
     """Return the one-word answer, with the objections to a plain yes."""
-    count, (passed, tests) = _verdicts(found), residual_score(found)
+    count, (passed, tests) = _count_verdicts(found), count_consistent_residuals(found)
     against = []
     if not found.fit:
         against.append("the model could not be simulated over the log")
-    elif any(_missed(fits) for fits in found.fit.values()):
+    elif any(_describe_missing(fits) for fits in found.fit.values()):
         against.append("the simulation leaves too much of an output")
     if passed < tests:
         against.append("the residuals show an effect that the model lacks")
@@ -115,36 +115,36 @@ def _answer(found: Identification) -> str:
     return f"With reservations: {'; '.join(against)}."
 
 
-def residual_score(found: Identification) -> tuple[int, int]:
+def count_consistent_residuals(found: Identification) -> tuple[int, int]:
     """Tests of the likelihood's residuals: how many passed, of how many; (0, 0) without any."""
     fit = found.evidence.likelihood
     if fit is None:
         return 0, 0
-    tests = [test for group in residual_tests(fit).values() for test in group]
+    tests = [test for group in run_residual_tests(fit).values() for test in group]
     total = sum(1 + len(test.correlation) for test in tests)
     return total - sum(len(test.warnings) for test in tests), total
 
 
-def _verdicts(found: Identification) -> Counter[Verdict]:
+def _count_verdicts(found: Identification) -> Counter[Verdict]:
     return Counter(estimate.verdict for estimate in found.estimates.values())
 
 
-def _tiles(found: Identification) -> list[Tile]:
+def _build_tiles(found: Identification) -> list[Tile]:
     tiles = []
     for name, (label, display) in SIGNALS.items():
         fits = found.fit.get(name, {})
         if "all" in fits:
-            fit, missed = fits["all"], _missed(fits)
-            note = f"rmse {significant(fit.rmse * display.factor, 3)} {display.label}"
+            fit, missed = fits["all"], _describe_missing(fits)
+            note = f"rmse {format_significant(fit.rmse * display.factor, 3)} {display.label}"
             if missed not in ("", "all"):
-                note += f"; {PHASES[missed]}: {_percent(fits[missed])}"
+                note += f"; {PHASES[missed]}: {_format_percent(fits[missed])}"
             tone = Tone.DOUBTFUL if missed else Tone.GOOD
-            tiles.append(Tile(f"fit of {label}", _percent(fit), tone, note))
-    passed, tests = residual_score(found)
+            tiles.append(Tile(f"fit of {label}", _format_percent(fit), tone, note))
+    passed, tests = count_consistent_residuals(found)
     if tests:
         tone = Tone.GOOD if passed == tests else Tone.DOUBTFUL
         tiles.append(Tile("residual tests passed", f"{passed} of {tests}", tone, "see the fit"))
-    count = _verdicts(found)
+    count = _count_verdicts(found)
     complete = not count[Verdict.WEAK] and not count[Verdict.NOT_IDENTIFIABLE]
     tiles.append(
         Tile(
@@ -159,7 +159,7 @@ def _tiles(found: Identification) -> list[Tile]:
     return tiles
 
 
-def parameter_table(found: Identification) -> TableBlock:
+def build_parameter_table(found: Identification) -> TableBlock:
     """All parameters with their intervals and verdicts."""
     head = (
         Cell("parameter"),
@@ -178,20 +178,20 @@ def parameter_table(found: Identification) -> TableBlock:
     first: dict[str, str] = {}
     rows = []
     for one in found.estimates.values():
-        label = parameter_label(one.id)
+        label = get_parameter_label(one.id)
         owner = first.setdefault(one.reason, label)
-        rows.append(_parameter_row(one, one.reason if owner == label else f"as for {owner}"))
+        rows.append(_build_parameter_row(one, one.reason if owner == label else f"as for {owner}"))
     return TableBlock(caption, head, rows)
 
 
-def _parameter_row(estimate: Estimate, remark: str) -> tuple[Cell, ...]:
-    spec = spec_of(estimate.id)
-    display = display_of(estimate.unit)
-    value, total = _shown(estimate, estimate.std_total, display)
-    _, noise = _shown(estimate, estimate.std_noise, display)
+def _build_parameter_row(estimate: Estimate, remark: str) -> tuple[Cell, ...]:
+    spec = get_parameter_spec(estimate.id)
+    display = get_display_unit(estimate.unit)
+    value, total = _format_estimate(estimate, estimate.std_total, display)
+    _, noise = _format_estimate(estimate, estimate.std_noise, display)
     return (
         Cell(
-            parameter_label(estimate.id),
+            get_parameter_label(estimate.id),
             note=f"{spec.meaning} · {estimate.id}",
             remark=remark if estimate.reason else "",
         ),
@@ -204,15 +204,15 @@ def _parameter_row(estimate: Estimate, remark: str) -> tuple[Cell, ...]:
     )
 
 
-def _shown(estimate: Estimate, std: float | None, display: Display) -> tuple[str, str]:
+def _format_estimate(estimate: Estimate, std: float | None, display: Display) -> tuple[str, str]:
     if estimate.value is None:
         return "–", "–"
     half = None if std is None else Z95 * std * display.factor
-    value, width = with_uncertainty(estimate.value * display.factor, half)
+    value, width = format_uncertainty(estimate.value * display.factor, half)
     return value, width or "–"
 
 
-def fit_table(found: Identification) -> TableBlock:
+def build_fit_table(found: Identification) -> TableBlock:
     """Fit % and rmse by signal and phase."""
     head = [Cell("signal"), *(Cell(label, number=True) for label in PHASES.values())]
     rows = []
@@ -220,7 +220,7 @@ def fit_table(found: Identification) -> TableBlock:
         if name not in found.fit:
             continue
         fits = [found.fit[name].get(phase) for phase in PHASES]
-        rows.append([Cell(label), *(fit_cell(fit, display) for fit in fits)])
+        rows.append([Cell(label), *(make_fit_cell(fit, display) for fit in fits)])
     return TableBlock(
         "Simulation against measurement: fit % = 100·(1 − ‖y − ŷ‖ / ‖y − mean(y)‖), the mean taken "
         "over the whole log for every phase; root mean square error below. Where a signal hardly "
@@ -230,19 +230,19 @@ def fit_table(found: Identification) -> TableBlock:
     )
 
 
-def fit_cell(fit: SignalFit | None, display: Display) -> Cell:
+def make_fit_cell(fit: SignalFit | None, display: Display) -> Cell:
     """Format the fit in % with the error in its unit below; a dash without a fit."""
     if fit is None:
         return Cell("–", number=True)
-    note = f"{significant(fit.rmse * display.factor, 3)} {display.label}"
-    return Cell(_percent(fit), number=True, note=note)
+    note = f"{format_significant(fit.rmse * display.factor, 3)} {display.label}"
+    return Cell(_format_percent(fit), number=True, note=note)
 
 
-def _percent(fit: SignalFit) -> str:
+def _format_percent(fit: SignalFit) -> str:
     return f"{fit.fit_percent:.1f} %" if math.isfinite(fit.fit_percent) else "–"
 
 
-def _missed(fits: Mapping[str, SignalFit]) -> str:
+def _describe_missing(fits: Mapping[str, SignalFit]) -> str:
     """Phase of a signal that the simulation misses: "all", else the worst; empty for none.
 
     A phase in which the signal hardly moves has a low fit although only noise is left, of which it

@@ -7,15 +7,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from drivetwin._util.display_units import significant
+from drivetwin._util.display_units import format_significant
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.paper.wlse import GridFit
-from drivetwin.report.figures.load import load_figure
-from drivetwin.report.figures.momentum import momentum_figure
-from drivetwin.report.figures.ringdown import ringdown_figure, ringdown_panels
-from drivetwin.report.figures.wlse import WlseLabels, wlse_figure
+from drivetwin.report.figures.load import plot_load
+from drivetwin.report.figures.momentum import plot_momentum
+from drivetwin.report.figures.ringdown import build_ringdown_panels, plot_ringdown
+from drivetwin.report.figures.wlse import WlseLabels, plot_wlse
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -25,7 +25,7 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     Tone,
 )
-from drivetwin.shifts.shift import shift_labels
+from drivetwin.shifts.shift import make_shift_labels
 
 INERTIA_LABELS = WlseLabels(
     grid="η",
@@ -55,10 +55,10 @@ class _Stages(Generic[_Kind]):
 _AnyStages = _Stages[IntegralShift] | _Stages[PaperShift]
 
 
-def evidence_sections(found: Identification) -> list[Section]:
+def build_stage_sections(found: Identification) -> list[Section]:
     """One section per question: inertia and efficiency, load, output shaft."""
-    integral = _stages(found, found.evidence.integral, "integral method")
-    paper = _stages(found, found.evidence.paper, "the paper's method")
+    integral = _collect_stages(found, found.evidence.integral, "integral method")
+    paper = _collect_stages(found, found.evidence.paper, "the paper's method")
     return [
         Section(
             "inertia",
@@ -66,11 +66,11 @@ def evidence_sections(found: Identification) -> list[Section]:
             "Eq. 10: η·T_e − T_o/i = J′·ω_e′. Points on the line mean that torque and acceleration "
             "agree with one η and one J′.",
             [
-                *_momentum_blocks(integral),
+                *_build_momentum_blocks(integral),
                 *(
                     block
                     for one in paper
-                    for block in _grid_blocks(
+                    for block in _build_grid_blocks(
                         one.by, one.stages.inertia, one.stages.doubts.get("eta"), INERTIA_LABELS
                     )
                 ),
@@ -81,11 +81,11 @@ def evidence_sections(found: Identification) -> list[Section]:
             "Load and vehicle inertia",
             "Eq. 11: T_o − T_v/i_f = (J3/i_f)·ω_w′.",
             [
-                *_load_blocks(found, integral),
+                *_build_load_blocks(found, integral),
                 *(
                     block
                     for one in paper
-                    for block in _grid_blocks(
+                    for block in _build_grid_blocks(
                         one.by, one.stages.load, one.stages.doubts.get("J_vehicle"), LOAD_LABELS
                     )
                 ),
@@ -97,64 +97,68 @@ def evidence_sections(found: Identification) -> list[Section]:
             "After lock-up the inertias on both sides of the output shaft swing against each "
             "other; frequency and decay give stiffness and damping (eqs. 12–14).",
             [
-                *_ring_blocks([*integral, *paper]),
-                *_refusals([*integral, *paper], "shaft"),
+                *_build_ring_blocks([*integral, *paper]),
+                *_list_refusals([*integral, *paper], "shaft"),
             ],
         ),
     ]
 
 
-def _stages(found: Identification, stages: Sequence[_Kind], method: str) -> list[_Stages[_Kind]]:
+def _collect_stages(
+    found: Identification, stages: Sequence[_Kind], method: str
+) -> list[_Stages[_Kind]]:
     """Collect the stage results of one method, with the shift names if there are several."""
-    names = [f"Shift {name}, {method}" for name in shift_labels(found.shifts)]
+    names = [f"Shift {name}, {method}" for name in make_shift_labels(found.shifts)]
     if len(stages) < 2 or len(stages) != len(names):
         names = [method[0].upper() + method[1:]] * len(stages)
     return [_Stages(name, one) for name, one in zip(names, stages, strict=True)]
 
 
-def _momentum_blocks(shifts: Iterable[_Stages[IntegralShift]]) -> list[Block]:
+def _build_momentum_blocks(shifts: Iterable[_Stages[IntegralShift]]) -> list[Block]:
     return [
         FigureBlock(
-            momentum_figure(one.stages.momentum),
+            plot_momentum(one.stages.momentum),
             f"{one.by}, momentum form: each point is a window weighted by a smooth kernel, so "
             "no speed is differentiated. Right: how the misfit rises as the engine torque is taken "
-            "to be older or younger than it is." + _without_age(one.stages),
+            "to be older or younger than it is." + _note_missing_delay(one.stages),
         )
         for one in shifts
     ]
 
 
-def _without_age(shift: IntegralShift) -> str:
+def _note_missing_delay(shift: IntegralShift) -> str:
     why = shift.refusals.get("te_delay")
     return f" Here {why}; the least misfit is noise, and no age is assumed." if why else ""
 
 
-def _load_blocks(found: Identification, shifts: Iterable[_Stages[IntegralShift]]) -> list[Block]:
+def _build_load_blocks(
+    found: Identification, shifts: Iterable[_Stages[IntegralShift]]
+) -> list[Block]:
     validations = found.evidence.validation
     final_drive = validations[0].model.i_f if validations else None
     return [
         FigureBlock(
-            load_figure(one.stages.load, final_drive),
+            plot_load(one.stages.load, final_drive),
             f"{one.by}, momentum form: one point per window.",
         )
         for one in shifts
     ]
 
 
-def _grid_blocks(by: str, fit: GridFit, doubt: str | None, labels: WlseLabels) -> list[Block]:
+def _build_grid_blocks(by: str, fit: GridFit, doubt: str | None, labels: WlseLabels) -> list[Block]:
     """Build figure and table of a grid search, with any doubt about it between the two."""
     text = (
         f"{by}, weighted least squares (Fig. 6): samples whose own quotient lies in the plausible "
         "range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise in the "
         "differenced speed biases it."
     )
-    blocks: list[Block] = [FigureBlock(wlse_figure(fit, labels), text)]
+    blocks: list[Block] = [FigureBlock(plot_wlse(fit, labels), text)]
     if doubt:
         blocks.append(NotesBlock("Not to be relied on", [doubt], Tone.DOUBTFUL))
-    return [*blocks, grid_table(fit, labels, Tone.DOUBTFUL if doubt else Tone.GOOD)]
+    return [*blocks, build_grid_table(fit, labels, Tone.DOUBTFUL if doubt else Tone.GOOD)]
 
 
-def grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -> TableBlock:
+def build_grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -> TableBlock:
     """The grid as in the paper's Table 1; the row of least error is marked in `tone`."""
     head = (
         Cell(f"{labels.grid} [{labels.unit}]", number=True),
@@ -165,8 +169,8 @@ def grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -> Tabl
     rows = [
         (
             Cell(f"{row.value:g}", number=True),
-            Cell(significant(row.inertia), number=True),
-            Cell(significant(row.rmse), number=True),
+            Cell(format_significant(row.inertia), number=True),
+            Cell(format_significant(row.rmse), number=True),
             Cell("least error" if row == fit.best else "", badge=True, tone=tone),
         )
         for row in fit.rows
@@ -174,7 +178,7 @@ def grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -> Tabl
     return TableBlock("Grid search as in Table 1, RMS error at the output shaft.", head, rows)
 
 
-def _ring_blocks(shifts: Iterable[_AnyStages]) -> list[Block]:
+def _build_ring_blocks(shifts: Iterable[_AnyStages]) -> list[Block]:
     blocks: list[Block] = []
     for one in shifts:
         ring = one.stages.ring
@@ -186,11 +190,11 @@ def _ring_blocks(shifts: Iterable[_AnyStages]) -> list[Block]:
             else "from a decaying sine on a parabola, the engine torque's own motion included"
         )
         text = f"{one.by}: {ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, {how}."
-        blocks.append(FigureBlock(ringdown_figure(ring), text, ringdown_panels(ring)))
+        blocks.append(FigureBlock(plot_ringdown(ring), text, build_ringdown_panels(ring)))
     return blocks
 
 
-def _refusals(shifts: Iterable[_AnyStages], stage: str) -> list[Block]:
+def _list_refusals(shifts: Iterable[_AnyStages], stage: str) -> list[Block]:
     texts = [
         f"{one.by}: {one.stages.refusals[stage]}" for one in shifts if stage in one.stages.refusals
     ]

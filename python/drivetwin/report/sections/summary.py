@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from drivetwin._util.display_units import significant
+from drivetwin._util.display_units import format_significant
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.report.figures.friction import friction_figure
-from drivetwin.report.figures.recording import log_figure, log_panels
-from drivetwin.report.figures.shift_phases import shift_panels, shift_phases
-from drivetwin.report.figures.validation import validation_figure, validation_panels
+from drivetwin.report.figures.friction import plot_friction
+from drivetwin.report.figures.recording import build_log_panels, plot_log
+from drivetwin.report.figures.shift_phases import build_shift_panels, plot_shift_phases
+from drivetwin.report.figures.validation import build_validation_panels, plot_validation
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -20,10 +20,10 @@ from drivetwin.report.sections.blocks import (
     Section,
     TableBlock,
     Tone,
-    cells,
-    link_of,
+    make_cells,
+    make_link,
 )
-from drivetwin.shifts.shift import Shift, shift_labels
+from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 _TORQUE_PHASE = {
@@ -45,7 +45,7 @@ OF_SPEEDS = (
 )
 
 
-def phase_key(kind: ShiftKind) -> str:
+def describe_phases(kind: ShiftKind) -> str:
     """Describe the numbers of the four phases in a shift of this kind."""
     return (
         f"1 gear held before the shift · 2 torque phase: {_TORQUE_PHASE[kind]} · 3 inertia phase: "
@@ -54,23 +54,23 @@ def phase_key(kind: ShiftKind) -> str:
     )
 
 
-def shift_section(found: Identification, log: ShiftLog) -> Section:
+def build_shift_section(found: Identification, log: ShiftLog) -> Section:
     """Measured signals with the detected phases, one figure per shift."""
     blocks: list[Block] = []
     if len(found.shifts) > 1:
         text = "The whole log; each button shows one shift of those that were used."
-        blocks.append(FigureBlock(log_figure(log, found.shifts), text, log_panels(log)))
-    for name, shift in zip(shift_labels(found.shifts), found.shifts, strict=True):
+        blocks.append(FigureBlock(plot_log(log, found.shifts), text, build_log_panels(log)))
+    for name, shift in zip(make_shift_labels(found.shifts), found.shifts, strict=True):
         title = f"Shift {name}, {shift.kind.value}. "
         blocks.append(
             FigureBlock(
-                shift_phases(log, shift),
-                title + phase_key(shift.kind),
-                shift_panels(log, shift),
-                link_of(shift),
+                plot_shift_phases(log, shift),
+                title + describe_phases(shift.kind),
+                build_shift_panels(log, shift),
+                make_link(shift),
             )
         )
-        blocks.append(_phase_table(name, shift))
+        blocks.append(_build_phase_table(name, shift))
         if shift.warnings:
             blocks.append(NotesBlock("About this shift", shift.warnings, Tone.DOUBTFUL))
     if found.rejected:
@@ -84,7 +84,7 @@ def shift_section(found: Identification, log: ShiftLog) -> Section:
     )
 
 
-def _phase_table(name: str, shift: Shift) -> TableBlock:
+def _build_phase_table(name: str, shift: Shift) -> TableBlock:
     spans = (
         ("1 gear held", shift.before, None),
         ("2 torque phase", shift.torque_phase, "torque_start"),
@@ -94,7 +94,7 @@ def _phase_table(name: str, shift: Shift) -> TableBlock:
     rows = []
     for label, (start, end), boundary in spans:
         sigma = shift.sigma.get(boundary) if boundary else None
-        doubt = f"± {significant(1e3 * Z95 * sigma, 2)} ms" if sigma else ""
+        doubt = f"± {format_significant(1e3 * Z95 * sigma, 2)} ms" if sigma else ""
         rows.append(
             (
                 Cell(label),
@@ -115,12 +115,12 @@ def _phase_table(name: str, shift: Shift) -> TableBlock:
     return TableBlock(f"Phases of shift {name}: {elements}", head, rows)
 
 
-def friction_section(found: Identification) -> Section:
+def build_friction_section(found: Identification) -> Section:
     """μ over slip of every element that slipped under load."""
     blocks: list[Block] = []
     for element, curve in found.friction.items():
         caption = f"Friction of {element}, method: {curve.method_text}. "
-        blocks.append(FigureBlock(friction_figure(element, curve), caption + _law_text(curve)))
+        blocks.append(FigureBlock(plot_friction(element, curve), caption + _format_law(curve)))
     over_eta = any(curve.over_eta for curve in found.friction.values())
     return Section(
         "friction",
@@ -132,20 +132,20 @@ def friction_section(found: Identification) -> Section:
     )
 
 
-def _law_text(curve: FrictionCurve) -> str:
+def _format_law(curve: FrictionCurve) -> str:
     if (law := curve.stribeck) is None:
         return "No Stribeck law fits within the range seen; the smoothed curve is used."
     return (
         f"Stribeck law {curve.symbol} = μ_c + (μ_s − μ_c)·exp(−|s|/v_s) + μ_v·|s| with "
-        f"μ_c = {significant(law.mu_c)}, μ_s = {significant(law.mu_s)}, "
-        f"v_s = {significant(law.v_s, 3)} rad/s, μ_v = {significant(law.mu_v, 3)} s/rad."
+        f"μ_c = {format_significant(law.mu_c)}, μ_s = {format_significant(law.mu_s)}, "
+        f"v_s = {format_significant(law.v_s, 3)} rad/s, μ_v = {format_significant(law.mu_v, 3)} s/rad."
     )
 
 
-def validation_section(validations: tuple[Validation, ...]) -> Section:
+def build_validation_section(validations: tuple[Validation, ...]) -> Section:
     """Simulation over measurement (Fig. 11)."""
     blocks: list[Block] = []
-    names = shift_labels([one.shift for one in validations])
+    names = make_shift_labels([one.shift for one in validations])
     for name, one in zip(names, validations, strict=True):
         text = (
             f"Shift {name}: the measured engine torque and pressures "
@@ -155,9 +155,11 @@ def validation_section(validations: tuple[Validation, ...]) -> Section:
             "moves the lock-up by a millisecond or two: the residual then swings on after it."
         )
         blocks.append(
-            FigureBlock(validation_figure(one), text, validation_panels(one), link_of(one.shift))
+            FigureBlock(
+                plot_validation(one), text, build_validation_panels(one), make_link(one.shift)
+            )
         )
-        blocks.append(_event_table(one))
+        blocks.append(_build_event_table(one))
     return Section(
         "validation",
         "Simulation over measurement",
@@ -166,15 +168,15 @@ def validation_section(validations: tuple[Validation, ...]) -> Section:
     )
 
 
-def _event_table(validation: Validation) -> TableBlock:
+def _build_event_table(validation: Validation) -> TableBlock:
     """Changes of friction mode; filling and venting repeat with every ripple of the pressure."""
     rows = [
-        cells(f"{event.time:.4f} s", event.element, event.kind.replace("_", " "))
+        make_cells(f"{event.time:.4f} s", event.element, event.kind.replace("_", " "))
         for event in validation.trajectory.events
         if event.kind not in ("fill", "vent")
     ]
     return TableBlock(
         f"Events of the simulation (status: {validation.status}).",
-        cells("time", "element", "event"),
+        make_cells("time", "element", "event"),
         rows,
     )

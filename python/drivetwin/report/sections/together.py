@@ -7,16 +7,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin._util.display_units import display_of, significant
+from drivetwin._util.display_units import format_significant, get_display_unit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.multi_log import FAR, Consistency, LogShare, Several
 from drivetwin.estimation.result.validation import HeldOut, Outcome, Validation
-from drivetwin.parameters import log_of
-from drivetwin.report.figures.comparison import agreement_figure
-from drivetwin.report.figures.validation import validation_figure, validation_panels
-from drivetwin.report.find_reports import Candidate, agreements
-from drivetwin.report.labels import parameter_label
+from drivetwin.parameters import split_log_number
+from drivetwin.report.figures.comparison import plot_agreement
+from drivetwin.report.figures.validation import build_validation_panels, plot_validation
+from drivetwin.report.find_reports import Candidate, compare_estimates
+from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -27,11 +27,11 @@ from drivetwin.report.sections.blocks import (
     Tile,
     TilesBlock,
     Tone,
-    cells,
-    link_of,
+    make_cells,
+    make_link,
 )
-from drivetwin.report.sections.comparison import value_cell
-from drivetwin.report.sections.parameters import PHASES, SIGNALS, fit_cell
+from drivetwin.report.sections.comparison import make_value_cell
+from drivetwin.report.sections.parameters import PHASES, SIGNALS, make_fit_cell
 
 _TONES = {
     Outcome.ALLOWED: Tone.GOOD,
@@ -42,7 +42,7 @@ _TONES = {
 _TOGETHER = "together"
 
 
-def several_section(found: Identification, several: Several) -> Section:
+def build_joint_section(found: Identification, several: Several) -> Section:
     """Compare the estimates of each log with the joint estimate, and test their agreement."""
     tested = several.consistency
     tone = Tone.GOOD if tested.agree else Tone.DOUBTFUL
@@ -51,20 +51,20 @@ def several_section(found: Identification, several: Several) -> Section:
         Tile("logs fitted as one", str(len(several.logs))),
         Tile("the logs", word, tone, f"χ² {tested.chi2:.1f} on {tested.freedom}, p {tested.p:.2g}"),
     ]
-    shared = {k: one for k, one in found.estimates.items() if not log_of(k)[1]}
+    shared = {k: one for k, one in found.estimates.items() if not split_log_number(k)[1]}
     names = [f"log {one.number}" for one in several.logs]
     told = [(name, one.alone) for name, one in zip(names, several.logs, strict=True)]
     candidates = [
         Candidate(name, "", {k: v for k, v in alone.items() if k in shared}, {}, {}, {}, "")
         for name, alone in (*told, (_TOGETHER, shared))
     ]
-    compared = [one for one in agreements(candidates) if one.apart is not None]
+    compared = [one for one in compare_estimates(candidates) if one.apart is not None]
     blocks: list[Block] = [
         TilesBlock(tiles),
-        _log_table(found, several),
-        _shared_table(shared, several.logs, tested),
+        _build_log_table(found, several),
+        _build_shared_table(shared, several.logs, tested),
         FigureBlock(
-            agreement_figure([*names, _TOGETHER], compared),
+            plot_agreement([*names, _TOGETHER], compared),
             "What each log tells alone and what all tell together, against their common mean, "
             "with total 95 % intervals in standard deviations of the parameter. Of logs alike in "
             "what they excite the common interval is narrower by the root of their number; the "
@@ -80,14 +80,17 @@ def several_section(found: Identification, several: Several) -> Section:
     )
 
 
-def _log_table(found: Identification, several: Several) -> TableBlock:
+def _build_log_table(found: Identification, several: Several) -> TableBlock:
     """File, shifts, own parameters and fit of each log."""
-    own = {name: log_of(name) for name in found.estimates}
+    own = {name: split_log_number(name) for name in found.estimates}
     plain = list(dict.fromkeys(name for name, number in own.values() if number))
-    units = {name: display_of(found.estimates[f"{_numbered(name, own)}"].unit) for name in plain}
+    units = {
+        name: get_display_unit(found.estimates[f"{_format_numbers(name, own)}"].unit)
+        for name in plain
+    }
     head = (
-        *cells("log", "file", "shifts"),
-        *(Cell(parameter_label(n), number=True, note=units[n].label) for n in plain),
+        *make_cells("log", "file", "shifts"),
+        *(Cell(get_parameter_label(n), number=True, note=units[n].label) for n in plain),
         *(Cell(f"fit of {label}", number=True) for label, _ in SIGNALS.values()),
     )
     rows = []
@@ -96,10 +99,10 @@ def _log_table(found: Identification, several: Several) -> TableBlock:
         shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in one.shifts)
         rows.append(
             (
-                *cells(str(one.number), Path(one.source).name, shifts),
-                *(value_cell(found.estimates.get(mine.get(n, "")), units[n]) for n in plain),
+                *make_cells(str(one.number), Path(one.source).name, shifts),
+                *(make_value_cell(found.estimates.get(mine.get(n, "")), units[n]) for n in plain),
                 *(
-                    fit_cell(one.fit.get(signal, {}).get("all"), display)
+                    make_fit_cell(one.fit.get(signal, {}).get("all"), display)
                     for signal, (_, display) in SIGNALS.items()
                 ),
             )
@@ -107,25 +110,25 @@ def _log_table(found: Identification, several: Several) -> TableBlock:
     return TableBlock("The logs, what each has of its own, and the fit of the model.", head, rows)
 
 
-def _numbered(plain: str, own: dict[str, tuple[str, int]]) -> str:
+def _format_numbers(plain: str, own: dict[str, tuple[str, int]]) -> str:
     """Return the first log-specific id of the parameter `plain`."""
     return next(key for key, (name, number) in own.items() if name == plain and number)
 
 
-def _shared_table(
+def _build_shared_table(
     shared: dict[str, Estimate], logs: Sequence[LogShare], tested: Consistency
 ) -> TableBlock:
     """Every parameter that the logs share: alone, together, and the log farthest off."""
     moves = {one.parameter: one for one in tested.moves}
     rows = []
     for name, estimate in shared.items():
-        display, move = display_of(estimate.unit), moves.get(name)
+        display, move = get_display_unit(estimate.unit), moves.get(name)
         far = move is not None and abs(move.z) > FAR
         rows.append(
             (
-                Cell(parameter_label(name), note=name),
-                *(value_cell(one.alone.get(name), display) for one in logs),
-                value_cell(estimate, display),
+                Cell(get_parameter_label(name), note=name),
+                *(make_value_cell(one.alone.get(name), display) for one in logs),
+                make_value_cell(estimate, display),
                 Cell(display.label),
                 Cell("–", number=True)
                 if move is None or move.z == 0.0
@@ -153,15 +156,21 @@ def _shared_table(
     )
 
 
-def held_out_section(found: Identification, held: Sequence[HeldOut]) -> Section:
+def build_holdout_section(found: Identification, held: Sequence[HeldOut]) -> Section:
     """Compare the fit of each predicted shift with the fitted shifts and the noise limit."""
     tiles = [
-        Tile(one.name, _torque_fit(one), _TONES[one.outcome], one.outcome.value) for one in held
+        Tile(one.name, _format_torque_fit(one), _TONES[one.outcome], one.outcome.value)
+        for one in held
     ]
-    blocks: list[Block] = [TilesBlock(tiles), _judgement_table(found, held)]
-    own = list(_own_rows(held))
+    blocks: list[Block] = [TilesBlock(tiles), _build_judgement_table(found, held)]
+    own = list(_iterate_log_rows(held))
     if own:
-        head = (Cell("log"), Cell("parameter"), Cell("value", number=True), *cells("unit", "from"))
+        head = (
+            Cell("log"),
+            Cell("parameter"),
+            Cell("value", number=True),
+            *make_cells("unit", "from"),
+        )
         text = "What these logs have of their own, told by the gear held before the shift alone."
         blocks.append(TableBlock(text, head, own))
     notes = [f"{one.name}: {text}" for one in held for text in one.notes]
@@ -169,7 +178,7 @@ def held_out_section(found: Identification, held: Sequence[HeldOut]) -> Section:
         blocks.append(NotesBlock("About the predictions", notes, Tone.DOUBTFUL))
     for one in held:
         if one.validation is not None:
-            blocks += [*_shown(one, one.validation)]
+            blocks += [*_build_prediction_blocks(one, one.validation)]
     return Section(
         "held-out",
         "Predicted, not fitted",
@@ -183,7 +192,7 @@ def held_out_section(found: Identification, held: Sequence[HeldOut]) -> Section:
     )
 
 
-def _torque_fit(one: HeldOut) -> str:
+def _format_torque_fit(one: HeldOut) -> str:
     """Fit % of the output torque, else of the input speed."""
     if one.validation is None:
         return "–"
@@ -191,30 +200,30 @@ def _torque_fit(one: HeldOut) -> str:
     return f"{next(iter(fits.values()))['all'].fit_percent:.1f} %"
 
 
-def _judgement_table(found: Identification, held: Sequence[HeldOut]) -> TableBlock:
+def _build_judgement_table(found: Identification, held: Sequence[HeldOut]) -> TableBlock:
     head = (
-        *cells("shift", "signal"),
+        *make_cells("shift", "signal"),
         Cell("predicted", number=True, note="fit %, rmse"),
         Cell("fitted", number=True, note="fit %, rmse"),
         Cell("usual", number=True, note="rmse"),
         Cell("allowed", number=True, note="rmse"),
-        *cells("unit", "verdict"),
+        *make_cells("unit", "verdict"),
     )
     rows = []
     for one in held:
         fits = {} if one.validation is None else one.validation.fit
         for signal, phases in fits.items():
             label, display = SIGNALS[signal]
-            bound, outcome = one.bounds.get(signal), one.outcome_of(signal)
+            bound, outcome = one.bounds.get(signal), one.get_signal_outcome(signal)
             sizes = (None, None) if bound is None else (bound.usual, bound.largest)
             rows.append(
                 (
-                    *cells(one.name, label),
-                    fit_cell(phases["all"], display),
-                    fit_cell(found.fit.get(signal, {}).get("all"), display),
+                    *make_cells(one.name, label),
+                    make_fit_cell(phases["all"], display),
+                    make_fit_cell(found.fit.get(signal, {}).get("all"), display),
                     *(
                         Cell(
-                            "–" if size is None else significant(size * display.factor, 3),
+                            "–" if size is None else format_significant(size * display.factor, 3),
                             number=True,
                         )
                         for size in sizes
@@ -226,7 +235,7 @@ def _judgement_table(found: Identification, held: Sequence[HeldOut]) -> TableBlo
         if not fits:
             dashes = [Cell("–", number=True)] * 4
             verdict = Cell(one.outcome.value, badge=True, tone=_TONES[one.outcome])
-            rows.append((*cells(one.name, ""), *dashes, Cell(""), verdict))
+            rows.append((*make_cells(one.name, ""), *dashes, Cell(""), verdict))
     return TableBlock(
         "Predictions beside what was fitted (of all fitted shifts), and what noise allows.",
         head,
@@ -234,30 +243,30 @@ def _judgement_table(found: Identification, held: Sequence[HeldOut]) -> TableBlo
     )
 
 
-def _own_rows(held: Sequence[HeldOut]) -> Iterator[tuple[Cell, ...]]:
+def _iterate_log_rows(held: Sequence[HeldOut]) -> Iterator[tuple[Cell, ...]]:
     for one in held:
         for name, estimate in one.own.items():
-            display = display_of(estimate.unit)
+            display = get_display_unit(estimate.unit)
             yield (
                 Cell(Path(one.source).name),
-                Cell(parameter_label(name), note=name),
-                value_cell(estimate, display),
+                Cell(get_parameter_label(name), note=name),
+                make_value_cell(estimate, display),
                 Cell(display.label),
                 Cell(estimate.method),
             )
 
 
-def _shown(one: HeldOut, run: Validation) -> Iterator[Block]:
+def _build_prediction_blocks(one: HeldOut, run: Validation) -> Iterator[Block]:
     """Simulation over measurement of one prediction, and its fit by phase."""
     yield FigureBlock(
-        validation_figure(run),
+        plot_validation(run),
         f"{one.name}, predicted: measured inputs, each output as measured and as predicted, and "
         "below it what is left.",
-        validation_panels(run),
-        link_of(one.shift),
+        build_validation_panels(run),
+        make_link(one.shift),
     )
     rows = [
-        (Cell(label), *(fit_cell(run.fit[signal].get(phase), display) for phase in PHASES))
+        (Cell(label), *(make_fit_cell(run.fit[signal].get(phase), display) for phase in PHASES))
         for signal, (label, display) in SIGNALS.items()
         if signal in run.fit
     ]
@@ -265,7 +274,7 @@ def _shown(one: HeldOut, run: Validation) -> Iterator[Block]:
     yield TableBlock(f"Fit % and rmse of the prediction by phase, {one.name}.", head, rows)
 
 
-def of_log(section: Section, share: LogShare) -> Section:
+def prefix_log_section(section: Section, share: LogShare) -> Section:
     """A section of a one-log report under the number of its log."""
     return replace(
         section,

@@ -19,29 +19,29 @@ from drivetwin.report.sections.blocks import (
     Tile,
     TilesBlock,
 )
-from drivetwin.workbench.views.widgets import badge, graph, hint, notes
+from drivetwin.workbench.views.widgets import make_badge, make_graph, make_hint, make_notes
 
 
-def shown(section: Section, prefix: str) -> list[Component]:
+def render_section(section: Section, prefix: str) -> list[Component]:
     """A section under its title; `prefix` makes the ids of its figures its own."""
-    blocks = [_block(block, f"{prefix}-{k}") for k, block in enumerate(section.blocks)]
-    return [html.H3(section.title), hint(section.intro), *blocks]
+    blocks = [_render_block(block, f"{prefix}-{k}") for k, block in enumerate(section.blocks)]
+    return [html.H3(section.title), make_hint(section.intro), *blocks]
 
 
-def _block(block: Block, name: str) -> Component:
+def _render_block(block: Block, name: str) -> Component:
     match block:
         case FigureBlock():
-            figure = graph(name, block.caption.partition(".")[0], block.figure)
-            return html.Div([figure, hint(block.caption)])
+            figure = make_graph(name, block.caption.partition(".")[0], block.figure)
+            return html.Div([figure, make_hint(block.caption)])
         case TableBlock():
-            return _table(block.caption, block.head, block.rows)
+            return _render_table(block.caption, block.head, block.rows)
         case NotesBlock():
-            return notes(block.heading, block.items, block.tone.value)
+            return make_notes(block.heading, block.items, block.tone.value)
         case TilesBlock():
-            return html.Div([_tile(one) for one in block.tiles], className="tiles")
+            return html.Div([_render_tile(one) for one in block.tiles], className="tiles")
 
 
-def _tile(tile: Tile) -> Component:
+def _render_tile(tile: Tile) -> Component:
     return html.Div(
         [
             html.Span(tile.label, className="label"),
@@ -52,19 +52,24 @@ def _tile(tile: Tile) -> Component:
     )
 
 
-def _table(caption: str, head: Sequence[Cell], rows: Iterable[Sequence[Cell]]) -> Component:
+def _render_table(caption: str, head: Sequence[Cell], rows: Iterable[Sequence[Cell]]) -> Component:
     body = [
-        html.Tr([_cell(row[0], html.Th, scope="row"), *(_cell(one, html.Td) for one in row[1:])])
+        html.Tr(
+            [
+                _render_cell(row[0], html.Th, scope="row"),
+                *(_render_cell(one, html.Td) for one in row[1:]),
+            ]
+        )
         for row in rows
     ]
-    top = html.Tr([_cell(one, html.Th, scope="col") for one in head])
+    top = html.Tr([_render_cell(one, html.Th, scope="col") for one in head])
     table = html.Table([html.Caption(caption), html.Thead(top), html.Tbody(body)])
     return html.Div(table, className="table")
 
 
-def _cell(cell: Cell, kind: type[html.Td] | type[html.Th], **options: Any) -> Component:
+def _render_cell(cell: Cell, kind: type[html.Td] | type[html.Th], **options: Any) -> Component:
     content: list[Component | str] = [
-        badge(cell.text, cell.tone.value) if cell.badge and cell.text else cell.text
+        make_badge(cell.text, cell.tone.value) if cell.badge and cell.text else cell.text
     ]
     content += [html.Small(text) for text in (cell.note, cell.remark) if text]
     return kind(content, className="number" if cell.number else "text", **options)

@@ -9,8 +9,8 @@ from typing import Any
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
-from drivetwin.report.figures.recording import log_figure
-from drivetwin.workbench.mapping import Entry, Row, roles_of, rows_of, unit_names
+from drivetwin.report.figures.recording import plot_log
+from drivetwin.workbench.mapping import Entry, Row, list_roles, list_rows, list_unit_names
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
@@ -21,11 +21,11 @@ _SIGNS = {"+": "as recorded", "-": "reversed"}
 def layout() -> list[Component]:
     """The table of columns, and the channels as read."""
     return [
-        ui.hint(
+        ui.make_hint(
             "Every column of the file with the role that it is proposed for. Correct role, unit or "
             "sign and apply: the log is then read again. An empty role leaves a column aside."
         ),
-        html.Datalist([html.Option(value=name) for name in unit_names()], id="unit-names"),
+        html.Datalist([html.Option(value=name) for name in list_unit_names()], id="unit-names"),
         html.Div(id="channels-content"),
     ]
 
@@ -33,11 +33,13 @@ def layout() -> list[Component]:
 def register(page: ui.Page) -> None:
     """Showing and correcting the mapping."""
 
-    @page.callback(Output("channels-content", "children"), Input(ui.due_id("channels"), "data"))
+    @page.callback(
+        Output("channels-content", "children"), Input(ui.make_due_id("channels"), "data")
+    )
     def show(session: Session, _: int) -> list[Component]:
         """Columns, faults and the channels over time."""
         opened = session.work.opened
-        return [ui.hint("No log is open.")] if opened is None else _content(opened)
+        return [ui.make_hint("No log is open.")] if opened is None else _build_content(opened)
 
     @page.callback(
         Input("apply-mapping", "n_clicks"),
@@ -56,34 +58,34 @@ def register(page: ui.Page) -> None:
         """Read the log with the mapping as it stands in the table."""
         if not clicks:
             return
-        session.correct(
+        session.correct_mapping(
             [
                 Entry(role, unit or "", sign == "-")
                 for role, unit, sign in zip(roles, units, signs, strict=True)
             ]
         )
         opened = session.work.require_opened()
-        ui.announce(ui.Topic.LOG)
-        ui.tell_read("The log is read as mapped", opened.fault, len(session.work.shifts))
+        ui.notify_topic(ui.Topic.LOG)
+        ui.notify_opened_log("The log is read as mapped", opened.fault, len(session.work.shifts))
 
 
-def _content(opened: Opened) -> list[Component]:
-    roles = {"": "not used", **{role: role for role in roles_of(opened.card)}}
-    rows = [_row(number, one, roles) for number, one in enumerate(rows_of(opened.survey))]
+def _build_content(opened: Opened) -> list[Component]:
+    roles = {"": "not used", **{role: role for role in list_roles(opened.card)}}
+    rows = [_build_row(number, one, roles) for number, one in enumerate(list_rows(opened.survey))]
     head = ("column", "unit in the file", "Hz", "least", "greatest", "gaps", "role", "unit", "sign")
     content = [
-        ui.notes("The log cannot be read as mapped", [opened.fault] if opened.fault else []),
-        ui.notes("About the columns", opened.survey.notes),
-        ui.table(head, rows, name="mapping"),
-        ui.row(ui.button("Apply the mapping", "apply-mapping", main=True)),
+        ui.make_notes("The log cannot be read as mapped", [opened.fault] if opened.fault else []),
+        ui.make_notes("About the columns", opened.survey.notes),
+        ui.make_table(head, rows, name="mapping"),
+        ui.make_row(ui.make_button("Apply the mapping", "apply-mapping", main=True)),
     ]
     if opened.log is not None:
-        figure = log_figure(opened.log)
-        content.append(ui.graph("channels-plot", "All channels over time", figure))
+        figure = plot_log(opened.log)
+        content.append(ui.make_graph("channels-plot", "All channels over time", figure))
     return content
 
 
-def _row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
+def _build_row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
     column = one.column
     low, high = column.range or (None, None)
     name = f"{column.name} ({column.group})" if column.group else column.name
@@ -94,12 +96,12 @@ def _row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
     return [
         name,
         column.unit or "none",
-        _number(column.rate),
-        _number(low),
-        _number(high),
+        _render_number(column.rate),
+        _render_number(low),
+        _render_number(high),
         str(column.gaps) if column.gaps else "–",
-        ui.choice(part("role"), f"role of {name}", roles, one.role, hidden_label=True),
-        ui.field(
+        ui.make_choice(part("role"), f"role of {name}", roles, one.role, hidden_label=True),
+        ui.make_field(
             part("unit"),
             f"unit of {name}",
             hidden_label=True,
@@ -108,11 +110,11 @@ def _row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
             list="unit-names",
             size="8",
         ),
-        ui.choice(
+        ui.make_choice(
             part("sign"), f"sign of {name}", _SIGNS, "-" if one.reversed else "+", hidden_label=True
         ),
     ]
 
 
-def _number(value: float | None) -> Component:
+def _render_number(value: float | None) -> Component:
     return html.Div("–" if value is None else f"{value:.4g}", className="number")

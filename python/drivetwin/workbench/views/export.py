@@ -10,7 +10,7 @@ from dash import ALL, Input, Output, ctx, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.export.targets import Target
-from drivetwin.workbench.exports import Record, produce
+from drivetwin.workbench.exports import Record, make_product
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
 
@@ -36,19 +36,19 @@ RECORDS = {
 def layout() -> list[Component]:
     """Two groups of buttons."""
     return [
-        ui.hint(
+        ui.make_hint(
             "What is exported is the result shown under Model, as identified: sliders do not "
             "change it."
         ),
         html.H3("The twin for other programs"),
-        _group({target.value: text for target, text in TARGETS.items()}),
+        _build_group({target.value: text for target, text in TARGETS.items()}),
         html.H3("Files of drivetwin"),
-        _group({record.value: text for record, text in RECORDS.items()}),
+        _build_group({record.value: text for record, text in RECORDS.items()}),
         dcc.Download(id="download"),
     ]
 
 
-def _group(entries: dict[str, tuple[str, str]]) -> Component:
+def _build_group(entries: dict[str, tuple[str, str]]) -> Component:
     return html.Div(
         [
             html.Button(
@@ -71,11 +71,13 @@ def register(page: ui.Page) -> None:
         """Write the file and send it to the browser."""
         if not isinstance(ctx.triggered_id, dict) or not any(clicks):
             return no_update
-        product = produce(session.work, _wanted(ctx.triggered_id["export"]), session.scratch)
-        ui.tell(f"{product.name}: {len(product.content) / 1e3:.0f} kB")
+        product = make_product(
+            session.work, _parse_choice(ctx.triggered_id["export"]), session.scratch
+        )
+        ui.notify(f"{product.name}: {len(product.content) / 1e3:.0f} kB")
         content = base64.b64encode(product.content).decode()
         return {"content": content, "filename": product.name, "base64": True}
 
 
-def _wanted(name: str) -> Target | Record:
+def _parse_choice(name: str) -> Target | Record:
     return Record(name) if name in set(Record) else Target(name)

@@ -6,9 +6,15 @@ from __future__ import annotations
 from dash import Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
-from drivetwin._util.display_units import NM, RPM, significant
-from drivetwin.gearbox import Gearbox, builtin_gearboxes
-from drivetwin.workbench.gearboxes import ReducedShift, gears_of, members_of, reduced, shifts_of
+from drivetwin._util.display_units import NM, RPM, format_significant
+from drivetwin.gearbox import Gearbox, list_builtin_gearboxes
+from drivetwin.workbench.gearboxes import (
+    ReducedShift,
+    list_gears,
+    list_members,
+    list_shifts,
+    reduce_shift,
+)
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
 
@@ -18,20 +24,22 @@ _FIRST = "three-set-4000cr"
 
 def layout() -> list[Component]:
     """Return the controls for choosing a gearbox, and its description."""
-    names = builtin_gearboxes()
+    names = list_builtin_gearboxes()
     return [
-        ui.hint(
+        ui.make_hint(
             "A built-in gearbox, or a gearbox card of the folder. Ratios are computed from the "
             "members; a shift is reduced to two speeds, and the error of that is told."
         ),
-        ui.row(
-            ui.choice("gearbox-builtin", "Built-in", {"": "–", **{n: n for n in names}}, _FIRST),
+        ui.make_row(
+            ui.make_choice(
+                "gearbox-builtin", "Built-in", {"": "–", **{n: n for n in names}}, _FIRST
+            ),
             html.Div(
-                ui.field("gearbox-path", "or gearbox card", type="text", list="card-names"),
+                ui.make_field("gearbox-path", "or gearbox card", type="text", list="card-names"),
                 className="wide",
             ),
-            ui.upload_button("Upload a card…", "gearbox", "gearbox-upload"),
-            ui.button("Show", "show-gearbox", main=True),
+            ui.make_upload_button("Upload a card…", "gearbox", "gearbox-upload"),
+            ui.make_button("Show", "show-gearbox", main=True),
         ),
         dcc.Store(id="gearbox-upload"),
         html.Div(id="gearbox-content"),
@@ -52,18 +60,18 @@ def register(page: ui.Page) -> None:
     ) -> None:
         """Load a card: the one typed, else the upload, else the built-in one."""
         if path:
-            session.open_gearbox(session.in_folder(path))
+            session.open_gearbox(session.get_folder_source(path))
         elif upload is not None:
-            session.open_gearbox(session.uploaded(upload["key"]))
+            session.open_gearbox(session.get_uploaded(upload["key"]))
         else:
             session.open_gearbox(builtin)
-        ui.announce(ui.Topic.GEARBOX)
+        ui.notify_topic(ui.Topic.GEARBOX)
 
-    @page.callback(Output("gearbox-content", "children"), Input(ui.due_id("gearbox"), "data"))
+    @page.callback(Output("gearbox-content", "children"), Input(ui.make_due_id("gearbox"), "data"))
     def show(session: Session, _: int) -> list[Component]:
         """All of the gearbox."""
         box = session.gearbox
-        return [] if box is None else _content(box)
+        return [] if box is None else _build_content(box)
 
     @page.callback(
         Output("reduction", "children"), Input("gearbox-shift", "data-value"), initially=True
@@ -71,11 +79,15 @@ def register(page: ui.Page) -> None:
     def reduce(session: Session, shift: str | None) -> object:
         """One shift as a dual clutch."""
         box = session.gearbox
-        return no_update if box is None or shift is None else _reduction(reduced(box, shift))
+        return (
+            no_update
+            if box is None or shift is None
+            else _build_reduction(reduce_shift(box, shift))
+        )
 
 
-def _content(box: Gearbox) -> list[Component]:
-    gears = gears_of(box)
+def _build_content(box: Gearbox) -> list[Component]:
+    gears = list_gears(box)
     application: list[list[ui.Content]] = [
         [
             one.name,
@@ -83,82 +95,88 @@ def _content(box: Gearbox) -> list[Component]:
                 html.Div("●" if e in one.elements else "", className="engaged")
                 for e in box.elements
             ),
-            _right(f"{one.ratio:.4f}"),
-            _right(f"{one.published:.4g}"),
-            _right(f"{100 * one.difference:+.2f} %"),
+            _align_right(f"{one.ratio:.4f}"),
+            _align_right(f"{one.published:.4g}"),
+            _align_right(f"{100 * one.difference:+.2f} %"),
         ]
         for one in gears
     ]
     members: list[list[ui.Content]] = [
         [
             one.name,
-            _right(f"{one.inertia:.4g}" if one.inertia else "–"),
+            _align_right(f"{one.inertia:.4g}" if one.inertia else "–"),
             ", ".join(one.joined),
         ]
-        for one in members_of(box)
+        for one in list_members(box)
     ]
     sets: list[list[ui.Content]] = [
-        [one.name, one.sun, one.ring, one.carrier, _right(f"{one.z:.4g}")] for one in box.sets
+        [one.name, one.sun, one.ring, one.carrier, _align_right(f"{one.z:.4g}")] for one in box.sets
     ]
-    shifts = {name: name for name in shifts_of(box)}
+    shifts = {name: name for name in list_shifts(box)}
     head = ("gear", *box.elements, "ratio", "published", "difference")
     return [
         html.H3(box.name),
-        ui.hint(box.source),
-        ui.table(head, application, "Application table: ● is engaged.", "application"),
+        ui.make_hint(box.source),
+        ui.make_table(head, application, "Application table: ● is engaged.", "application"),
         html.H3("Reduction of a shift"),
-        ui.row(ui.choice("gearbox-shift", "Shift", shifts, next(iter(shifts)))),
+        ui.make_row(ui.make_choice("gearbox-shift", "Shift", shifts, next(iter(shifts)))),
         html.Div(id="reduction"),
         html.H3("Members"),
         *(
-            [ui.table(("set", "sun", "ring", "carrier", "z"), sets, "Planetary sets.")]
+            [ui.make_table(("set", "sun", "ring", "carrier", "z"), sets, "Planetary sets.")]
             if sets
             else []
         ),
-        ui.table(("member", "inertia [kg·m²]", "joined by"), members),
+        ui.make_table(("member", "inertia [kg·m²]", "joined by"), members),
     ]
 
 
-def _reduction(found: ReducedShift) -> list[Component]:
+def _build_reduction(found: ReducedShift) -> list[Component]:
     one = found.reduction
     elements: list[list[ui.Content]] = [
-        [each.element, role, *(_right(f"{x:.4f}") for x in (each.i_c, each.i_out, each.ratio))]
+        [
+            each.element,
+            role,
+            *(_align_right(f"{x:.4f}") for x in (each.i_c, each.i_out, each.ratio)),
+        ]
         for role, each in (("off-going", one.off_going), ("on-coming", one.on_coming))
     ]
     elements += [[name, "engaged throughout", "", "", ""] for name in one.common]
     members: list[list[ui.Content]] = [
         [
             each.member,
-            _right(f"{each.inertia:.4g}"),
-            *(_right(_number(value)) for value in (each.a, each.b, each.coupling)),
+            _align_right(f"{each.inertia:.4g}"),
+            *(_align_right(_format_number(value)) for value in (each.a, each.b, each.coupling)),
         ]
         for each in one.members
     ]
     mass: list[list[ui.Content]] = [
-        ["ω_in", _right(_number(one.M11)), _right(_number(one.M12))],
-        ["ω_out", _right(_number(one.M12)), _right(_number(one.M22))],
+        ["ω_in", _align_right(_format_number(one.M11)), _align_right(_format_number(one.M12))],
+        ["ω_out", _align_right(_format_number(one.M12)), _align_right(_format_number(one.M22))],
     ]
     return [
-        ui.hint(one.condition()),
-        ui.table(("element", "", "i_c", "i_out", "i_c·i_out"), elements,
+        ui.make_hint(one.describe_condition()),
+        ui.make_table(("element", "", "i_c", "i_out", "i_c·i_out"), elements,
               "slip = ω_in/i_c − i_out·ω_out (eq. 15)"),
-        ui.table(("mass matrix [kg·m²]", "ω_in", "ω_out"), mass),
-        ui.table(("member", "inertia [kg·m²]", "a", "b", "to M12"), members,
+        ui.make_table(("mass matrix [kg·m²]", "ω_in", "ω_out"), mass),
+        ui.make_table(("member", "inertia [kg·m²]", "a", "b", "to M12"), members,
               "Members that move: ω = a·ω_in − b·ω_out."),
-        _error(found),
+        _build_error_table(found),
     ]  # fmt: skip
 
 
-def _error(found: ReducedShift) -> Component:
+def _build_error_table(found: ReducedShift) -> Component:
     if found.reduction.exact:
-        return ui.hint("Nothing couples the two shafts: the reduced form makes no error.")
+        return ui.make_hint("Nothing couples the two shafts: the reduced form makes no error.")
     if found.estimated is None or found.simulated is None:
-        return ui.hint(f"The error of leaving M12 out is not told: {found.reason}")
+        return ui.make_hint(f"The error of leaving M12 out is not told: {found.reason}")
     rows: list[list[ui.Content]] = [
         [
             label,
             *(
-                _right(f"{significant(getattr(each, name) * unit.factor, 3)} {unit.label}")
+                _align_right(
+                    f"{format_significant(getattr(each, name) * unit.factor, 3)} {unit.label}"
+                )
                 for each in (found.estimated, found.simulated)
             ),
         ]
@@ -169,13 +187,13 @@ def _error(found: ReducedShift) -> Component:
         )
     ]
     caption = "Largest error over the reference shift of the card without M12."
-    return ui.table(("signal", "estimated", "simulated"), rows, caption)
+    return ui.make_table(("signal", "estimated", "simulated"), rows, caption)
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     """Format a number to four digits; round-off relative to 1 becomes zero."""
     return "0" if abs(value) < _ROUND_OFF else f"{value:.4g}"
 
 
-def _right(text: str) -> Component:
+def _align_right(text: str) -> Component:
     return html.Div(text, className="number")

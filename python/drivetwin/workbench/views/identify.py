@@ -10,14 +10,14 @@ from dash.development.base_component import Component
 
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import Method
-from drivetwin.report.labels import parameter_label
-from drivetwin.report.sections.parameters import trust_section
+from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.sections.parameters import build_parameters_section
 from drivetwin.workbench.locks import LockKind
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import Work
+from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.blocks import shown
-from drivetwin.workbench.views.log import facts_line
+from drivetwin.workbench.views.blocks import render_section
+from drivetwin.workbench.views.log import build_facts_line
 
 _UP_TO = {
     "likelihood": "paper, integral and likelihood",
@@ -31,14 +31,14 @@ _POLL = 300
 def layout() -> list[Component]:
     """Run, cancel, progress, outcome."""
     return [
-        ui.hint(
+        ui.make_hint(
             "Runs in a process of its own; the page stays free. The integral and the likelihood "
             "method take phases and locks as set; the paper's procedure knows no locks."
         ),
-        ui.row(
-            ui.choice("methods", "Methods", _UP_TO, "likelihood"),
-            ui.button("Identify", "identify", main=True),
-            ui.button("Cancel", "cancel", disabled=True),
+        ui.make_row(
+            ui.make_choice("methods", "Methods", _UP_TO, "likelihood"),
+            ui.make_button("Identify", "identify", main=True),
+            ui.make_button("Cancel", "cancel", disabled=True),
         ),
         html.Div(
             [
@@ -71,15 +71,15 @@ def _register_buttons(page: ui.Page) -> None:
         """Begin the identification."""
         order = list(Method)
         session.identify(order[: order.index(Method(up_to)) + 1])
-        ui.tell("")
-        ui.announce(ui.Topic.RESULTS)
+        ui.notify("")
+        ui.notify_topic(ui.Topic.RESULTS)
 
     @page.callback(Input("cancel", "n_clicks"))
     def cancel(session: Session, _: int) -> None:
         """Stop it."""
         session.cancel()
-        ui.tell("The identification was cancelled")
-        ui.announce(ui.Topic.RESULTS)
+        ui.notify("The identification was cancelled")
+        ui.notify_topic(ui.Topic.RESULTS)
 
 
 def _register_progress(page: ui.Page) -> None:
@@ -91,10 +91,10 @@ def _register_progress(page: ui.Page) -> None:
     def follow(session: Session, _: int) -> tuple[object, object]:
         """Take in results as they come."""
         try:
-            if session.poll():
-                ui.announce(ui.Topic.RESULTS)
+            if session.collect_job_results():
+                ui.notify_topic(ui.Topic.RESULTS)
         except Exception:
-            ui.announce(ui.Topic.RESULTS)
+            ui.notify_topic(ui.Topic.RESULTS)
             raise
         job = session.job
         if job is None:
@@ -106,41 +106,45 @@ def _register_progress(page: ui.Page) -> None:
         Output("progress-box", "hidden"),
         Output("identify", "disabled"),
         Output("cancel", "disabled"),
-        Input(ui.topic_id(ui.Topic.RESULTS), "data"),
+        Input(ui.make_topic_id(ui.Topic.RESULTS), "data"),
     )
     def follow_on(session: Session, _: int) -> tuple[bool, bool, bool, bool]:
         """Look at the job for as long as there is one."""
         busy = session.job is not None
         return not busy, not busy, busy, not busy
 
-    @page.callback(Output("identify-content", "children"), Input(ui.due_id("identify"), "data"))
+    @page.callback(
+        Output("identify-content", "children"), Input(ui.make_due_id("identify"), "data")
+    )
     def show(session: Session, _: str) -> list[Component]:
         """Render the present results."""
-        return _content(session.work)
+        return _build_content(session.work)
 
 
-def _content(work: Work) -> list[Component]:
-    content: list[Component] = [_before(work)]
+def _build_content(work: SessionState) -> list[Component]:
+    content: list[Component] = [_describe_inputs(work)]
     for text in dict.fromkeys(work.refusals.values()):
         methods = [method.value for method, why in work.refusals.items() if why == text]
-        content.append(ui.notes(f"Nothing found by: {', '.join(methods)} method", [text]))
+        content.append(ui.make_notes(f"Nothing found by: {', '.join(methods)} method", [text]))
     if work.ended:
-        content.append(ui.notes("The identification ended early", [work.ended]))
+        content.append(ui.make_notes("The identification ended early", [work.ended]))
     if work.method is None:
         return content
     outcome = work.results[work.method]
     if outcome.found is None:
         count = Counter(one.verdict for one in outcome.twin.parameters.values())
         told = {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
-        content.append(facts_line({"method": outcome.twin.method.value, **told}))
-        content.append(ui.hint("From the saved workspace; identify again for evidence and report."))
+        content.append(build_facts_line({"method": outcome.twin.method.value, **told}))
+        content.append(
+            ui.make_hint("From the saved workspace; identify again for evidence and report.")
+        )
     else:
-        content += shown(trust_section(outcome.found), "trust")
-    content.append(ui.notes("Assumptions", outcome.twin.assumptions, "plain"))
+        content += render_section(build_parameters_section(outcome.found), "trust")
+    content.append(ui.make_notes("Assumptions", outcome.twin.assumptions, "plain"))
     return content
 
 
-def _before(work: Work) -> Component:
+def _describe_inputs(work: SessionState) -> Component:
     """Describe the inputs of the next run."""
     rows = []
     for index, times in work.moves.items():
@@ -150,7 +154,7 @@ def _before(work: Work) -> Component:
         text = "free" if lock.kind is LockKind.FREE else f"{lock.value:.5g} (SI)"
         if lock.kind is LockKind.PRIOR:
             text += f" ± {lock.std:.2g}"
-        rows.append((parameter_label(name), f"{lock.kind.value}: {text}"))
+        rows.append((get_parameter_label(name), f"{lock.kind.value}: {text}"))
     if not rows:
         return html.Div()
-    return ui.table(("set by hand", ""), rows, "Beside the vehicle card, the next run takes")
+    return ui.make_table(("set by hand", ""), rows, "Beside the vehicle card, the next run takes")

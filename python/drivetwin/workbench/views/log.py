@@ -22,22 +22,24 @@ _SHIFT_HEAD = ("shift", "kind", "elements", "starts", "locks")
 def layout() -> list[Component]:
     """Two files, by path or upload, and what they hold."""
     return [
-        ui.hint(
+        ui.make_hint(
             "A recording with at least one gear shift, and the vehicle card that says what is "
             "known from design. Paths are inside the folder that the workbench was started in."
         ),
-        ui.row(
-            html.Div(ui.field("log-path", "Log", type="text", list="log-names"), className="wide"),
-            ui.upload_button("Upload a log…", "log", "log-upload"),
-        ),
-        ui.row(
+        ui.make_row(
             html.Div(
-                ui.field("card-path", "Vehicle card", type="text", list="card-names"),
+                ui.make_field("log-path", "Log", type="text", list="log-names"), className="wide"
+            ),
+            ui.make_upload_button("Upload a log…", "log", "log-upload"),
+        ),
+        ui.make_row(
+            html.Div(
+                ui.make_field("card-path", "Vehicle card", type="text", list="card-names"),
                 className="wide",
             ),
-            ui.upload_button("Upload a card…", "card", "card-upload"),
+            ui.make_upload_button("Upload a card…", "card", "card-upload"),
         ),
-        ui.row(ui.button("Open", "open", main=True)),
+        ui.make_row(ui.make_button("Open", "open", main=True)),
         html.Datalist(id="log-names"),
         html.Datalist(id="card-names"),
         dcc.Store(id="log-upload"),
@@ -72,10 +74,10 @@ def register(page: ui.Page) -> None:
         session: Session, _: int, log: str | None, card: str | None, log_up: Any, card_up: Any
     ) -> None:
         """Read log and card."""
-        session.open(_source(session, log, log_up), _source(session, card, card_up))
+        session.open(_get_source(session, log, log_up), _get_source(session, card, card_up))
         opened = session.work.require_opened()
-        ui.announce(ui.Topic.LOG)
-        ui.tell_read(f"{log} is open", opened.fault, len(session.work.shifts))
+        ui.notify_topic(ui.Topic.LOG)
+        ui.notify_opened_log(f"{log} is open", opened.fault, len(session.work.shifts))
 
     @page.callback(
         Output("log-content", "children"),
@@ -83,36 +85,37 @@ def register(page: ui.Page) -> None:
         Output("card-path", "value"),
         Output("log-names", "children"),
         Output("card-names", "children"),
-        Input(ui.due_id("log"), "data"),
+        Input(ui.make_due_id("log"), "data"),
     )
     def show(session: Session, _: int) -> tuple[Any, ...]:
         """Render the open log."""
         work, folder = session.work, session.folder
-        content = [] if work.opened is None else _content(work.opened)
+        content = [] if work.opened is None else _build_content(work.opened)
         names = [
-            [html.Option(value=name) for name in folder.names(ends)] for ends in (SUFFIXES, _CARDS)
+            [html.Option(value=name) for name in folder.list_names(ends)]
+            for ends in (SUFFIXES, _CARDS)
         ]
-        return content, _shown(work.log), _shown(work.card), *names
+        return content, _format_source(work.log), _format_source(work.card), *names
 
 
-def _source(session: Session, typed: str | None, upload: dict[str, str] | None) -> Source:
+def _get_source(session: Session, typed: str | None, upload: dict[str, str] | None) -> Source:
     """The file that a field names: an upload, or a path in the folder."""
     if upload is not None and typed == _UPLOADED + upload["name"]:
-        return session.uploaded(upload["key"])
-    return session.in_folder(typed or "")
+        return session.get_uploaded(upload["key"])
+    return session.get_folder_source(typed or "")
 
 
-def _shown(source: Source | None) -> str:
+def _format_source(source: Source | None) -> str:
     if source is None:
         return ""
     return _UPLOADED + source.name if source.uploaded else source.name
 
 
-def _content(opened: Opened) -> list[Component]:
+def _build_content(opened: Opened) -> list[Component]:
     if opened.log is None or opened.found is None:
         return [
-            ui.notes("The log cannot be read as mapped", [opened.fault]),
-            ui.hint("Correct the mapping under Channels."),
+            ui.make_notes("The log cannot be read as mapped", [opened.fault]),
+            ui.make_hint("Correct the mapping under Channels."),
         ]
     log, found = opened.log, opened.found
     first = min(float(one.time[0]) for one in log.channels.values())
@@ -136,16 +139,16 @@ def _content(opened: Opened) -> list[Component]:
     ]
     refused = [f"{r.time[0]:.2f} s to {r.time[1]:.2f} s: {r.reason}" for r in found.rejected]
     return [
-        facts_line(facts),
-        *([ui.table(_SHIFT_HEAD, shifts, "Shifts of the log")] if shifts else []),
-        ui.notes("About the log", log.warnings),
-        ui.notes(
+        build_facts_line(facts),
+        *([ui.make_table(_SHIFT_HEAD, shifts, "Shifts of the log")] if shifts else []),
+        ui.make_notes("About the log", log.warnings),
+        ui.make_notes(
             "Not used" if shifts else "No usable shift", refused, "plain" if shifts else "doubtful"
         ),
     ]
 
 
-def facts_line(facts: dict[str, str]) -> Component:
+def build_facts_line(facts: dict[str, str]) -> Component:
     """Figures side by side, each under its name."""
     return html.Div(
         [html.Div([html.Span(name), html.Strong(value)]) for name, value in facts.items()],

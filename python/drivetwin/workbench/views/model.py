@@ -10,20 +10,20 @@ from typing import Any
 from dash import ALL, MATCH, Input, Output, Patch, State, ctx, html, no_update
 from dash.development.base_component import Component
 
-from drivetwin._util.display_units import display_of, with_uncertainty
+from drivetwin._util.display_units import format_uncertainty, get_display_unit
 from drivetwin.errors import MissingParameterError
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.parameters import spec_of
-from drivetwin.report.labels import parameter_label
+from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.parameters import TONES
-from drivetwin.shifts.shift import shift_labels
-from drivetwin.workbench.locks import Lock, LockKind, lockable, typed
+from drivetwin.shifts.shift import make_shift_labels
+from drivetwin.workbench.locks import Lock, LockKind, can_fix, parse_lock
 from drivetwin.workbench.session import Live, Session
-from drivetwin.workbench.session_state import Work
+from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.what_if import Slider, changes_of, display_for, sliders_of
+from drivetwin.workbench.what_if import Slider, collect_changes, get_display, list_sliders
 
 _KINDS = {kind.value: kind.value for kind in LockKind}
 _BOTH = """(a, b) => {
@@ -38,13 +38,13 @@ _BOTH = """(a, b) => {
 def layout() -> list[Component]:
     """Filled when there is a twin."""
     return [
-        ui.hint(
+        ui.make_hint(
             "Move a parameter: the simulation is driven by the measured engine torque and "
             "pressures again. The dotted curve is the model as identified."
         ),
         html.Div(id="model-content"),
         html.H3("Parameters and locks"),
-        ui.hint(
+        ui.make_hint(
             "free: the log alone decides. prior: value ± one standard deviation counts as a "
             "measurement. fixed: taken as known. Locks count from the next identification on."
         ),
@@ -60,23 +60,23 @@ def register(page: ui.Page) -> None:
 
 
 def _register_bench(page: ui.Page) -> None:
-    @page.callback(Output("model-content", "children"), Input(ui.due_id("model"), "data"))
+    @page.callback(Output("model-content", "children"), Input(ui.make_due_id("model"), "data"))
     def show(session: Session, _: int) -> list[Component]:
         """Render the sliders next to the figure."""
         if session.work.method is None or not session.work.shifts:
-            return [ui.hint("Nothing is identified yet.")]
+            return [ui.make_hint("Nothing is identified yet.")]
         try:
-            live = session.simulation()
+            live = session.get_simulation()
         except MissingParameterError as incomplete:
-            return [_choices(session.work), ui.hint(str(incomplete))]
-        return _bench(session, live)
+            return [_build_choices(session.work), ui.make_hint(str(incomplete))]
+        return _build_bench(session, live)
 
     @page.callback(Input("reset-sliders", "n_clicks"))
     def reset(session: Session, clicks: int | None) -> None:
         """Back to what was identified."""
         if clicks:
             session.choose_method(session.work.require_outcome().method)
-            ui.announce(ui.Topic.LIVE)
+            ui.notify_topic(ui.Topic.LIVE)
 
     @page.callback(Input("model-method", "data-value"), Input("model-shift", "data-value"))
     def choose(session: Session, method: str | None, shift: str | None) -> None:
@@ -84,10 +84,10 @@ def _register_bench(page: ui.Page) -> None:
         work = session.work
         if method is not None and Method(method) is not work.method:
             session.choose_method(Method(method))
-            ui.announce(ui.Topic.LIVE)
+            ui.notify_topic(ui.Topic.LIVE)
         if shift is not None and int(shift) != work.shift:
             session.choose_shift(int(shift))
-            ui.announce(ui.Topic.PHASES)
+            ui.notify_topic(ui.Topic.PHASES)
 
 
 def _register_sliders(page: ui.Page) -> None:
@@ -116,24 +116,26 @@ def _register_sliders(page: ui.Page) -> None:
             if value is not None
         }  # fmt: skip
         work = session.work
-        sliders = sliders_of(work.require_twin(), work.require_shift())
-        changes = changes_of(sliders, positions)
+        sliders = list_sliders(work.require_twin(), work.require_shift())
+        changes = collect_changes(sliders, positions)
         if changes == work.changes:
             return no_update, no_update
         patch = Patch()
-        for place, change in session.slide(changes).items():
+        for place, change in session.apply_sliders(changes).items():
             patch["data"][place]["x"] = change["x"]
             patch["data"][place]["y"] = change["y"]
         spent = 1e3 * (time.perf_counter() - begun)
-        return patch, _fit(session.simulation(), f"simulated and compared in {spent:.0f} ms")
+        return patch, _build_fit(
+            session.get_simulation(), f"simulated and compared in {spent:.0f} ms"
+        )
 
 
 def _register_locks(page: ui.Page) -> None:
-    @page.callback(Output("locks-content", "children"), Input(ui.due_id("model"), "data"))
+    @page.callback(Output("locks-content", "children"), Input(ui.make_due_id("model"), "data"))
     def show(session: Session, _: int) -> list[Component]:
         """One row for each parameter."""
         work = session.work
-        return _locks(work) if work.shifts else [ui.hint("No shift is open.")]
+        return _build_locks(work) if work.shifts else [ui.make_hint("No shift is open.")]
 
     @page.callback(
         Input({"lock": "kind", "id": ALL}, "data-value"),
@@ -153,44 +155,48 @@ def _register_locks(page: ui.Page) -> None:
             return
         name = ctx.triggered_id["id"]
         place = [one["id"] for one in ids].index(name)
-        wanted = typed(name, LockKind(kinds[place]), values[place], stds[place])
-        if _same(wanted, session.work.lock_of(name)):
-            ui.tell("")
+        wanted = parse_lock(name, LockKind(kinds[place]), values[place], stds[place])
+        if _is_same(wanted, session.work.get_lock(name)):
+            ui.notify("")
             return
         session.set_lock(name, wanted)
-        ui.tell(f"{parameter_label(name)} is {wanted.kind.value} from the next identification on")
+        ui.notify(
+            f"{get_parameter_label(name)} is {wanted.kind.value} from the next identification on"
+        )
 
 
-def _same(one: Lock, other: Lock) -> bool:
+def _is_same(one: Lock, other: Lock) -> bool:
     if one.kind is not other.kind or one.kind is LockKind.FREE:
         return one.kind is other.kind
     near = abs(one.value - other.value) <= 1e-5 * abs(other.value)
     return near and abs(one.std - other.std) <= 1e-5 * abs(other.std)
 
 
-def _choices(work: Work) -> Component:
+def _build_choices(work: SessionState) -> Component:
     methods = {method.value: method.value for method in work.results}
-    shifts = {str(k): name for k, name in enumerate(shift_labels(work.shifts))}
+    shifts = {str(k): name for k, name in enumerate(make_shift_labels(work.shifts))}
     shown = work.require_outcome().method.value
-    return ui.row(
-        ui.choice("model-method", "Result", methods, shown),
-        ui.choice("model-shift", "Shift", shifts, str(work.shift)),
-        ui.button("As identified", "reset-sliders"),
+    return ui.make_row(
+        ui.make_choice("model-method", "Result", methods, shown),
+        ui.make_choice("model-shift", "Shift", shifts, str(work.shift)),
+        ui.make_button("As identified", "reset-sliders"),
     )
 
 
-def _bench(session: Session, live: Live) -> list[Component]:
+def _build_bench(session: Session, live: Live) -> list[Component]:
     work = session.work
-    sliders = sliders_of(work.require_twin(), work.require_shift())
+    sliders = list_sliders(work.require_twin(), work.require_shift())
     return [
-        _choices(work),
+        _build_choices(work),
         html.Div(
             [
-                html.Div([_slider(one, work.changes) for one in sliders], className="sliders"),
+                html.Div(
+                    [_build_slider(one, work.changes) for one in sliders], className="sliders"
+                ),
                 html.Div(
                     [
-                        html.Div(_fit(live, ""), id="model-fit"),
-                        ui.graph("model-plot", "Simulation over measurement", live.figure),
+                        html.Div(_build_fit(live, ""), id="model-fit"),
+                        ui.make_graph("model-plot", "Simulation over measurement", live.figure),
                     ]
                 ),
             ],
@@ -199,22 +205,22 @@ def _bench(session: Session, live: Live) -> list[Component]:
     ]
 
 
-def _slider(one: Slider, changes: Mapping[str, float]) -> Component:
+def _build_slider(one: Slider, changes: Mapping[str, float]) -> Component:
     value = one.value
     if one.id in changes:
-        value = round(changes[one.id] * display_for(one.id).factor / one.step) * one.step
+        value = round(changes[one.id] * get_display(one.id).factor / one.step) * one.step
     limits = {"min": one.low, "max": one.high, "step": one.step, "value": value}
     return html.Div(
         [
             html.Div([one.label, html.Small(one.unit)], className="name"),
-            ui.field(
+            ui.make_field(
                 {"part": "range", "id": one.id},
                 f"{one.label}, slider",
                 hidden_label=True,
                 type="range",
                 **limits,
             ),
-            ui.field(
+            ui.make_field(
                 {"part": "number", "id": one.id},
                 f"{one.label}, number in {one.unit}",
                 hidden_label=True,
@@ -227,33 +233,33 @@ def _slider(one: Slider, changes: Mapping[str, float]) -> Component:
     )
 
 
-def _fit(live: Live, remark: str) -> list[Component]:
+def _build_fit(live: Live, remark: str) -> list[Component]:
     """Fit of the present run, and of the one as identified."""
     rows = [
         (
             name.replace("_", " "),
-            _percent(live.present, name),
-            _percent(live.identified, name),
+            _format_percent(live.present, name),
+            _format_percent(live.identified, name),
         )
         for name in live.present.fit
     ]
-    parts = [ui.table(("fit over the whole shift", "now", "as identified"), rows)]
+    parts = [ui.make_table(("fit over the whole shift", "now", "as identified"), rows)]
     status = live.present.status
     text = remark if status == "completed" else f"the simulation ended early: {status}"
-    return [*parts, ui.hint(text)]
+    return [*parts, ui.make_hint(text)]
 
 
-def _percent(run: Validation, name: str) -> str:
+def _format_percent(run: Validation, name: str) -> str:
     return f"{run.fit[name]['all'].fit_percent:.2f} %"
 
 
-def _locks(work: Work) -> list[Component]:
-    names = list(work.require_twin().parameters) if work.method else _usual_ids(work)
+def _build_locks(work: SessionState) -> list[Component]:
+    names = list(work.require_twin().parameters) if work.method else _list_default_ids(work)
     head = ("parameter", "value", "± 95 %", "unit", "verdict", "lock", "at", "± std")
-    return [ui.table(head, [_lock_row(work, name) for name in names], name="locks")]
+    return [ui.make_table(head, [_build_lock_row(work, name) for name in names], name="locks")]
 
 
-def _usual_ids(work: Work) -> list[str]:
+def _list_default_ids(work: SessionState) -> list[str]:
     """List the parameters that can be fixed before an identification."""
     gears = dict.fromkeys(g for s in work.shifts for g in (s.start_gear, s.end_gear))
     elements = dict.fromkeys(e for s in work.shifts for e in (s.offgoing, s.oncoming))
@@ -265,19 +271,19 @@ def _usual_ids(work: Work) -> list[str]:
     ]
 
 
-def _lock_row(work: Work, name: str) -> list[Any]:
-    spec = spec_of(name)
-    display = display_of(spec.unit)
+def _build_lock_row(work: SessionState, name: str) -> list[Any]:
+    spec = get_parameter_spec(name)
+    display = get_display_unit(spec.unit)
     estimate = work.require_twin().parameters[name] if work.method else None
     value, width = "–", "–"
     if estimate is not None and estimate.value is not None:
         std = estimate.std_total
         half = None if std is None else Z95 * std * display.factor
-        value, width = with_uncertainty(estimate.value * display.factor, half)
+        value, width = format_uncertainty(estimate.value * display.factor, half)
     verdict: Any = ""
     if estimate is not None:
-        verdict = ui.badge(estimate.verdict.value, TONES[estimate.verdict].value)
-    label = html.Div([parameter_label(name), html.Small(spec.meaning)])
+        verdict = ui.make_badge(estimate.verdict.value, TONES[estimate.verdict].value)
+    label = html.Div([get_parameter_label(name), html.Small(spec.meaning)])
     cells: list[Any] = [
         label,
         html.Div(value, className="number"),
@@ -285,20 +291,22 @@ def _lock_row(work: Work, name: str) -> list[Any]:
         display.label,
         verdict,
     ]
-    if not lockable(name):
+    if not can_fix(name):
         return [*cells, "follows", "", ""]
-    return [*cells, *_lock_controls(work, name, None if estimate is None else estimate.value)]
+    return [*cells, *_build_lock_controls(work, name, None if estimate is None else estimate.value)]
 
 
-def _lock_controls(work: Work, name: str, told_value: float | None) -> list[Component]:
-    lock, factor = work.lock_of(name), display_of(spec_of(name).unit).factor
+def _build_lock_controls(
+    work: SessionState, name: str, told_value: float | None
+) -> list[Component]:
+    lock, factor = work.get_lock(name), get_display_unit(get_parameter_spec(name).unit).factor
     at = lock.value if lock.kind is not LockKind.FREE else told_value
     std = lock.std if lock.kind is LockKind.PRIOR else 0.05 * abs(at or 0.0)
-    label = parameter_label(name)
+    label = get_parameter_label(name)
 
     def number(part: str, text: str, value: float | None) -> Component:
         shown = None if value is None else float(f"{value * factor:.6g}")
-        return ui.field(
+        return ui.make_field(
             {"lock": part, "id": name},
             f"{text} of {label}",
             hidden_label=True,
@@ -309,7 +317,7 @@ def _lock_controls(work: Work, name: str, told_value: float | None) -> list[Comp
         )
 
     return [
-        ui.choice(
+        ui.make_choice(
             {"lock": "kind", "id": name}, f"lock of {label}", _KINDS, lock.kind, hidden_label=True
         ),
         number("value", "locked value", at),

@@ -25,11 +25,11 @@ from drivetwin.workbench.views import (
 from drivetwin.workbench.views.widgets import (
     Page,
     Topic,
-    announce,
-    attributes,
-    due_id,
-    told,
-    topic_id,
+    make_attributes,
+    make_due_id,
+    make_topic_id,
+    notify_topic,
+    shows_message,
 )
 
 
@@ -95,43 +95,43 @@ The view stands in the address, for the browser's way back and for loading the p
 def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
     """Give the application its layout and the callbacks of all views."""
     app.index_string = _INDEX
-    app.layout = _layout
-    _switch_views(app)
-    _draw_what_is_shown(app)
-    _enter(app, sessions, start)
+    app.layout = _build_layout
+    _register_view_switch(app)
+    _register_visible_resize(app)
+    _register_entry(app, sessions, start)
     _show_status(app, sessions)
     for _, view in VIEWS.values():
         view.register(Page(app, sessions))
 
 
-def _layout() -> Component:
+def _build_layout() -> Component:
     navigation = html.Nav(
         [
             html.H1(["drivetwin", html.Small("workbench")]),
             *(
                 html.Button(
-                    title, id=f"nav-{name}", type="button", **attributes(aria_current="false")
+                    title, id=f"nav-{name}", type="button", **make_attributes(aria_current="false")
                 )
                 for name, (title, _) in VIEWS.items()
             ),
         ],
         className="side",
-        **attributes(aria_label="Views"),
+        **make_attributes(aria_label="Views"),
     )
     panels = [
         html.Section(
             [html.H2(title), *view.layout()],
             id=f"view-{name}",
             hidden=name != _FIRST,
-            **attributes(aria_label=f"{title} view"),
+            **make_attributes(aria_label=f"{title} view"),
         )
         for name, (title, view) in VIEWS.items()
     ]
     return html.Div(
         [
             dcc.Store(id="session", storage_type="session"),
-            *(dcc.Store(id=topic_id(topic)) for topic in Topic),
-            *(dcc.Store(id=due_id(name)) for name in _TOPICS),
+            *(dcc.Store(id=make_topic_id(topic)) for topic in Topic),
+            *(dcc.Store(id=make_due_id(name)) for name in _TOPICS),
             navigation,
             html.Main(
                 [
@@ -145,7 +145,7 @@ def _layout() -> Component:
     )
 
 
-def _switch_views(app: Dash) -> None:
+def _register_view_switch(app: Dash) -> None:
     script = _SWITCH.replace("NAMES", str(list(VIEWS)))
     app.clientside_callback(  # type: ignore[no-untyped-call]
         script,
@@ -155,36 +155,36 @@ def _switch_views(app: Dash) -> None:
     )
 
 
-def _draw_what_is_shown(app: Dash) -> None:
+def _register_visible_resize(app: Dash) -> None:
     """A view is drawn when it is looked at: all of them at once would keep the browser busy."""
     for name, topics in _TOPICS.items():
         app.clientside_callback(  # type: ignore[no-untyped-call]
             _DUE,
-            Output(due_id(name), "data"),
+            Output(make_due_id(name), "data"),
             Input(f"view-{name}", "hidden"),
-            *(Input(topic_id(topic), "data") for topic in topics),
-            State(due_id(name), "data"),
+            *(Input(make_topic_id(topic), "data") for topic in topics),
+            State(make_due_id(name), "data"),
         )
 
 
-def _enter(app: Dash, sessions: Sessions, start: Start) -> None:
+def _register_entry(app: Dash, sessions: Sessions, start: Start) -> None:
     @app.callback(
         Output("session", "data"), Input("session", "modified_timestamp"), State("session", "data")
     )
-    @told
+    @shows_message
     def enter(_: int, key: str | None) -> object:
         """Go on with the session of this tab, or begin one with what the command line named."""
         if key in sessions:
-            announce(Topic.LOG)
-            announce(Topic.GEARBOX)
+            notify_topic(Topic.LOG)
+            notify_topic(Topic.GEARBOX)
             return no_update
-        fresh = sessions.new()
+        fresh = sessions.create()
         if start.log is not None and start.card is not None:
             _open_first(sessions.get(fresh), start)
         return fresh
 
 
-@told
+@shows_message
 def _open_first(session: Session, start: Start) -> None:
     if start.log is not None and start.card is not None:
         session.open(start.log, start.card, start.mapping)
@@ -193,8 +193,8 @@ def _open_first(session: Session, start: Start) -> None:
 def _show_status(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("status", "children"),
-        Input(topic_id(Topic.LOG), "data"),
-        Input(topic_id(Topic.RESULTS), "data"),
+        Input(make_topic_id(Topic.LOG), "data"),
+        Input(make_topic_id(Topic.RESULTS), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )

@@ -9,20 +9,26 @@ from typing import Any
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
-from drivetwin._util.display_units import display_of, significant
-from drivetwin.report.sections.summary import phase_key
+from drivetwin._util.display_units import format_significant, get_display_unit
+from drivetwin.report.sections.summary import describe_phases
 from drivetwin.shifts.quality import QUALITY_UNITS
-from drivetwin.shifts.shift import Shift, shift_labels
-from drivetwin.workbench.phases import LABELS, dragged, phase_figure, shown_times, typed
+from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.workbench.phases import (
+    LABELS,
+    get_display_times,
+    parse_drag,
+    parse_times,
+    plot_phases,
+)
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import Work
+from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
 
 
 def layout() -> list[Component]:
     """The figure and the times."""
     return [
-        ui.hint(
+        ui.make_hint(
             "Drag a dashed line to move a phase boundary, or type its time. What is set by hand "
             "counts for the next identification."
         ),
@@ -37,11 +43,11 @@ def register(page: ui.Page) -> None:
 
 
 def _register_figure(page: ui.Page) -> None:
-    @page.callback(Output("phases-content", "children"), Input(ui.due_id("phases"), "data"))
+    @page.callback(Output("phases-content", "children"), Input(ui.make_due_id("phases"), "data"))
     def show(session: Session, _: int) -> list[Component]:
         """The shift that is chosen."""
         work = session.work
-        return _content(work) if work.shifts else [ui.hint("No shift is open.")]
+        return _build_content(work) if work.shifts else [ui.make_hint("No shift is open.")]
 
     @page.callback(Input("phases-plot", "relayoutData"))
     def drag(session: Session, change: dict[str, Any] | None) -> None:
@@ -49,11 +55,11 @@ def _register_figure(page: ui.Page) -> None:
         work = session.work
         if not change or not any(name.startswith("shapes[") for name in change):
             return
-        moves = dragged(phase_figure(work.require_log(), work.require_shift()), change)
-        ui.announce(ui.Topic.PHASES)
+        moves = parse_drag(plot_phases(work.require_log(), work.require_shift()), change)
+        ui.notify_topic(ui.Topic.PHASES)
         if moves:
-            session.move(work.shift, moves)
-            ui.tell("; ".join(f"{LABELS[one]} at {time:.4f} s" for one, time in moves.items()))
+            session.move_boundaries(work.shift, moves)
+            ui.notify("; ".join(f"{LABELS[one]} at {time:.4f} s" for one, time in moves.items()))
 
 
 def _register_fields(page: ui.Page) -> None:
@@ -62,66 +68,66 @@ def _register_fields(page: ui.Page) -> None:
         """Times were typed."""
         if not clicks:
             return
-        changes = typed(session.work.require_shift(), times)
+        changes = parse_times(session.work.require_shift(), times)
         if not changes:
-            ui.tell("No time was changed")
+            ui.notify("No time was changed")
             return
-        session.move(session.work.shift, changes)
-        ui.announce(ui.Topic.PHASES)
-        ui.tell("The phases are set")
+        session.move_boundaries(session.work.shift, changes)
+        ui.notify_topic(ui.Topic.PHASES)
+        ui.notify("The phases are set")
 
     @page.callback(Input("reset-phases", "n_clicks"))
     def reset(session: Session, clicks: int | None) -> None:
         """Back to what was detected."""
         if not clicks:
             return
-        session.move(session.work.shift, {})
-        ui.announce(ui.Topic.PHASES)
-        ui.tell("The phases are as detected")
+        session.move_boundaries(session.work.shift, {})
+        ui.notify_topic(ui.Topic.PHASES)
+        ui.notify("The phases are as detected")
 
     @page.callback(Input("phases-shift", "data-value"))
     def choose(session: Session, shift: str | None) -> None:
         """Another shift of the log."""
         if shift is not None and int(shift) != session.work.shift:
             session.choose_shift(int(shift))
-            ui.announce(ui.Topic.PHASES)
+            ui.notify_topic(ui.Topic.PHASES)
 
 
-def _content(work: Work) -> list[Component]:
+def _build_content(work: SessionState) -> list[Component]:
     shift = work.require_shift()
-    names = {str(k): name for k, name in enumerate(shift_labels(work.shifts))}
+    names = {str(k): name for k, name in enumerate(make_shift_labels(work.shifts))}
     fields = [
-        ui.field(
+        ui.make_field(
             {"boundary": one.value},
             f"{LABELS[one]} [s]",
             type="number",
             value=time,
             step="any",
         )
-        for one, time in shown_times(shift).items()
+        for one, time in get_display_times(shift).items()
     ]
     return [
-        ui.row(ui.choice("phases-shift", "Shift", names, str(work.shift)), *fields),
-        ui.row(
-            ui.button("Apply times", "apply-phases", main=True),
-            ui.button("As detected", "reset-phases"),
+        ui.make_row(ui.make_choice("phases-shift", "Shift", names, str(work.shift)), *fields),
+        ui.make_row(
+            ui.make_button("Apply times", "apply-phases", main=True),
+            ui.make_button("As detected", "reset-phases"),
         ),
-        ui.graph(
+        ui.make_graph(
             "phases-plot",
             "The shift over time with its phases",
-            phase_figure(work.require_log(), shift),
+            plot_phases(work.require_log(), shift),
             edits={"shapePosition": True},
         ),
-        ui.hint(phase_key(shift.kind)),
-        ui.notes("About this shift", shift.warnings),
-        _quality(shift),
+        ui.make_hint(describe_phases(shift.kind)),
+        ui.make_notes("About this shift", shift.warnings),
+        _build_quality(shift),
     ]
 
 
-def _quality(shift: Shift) -> Component:
+def _build_quality(shift: Shift) -> Component:
     rows = []
     for name, value in shift.quality.items():
-        display = display_of(QUALITY_UNITS[name])
-        text = f"{significant(value * display.factor, 3)} {display.label}"
+        display = get_display_unit(QUALITY_UNITS[name])
+        text = f"{format_significant(value * display.factor, 3)} {display.label}"
         rows.append((name.replace("_", " "), text))
-    return ui.table(("figure", "value"), rows, "Shift quality")
+    return ui.make_table(("figure", "value"), rows, "Shift quality")

@@ -51,45 +51,45 @@ _CONCERNED = {
 }
 
 
-def attributes(**values: str) -> dict[str, Any]:
+def make_attributes(**values: str) -> dict[str, Any]:
     """Attributes with a hyphen, such as `aria_label` for `aria-label`."""
     return {name.replace("_", "-"): value for name, value in values.items()}
 
 
-def topic_id(topic: Topic) -> str:
+def make_topic_id(topic: Topic) -> str:
     """Id of the store whose change redraws what shows a topic."""
     return f"topic-{topic}"
 
 
-def due_id(view: str) -> str:
+def make_due_id(view: str) -> str:
     """Id of the store that changes when a view has to be drawn: it is shown, and out of date."""
     return f"due-{view}"
 
 
-def announce(topic: Topic) -> None:
+def notify_topic(topic: Topic) -> None:
     """Redraw, after the present callback, what shows a topic or follows from it."""
     for one in _CONCERNED[topic]:
-        set_props(topic_id(one), {"data": next(_counter)})
+        set_props(make_topic_id(one), {"data": next(_counter)})
 
 
-def tell(text: str, *, fault: bool = False) -> None:
+def notify(text: str, *, fault: bool = False) -> None:
     """Show a message at the head of the page."""
     set_props(
         "message", {"children": text, "className": "message fault" if fault else "message good"}
     )
 
 
-def tell_read(how: str, fault: str, shifts: int) -> None:
+def notify_opened_log(how: str, fault: str, shifts: int) -> None:
     """Show what came of reading a log, `how` in words: its fault, or how many shifts it holds."""
     if fault:
-        tell(f"The log cannot be read as mapped. {fault}", fault=True)
+        notify(f"The log cannot be read as mapped. {fault}", fault=True)
     elif shifts:
-        tell(f"{how}: {shifts} usable {'shift' if shifts == 1 else 'shifts'}")
+        notify(f"{how}: {shifts} usable {'shift' if shifts == 1 else 'shifts'}")
     else:
-        tell(f"{how}, but holds no usable shift: the view Log says why", fault=True)
+        notify(f"{how}, but holds no usable shift: the view Log says why", fault=True)
 
 
-def told(callback: Callable[P, R], unchanged: object = no_update) -> Callable[P, R]:
+def shows_message(callback: Callable[P, R], unchanged: object = no_update) -> Callable[P, R]:
     """Return the callback with its errors as the message of the page, and `unchanged` then."""
 
     @functools.wraps(callback)
@@ -97,7 +97,7 @@ def told(callback: Callable[P, R], unchanged: object = no_update) -> Callable[P,
         try:
             return callback(*args, **kwargs)
         except (DrivetwinError, OSError) as fault:
-            tell(_words(fault), fault=True)
+            notify(_format_fault(fault), fault=True)
             return cast(R, unchanged)
 
     return guarded
@@ -130,13 +130,13 @@ class Page:
                 State("session", "data"),
                 running=running,
                 prevent_initial_call=not initially,
-            )(told(act, None if silent else no_update))
+            )(shows_message(act, None if silent else no_update))
             return callback
 
         return register
 
 
-def _words(fault: DrivetwinError | OSError) -> str:
+def _format_fault(fault: DrivetwinError | OSError) -> str:
     """Format a typed error or an OS error as a message; files without their folders."""
     if isinstance(fault, DrivetwinError):
         return str(fault)
@@ -145,7 +145,7 @@ def _words(fault: DrivetwinError | OSError) -> str:
     return str(DrivetwinError(fault.strerror or type(fault).__name__, remedy, where))
 
 
-def choice(
+def make_choice(
     id: Id, label: str, options: Mapping[str, str], value: str, *, hidden_label: bool = False
 ) -> Component:
     """A labelled select: `options` are texts by value; read it as the property `data-value`."""
@@ -153,36 +153,36 @@ def choice(
         html.Option(text, value=key, selected="selected" if key == value else None)
         for key, text in options.items()
     ]
-    select = html.Select(entries, id=id, className="choice", **attributes(data_value=value))
-    return _labelled(label, select, hidden=hidden_label)
+    select = html.Select(entries, id=id, className="choice", **make_attributes(data_value=value))
+    return _attach_label(label, select, hidden=hidden_label)
 
 
-def field(id: Id, label: str, *, hidden_label: bool = False, **options: Any) -> Component:
+def make_field(id: Id, label: str, *, hidden_label: bool = False, **options: Any) -> Component:
     """A labelled input; `options` are those of dcc.Input."""
-    return _labelled(label, dcc.Input(id=id, **options), hidden=hidden_label)
+    return _attach_label(label, dcc.Input(id=id, **options), hidden=hidden_label)
 
 
-def _labelled(label: str, control: Component, *, hidden: bool) -> Component:
+def _attach_label(label: str, control: Component, *, hidden: bool) -> Component:
     text = html.Span(label, className="unseen" if hidden else "label")
     return html.Label([text, control], className="field")
 
 
-def button(text: str, id: Id, *, main: bool = False, **options: Any) -> Component:
+def make_button(text: str, id: Id, *, main: bool = False, **options: Any) -> Component:
     """A button; `main` is the one to press next."""
     style = "main" if main else ""
     return html.Button(text, id=id, type="button", className=style, **options)
 
 
-def upload_button(text: str, purpose: str, target: str) -> Component:
+def make_upload_button(text: str, purpose: str, target: str) -> Component:
     """Build a button that uploads a file; the store `target` then holds key and name."""
     return html.Button(
         text,
         type="button",
-        **attributes(data_upload=purpose, data_target=target, data_limit=str(LIMITS[purpose])),
+        **make_attributes(data_upload=purpose, data_target=target, data_limit=str(LIMITS[purpose])),
     )
 
 
-def table(
+def make_table(
     head: Iterable[Content], rows: Iterable[Sequence[Content]], caption: str = "", name: str = ""
 ) -> Component:
     """A table whose first column names the row."""
@@ -199,7 +199,7 @@ def table(
     return html.Div(html.Table(children), className=f"table {name}".strip())
 
 
-def notes(title: str, texts: Iterable[str], tone: str = "doubtful") -> Component:
+def make_notes(title: str, texts: Iterable[str], tone: str = "doubtful") -> Component:
     """Build a list of sentences under a heading; empty without sentences."""
     items = [html.Li(text) for text in dict.fromkeys(texts)]
     if not items:
@@ -207,22 +207,22 @@ def notes(title: str, texts: Iterable[str], tone: str = "doubtful") -> Component
     return html.Div([html.H3(title), html.Ul(items)], className=f"notes {tone}")
 
 
-def badge(text: str, tone: str) -> Component:
+def make_badge(text: str, tone: str) -> Component:
     """A coloured label."""
     return html.Span(text, className=f"badge {tone}")
 
 
-def row(*children: Component) -> Component:
+def make_row(*children: Component) -> Component:
     """Controls side by side."""
     return html.Div(list(children), className="row")
 
 
-def hint(text: str) -> Component:
+def make_hint(text: str) -> Component:
     """A paragraph of quiet text."""
     return html.P(text, className="hint")
 
 
-def graph(id: str, label: str, figure: go.Figure, **config: Any) -> Component:
+def make_graph(id: str, label: str, figure: go.Figure, **config: Any) -> Component:
     """Build a figure; `label` is its description for screen readers."""
     options: Any = {
         "displaylogo": False,
@@ -231,4 +231,4 @@ def graph(id: str, label: str, figure: go.Figure, **config: Any) -> Component:
         **config,
     }
     plot = dcc.Graph(id=id, config=options, figure=figure, className="plot")
-    return html.Figure(plot, **attributes(aria_label=label))
+    return html.Figure(plot, **make_attributes(aria_label=label))

@@ -14,23 +14,23 @@ from drivetwin.workbench.workspace import ENDING
 def layout() -> list[Component]:
     """Save and reopen."""
     return [
-        ui.hint(
+        ui.make_hint(
             "A workspace holds the paths of log and card with their check sums, the mapping, "
             "phases, locks, the identified twins and the sliders; not the log itself. "
             "It is a JSON file in the folder of the workbench."
         ),
         html.H3("Save"),
-        ui.row(
-            html.Div(ui.field("save-name", "Name", type="text", value=f"work{ENDING}"),
+        ui.make_row(
+            html.Div(ui.make_field("save-name", "Name", type="text", value=f"work{ENDING}"),
                      className="wide"),
-            ui.button("Save", "save", main=True),
+            ui.make_button("Save", "save", main=True),
         ),
         html.H3("Reopen"),
-        ui.row(
-            html.Div(ui.field("reopen-name", "Workspace", type="text", list="workspace-names"),
+        ui.make_row(
+            html.Div(ui.make_field("reopen-name", "Workspace", type="text", list="workspace-names"),
                      className="wide"),
-            ui.button("Reopen", "reopen", main=True),
-            ui.upload_button("Upload a workspace…", "workspace", "workspace-upload"),
+            ui.make_button("Reopen", "reopen", main=True),
+            ui.make_upload_button("Upload a workspace…", "workspace", "workspace-upload"),
         ),
         html.Datalist(id="workspace-names"),
         dcc.Store(id="workspace-upload"),
@@ -47,31 +47,31 @@ def register(page: ui.Page) -> None:
     )
     def save(session: Session, _: int, name: str | None) -> list[Component]:
         """Write the file."""
-        ui.tell(f"saved as {session.save(name or '')}")
-        return _names(session)
+        ui.notify(f"saved as {session.save(name or '')}")
+        return _build_names(session)
 
     @page.callback(
         Output("workspace-names", "children", allow_duplicate=True),
-        Input(ui.due_id("workspace"), "data"),
+        Input(ui.make_due_id("workspace"), "data"),
     )
     def offer(session: Session, _: int) -> list[Component]:
         """Workspaces of the folder, for completion."""
-        return _names(session)
+        return _build_names(session)
 
     @page.callback(Input("reopen", "n_clicks"), State("reopen-name", "value"), busy="reopen")
     def reopen(session: Session, _: int, name: str | None) -> None:
         """Go on with a file of the folder."""
-        session.reopen(session.in_folder(name or ""))
-        ui.announce(ui.Topic.LOG)
-        ui.tell(f"{name} is reopened")
+        session.reopen(session.get_folder_source(name or ""))
+        ui.notify_topic(ui.Topic.LOG)
+        ui.notify(f"{name} is reopened")
 
     @page.callback(Input("workspace-upload", "data"))
     def reopen_upload(session: Session, upload: dict[str, str]) -> None:
         """Go on with an upload."""
-        session.reopen(session.uploaded(upload["key"]))
-        ui.announce(ui.Topic.LOG)
-        ui.tell(f"{upload['name']} is reopened")
+        session.reopen(session.get_uploaded(upload["key"]))
+        ui.notify_topic(ui.Topic.LOG)
+        ui.notify(f"{upload['name']} is reopened")
 
 
-def _names(session: Session) -> list[Component]:
-    return [html.Option(value=name) for name in session.folder.names((ENDING,))]
+def _build_names(session: Session) -> list[Component]:
+    return [html.Option(value=name) for name in session.folder.list_names((ENDING,))]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.estimation.likelihood.data.input_smoothing import local_cubic, smooth_pressure
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.likelihood.data.input_smoothing import smooth_local_cubic, smooth_pressure
 from drivetwin.vehicle.spec import PriorValue
 
 P0 = 8e4
@@ -17,7 +17,7 @@ TIME = np.arange(0.0, 1.0, 1e-3)
 
 def test_noise_at_the_kiss_point_adds_less_to_the_capacity() -> None:
     rng = np.random.default_rng(3)
-    noisy = Sampled(TIME, P0 + 7e3 * rng.standard_normal(TIME.size), 7e3)
+    noisy = MeasuredSignal(TIME, P0 + 7e3 * rng.standard_normal(TIME.size), 7e3)
     rectified = float(np.mean(np.maximum(noisy.values - P0, 0.0)))
     kept = float(np.mean(np.maximum(smooth_pressure(noisy) - P0, 0.0)))
     assert rectified == pytest.approx(0.4 * 7e3, rel=0.1)
@@ -26,13 +26,13 @@ def test_noise_at_the_kiss_point_adds_less_to_the_capacity() -> None:
 
 def test_a_vibrating_valve_keeps_its_amplitude() -> None:
     wave = 5e5 + 2.5e4 * np.sin(2.0 * np.pi * 18.0 * TIME)
-    assert np.max(np.abs(local_cubic(TIME, wave) - wave)[20:-20]) < 2e-3 * 2.5e4
+    assert np.max(np.abs(smooth_local_cubic(TIME, wave) - wave)[20:-20]) < 2e-3 * 2.5e4
 
 
 def test_a_sharp_corner_stays_as_read_and_a_ramp_stays_a_ramp() -> None:
     rng = np.random.default_rng(4)
     step = np.where(TIME < 0.5, 8e4, 6e5)
-    noisy = Sampled(TIME, step + 7e3 * rng.standard_normal(TIME.size), 7e3)
+    noisy = MeasuredSignal(TIME, step + 7e3 * rng.standard_normal(TIME.size), 7e3)
     smooth = smooth_pressure(noisy)
     near = np.abs(TIME - 0.5) < 6e-3
     assert np.array_equal(smooth[near], noisy.values[near])
@@ -41,7 +41,7 @@ def test_a_sharp_corner_stays_as_read_and_a_ramp_stays_a_ramp() -> None:
 
 
 def test_an_ideal_sensor_is_left_alone_where_it_bends() -> None:
-    exact = Sampled(TIME, 3e6 * np.maximum(TIME - 0.3, 0.0), 1e-6)
+    exact = MeasuredSignal(TIME, 3e6 * np.maximum(TIME - 0.3, 0.0), 1e-6)
     assert np.array_equal(smooth_pressure(exact)[295:306], exact.values[295:306])
     assert np.allclose(smooth_pressure(exact), exact.values, atol=1e-3)
 
@@ -49,7 +49,7 @@ def test_an_ideal_sensor_is_left_alone_where_it_bends() -> None:
 def test_slow_samples_are_left_as_they_are() -> None:
     time = np.arange(0.0, 2.0, 1e-2)
     values = np.random.default_rng(5).standard_normal(time.size)
-    assert np.array_equal(local_cubic(time, values), values)
+    assert np.array_equal(smooth_local_cubic(time, values), values)
 
 
 def _flicker(values: FloatArray) -> float:
@@ -60,7 +60,7 @@ def _flicker(values: FloatArray) -> float:
 def test_about_p0_a_steady_pressure_does_not_flicker_with_its_noise() -> None:
     rng = np.random.default_rng(6)
     held = np.where(TIME < 0.5, P0 + 5e3, 6e5)
-    noisy = Sampled(TIME, held + 7e3 * rng.standard_normal(TIME.size), 7e3)
+    noisy = MeasuredSignal(TIME, held + 7e3 * rng.standard_normal(TIME.size), 7e3)
     assert _flicker(smooth_pressure(noisy)) > 0.02
     smooth = smooth_pressure(noisy, PriorValue(P0, 5e3))
     assert _flicker(smooth) < 0.003
@@ -71,6 +71,6 @@ def test_about_p0_a_steady_pressure_does_not_flicker_with_its_noise() -> None:
 def test_about_p0_a_pressure_that_moves_keeps_its_motion() -> None:
     rng = np.random.default_rng(7)
     falling = P0 + 2e5 * (0.5 - TIME) + 2e4 * np.sin(2.0 * np.pi * 15.0 * TIME)
-    noisy = Sampled(TIME, falling + 2e3 * rng.standard_normal(TIME.size), 2e3)
+    noisy = MeasuredSignal(TIME, falling + 2e3 * rng.standard_normal(TIME.size), 2e3)
     smooth = smooth_pressure(noisy, PriorValue(P0, 5e3))
     assert np.sqrt(np.mean((smooth - falling) ** 2)) < 0.5 * 2e3

@@ -8,7 +8,11 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.likelihood.data.shift_record import FLOOR, TORQUE, record_of
+from drivetwin.estimation.likelihood.data.shift_record import (
+    MIN_RELATIVE_NOISE,
+    TORQUE,
+    build_record,
+)
 from tests.estimation.likelihood.fixtures import bench
 
 
@@ -18,8 +22,8 @@ def test_an_input_without_noise_has_that_of_an_ideal_sensor(level: float) -> Non
     torque = signals.engine_torque
     values = torque.values if level == 0.0 else 0.0 * torque.values + level
     exact = replace(signals, engine_torque=replace(torque, values=values, sigma=0.0))
-    record = record_of(exact, (signals.shift.before[0], signals.shift.after[1]))
-    assert record.input_sigma[TORQUE] == pytest.approx(FLOOR * abs(values).max())
+    record = build_record(exact, (signals.shift.before[0], signals.shift.after[1]))
+    assert record.input_sigma[TORQUE] == pytest.approx(MIN_RELATIVE_NOISE * abs(values).max())
     for name, pressure in signals.pressures.items():
         assert record.input_sigma[name] == pressure.sigma
 
@@ -28,9 +32,9 @@ def test_an_output_that_stopped_before_a_shift_is_not_compared_in_it() -> None:
     signals = bench().signals
     assert signals.wheel_speed is not None
     start, end = signals.shift.before[0] + 1.0, signals.shift.after[1]
-    stopped = replace(signals, wheel_speed=signals.wheel_speed.within((0.0, start - 0.1)))
-    names = [out.name for out in record_of(stopped, (start, end)).outputs]
+    stopped = replace(signals, wheel_speed=signals.wheel_speed.select_span((0.0, start - 0.1)))
+    names = [out.name for out in build_record(stopped, (start, end)).outputs]
     assert names == ["output_torque", "engine_speed", "output_speed"]
-    lost = replace(signals, output_speed=signals.output_speed.within((0.0, start - 0.1)))
+    lost = replace(signals, output_speed=signals.output_speed.select_span((0.0, start - 0.1)))
     with pytest.raises(IdentificationError, match="output speed hardly recorded"):
-        record_of(lost, (start, end))
+        build_record(lost, (start, end))

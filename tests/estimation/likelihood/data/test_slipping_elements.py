@@ -7,8 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
-from drivetwin.estimation.likelihood.data.slipping_elements import SLIPPING, all_carriers, carriers
+from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
+from drivetwin.estimation.likelihood.data.slipping_elements import (
+    SLIPPING,
+    find_all_slipping_elements,
+    find_slipping_elements,
+)
 from tests.estimation.synthetic import Run
 
 
@@ -17,20 +21,22 @@ def _held(signals: ShiftSignals, seconds: float) -> ShiftSignals:
     off = signals.pressures["B2"]
     until = signals.shift.inertia_phase[0] + seconds
     values = np.where(off.time < until, 4e5, 0.0)
-    return replace(signals, pressures={**signals.pressures, "B2": Sampled(off.time, values, 7e3)})
+    return replace(
+        signals, pressures={**signals.pressures, "B2": MeasuredSignal(off.time, values, 7e3)}
+    )
 
 
 def test_the_on_coming_element_alone_where_the_other_vents(stepped: Run) -> None:
     signals, driveline = stepped.signals(), stepped.truth.driveline()
-    assert carriers(signals, driveline) == ("B3",)
-    assert carriers(_held(signals, 0.5 * SLIPPING.min_filled), driveline) == ("B3",)
+    assert find_slipping_elements(signals, driveline) == ("B3",)
+    assert find_slipping_elements(_held(signals, 0.5 * SLIPPING.min_filled), driveline) == ("B3",)
 
 
 def test_both_where_the_off_going_one_slips_under_pressure(stepped: Run) -> None:
     signals, driveline = stepped.signals(), stepped.truth.driveline()
     slow = _held(signals, 2.0 * SLIPPING.min_filled)
-    assert carriers(slow, driveline) == ("B3", "B2")
-    assert all_carriers([signals, slow], [driveline, driveline]) == ("B3", "B2")
+    assert find_slipping_elements(slow, driveline) == ("B3", "B2")
+    assert find_all_slipping_elements([signals, slow], [driveline, driveline]) == ("B3", "B2")
 
 
 def test_noise_about_the_fill_pressure_does_not_make_an_element_slip_under_load(
@@ -44,5 +50,5 @@ def test_noise_about_the_fill_pressure_does_not_make_an_element_slip_under_load(
     values = np.where(
         off.time < signals.shift.inertia_phase[0] + 3.0 * SLIPPING.min_filled, near, 0.0
     )
-    pressures = {**signals.pressures, "B2": Sampled(off.time, values, sigma)}
-    assert carriers(replace(signals, pressures=pressures), driveline) == ("B3",)
+    pressures = {**signals.pressures, "B2": MeasuredSignal(off.time, values, sigma)}
+    assert find_slipping_elements(replace(signals, pressures=pressures), driveline) == ("B3",)

@@ -8,10 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.estimation.likelihood.diagnostics.identifiability import at_limits
-from drivetwin.estimation.likelihood.estimates import conclude
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters, slopes
+from drivetwin.estimation.likelihood.diagnostics.identifiability import find_at_bounds
+from drivetwin.estimation.likelihood.estimates import build_estimates
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
+    compute_jacobian,
+    compute_parameters,
+)
 from drivetwin.estimation.result.estimate import Verdict
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 
@@ -26,9 +29,9 @@ def test_an_age_at_the_limit_of_the_search_is_not_identified(side: float, word: 
     limit = made.truth["te_delay"] + side * SHORT
     bounds = {"more": posed.upper.copy(), "less": posed.lower.copy()}
     bounds[word][start.names.index("te_delay")] = limit
-    fit = nearest(replace(posed, upper=bounds["more"], lower=bounds["less"]), start)
+    fit = fit_local(replace(posed, upper=bounds["more"], lower=bounds["less"]), start)
     assert fit is not None
-    told = conclude(fit, [made.signals], [made.driveline], {}, {})
+    told = build_estimates(fit, [made.signals], [made.driveline], {}, {})
     age = told.estimates["te_delay"]
     assert age.value == pytest.approx(limit)
     assert age.verdict is Verdict.WEAK
@@ -39,5 +42,5 @@ def test_an_age_at_the_limit_of_the_search_is_not_identified(side: float, word: 
 def test_within_the_limits_nothing_is_said() -> None:
     fit, signals = fitted(), [bench().signals]
     std = np.sqrt(np.diag(fit.covariance))
-    ids = tuple(parameters(fit.problem, fit.mean, signals))
-    assert at_limits(fit, ids, slopes(fit.problem, fit.mean, std, signals)) == {}
+    ids = tuple(compute_parameters(fit.problem, fit.mean, signals))
+    assert find_at_bounds(fit, ids, compute_jacobian(fit.problem, fit.mean, std, signals)) == {}

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.likelihood.diagnostics.misspecification import late_torque, left_out
-from drivetwin.estimation.likelihood.estimates import conclude
+from drivetwin.estimation.likelihood.diagnostics.misspecification import (
+    check_torque_delay,
+    run_score_tests,
+)
+from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
-from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from tests.estimation.likelihood.fixtures import fitted, problem, truth_of
@@ -28,7 +31,7 @@ def _with_delay(delay: float, role: str = "output_torque") -> tuple[Bench, Likel
     sensors = [replace(one, delay=delay) if one.role == role else one for one in base.sensors]
     made = record_bench(replace(base, sensors=tuple(sensors)), 0, Knowledge())
     posed, start = problem(made)
-    found = nearest(posed, start)
+    found = fit_local(posed, start)
     assert found is not None
     return made, found
 
@@ -37,10 +40,10 @@ def _with_delay(delay: float, role: str = "output_torque") -> tuple[Bench, Likel
 def test_a_late_torque_is_told_with_its_delay(delay: float) -> None:
     """To first order: 2 ms are 9 degrees of the oscillation."""
     _, found = _with_delay(delay)
-    step = late_torque(found)
+    step = check_torque_delay(found)
     (seen,), (std,) = step.amounts, step.std
     assert abs(seen - delay) < 3.0 * std + 0.15 * delay
-    (effect,) = left_out(found)
+    (effect,) = run_score_tests(found)
     assert f"{1e3 * seen:.1f} ±" in effect.text
     assert "late against the speeds" in effect.text
     assert f"channels.output_torque.time_shift_s = -{seen:.4f}" in effect.text
@@ -49,15 +52,15 @@ def test_a_late_torque_is_told_with_its_delay(delay: float) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_where_nothing_is_left_out_nothing_is_told(seed: int) -> None:
     found = fitted(seed)
-    step = late_torque(found)
+    step = check_torque_delay(found)
     assert abs(step.amounts[0]) < 3.5 * step.std[0]
-    assert list(left_out(found)) == []
+    assert list(run_score_tests(found)) == []
 
 
 def test_what_a_late_torque_moves_is_not_identified() -> None:
     """The age of the engine torque takes nearly all of the delay."""
     made, found = _with_delay(0.002)
-    told = conclude(found, [made.signals], [made.driveline], {}, {})
+    told = build_estimates(found, [made.signals], [made.driveline], {}, {})
     assert any("late against the speeds" in text for text in told.warnings)
     age = told.estimates["te_delay"]
     assert age.verdict is Verdict.WEAK
@@ -73,19 +76,19 @@ def test_slow_errors_of_a_sensor_widen_how_late_it_is() -> None:
     held = np.repeat(np.random.default_rng(1).standard_normal(torque.values.size // 50 + 1), 50)
     slow = residual.copy()
     slow[: torque.values.size] += 4.0 * torque.sigma * held[: torque.values.size]
-    sure = late_torque(found)
-    unsure = late_torque(replace(found, normal=replace(found.normal, residuals=(slow,))))
+    sure = check_torque_delay(found)
+    unsure = check_torque_delay(replace(found, normal=replace(found.normal, residuals=(slow,))))
     assert unsure.std[0] > 2.0 * sure.std[0]
 
 
 def test_a_late_pressure_is_told() -> None:
     """To first order: Stribeck's law bends to follow it, so that more than is seen may be late."""
     made, found = _with_delay(0.015, "pressure.B3")
-    told = [one for one in left_out(found) if one.text.startswith("the pressure of B3 is")]
+    told = [one for one in run_score_tests(found) if one.text.startswith("the pressure of B3 is")]
     assert len(told) == 1
     assert "late against the torque that it makes" in told[0].text
     assert "channels.pressure.B3.time_shift_s = -0.0" in told[0].text
-    concluded = conclude(found, [made.signals], [made.driveline], {}, {})
+    concluded = build_estimates(found, [made.signals], [made.driveline], {}, {})
     assert told[0].text in concluded.warnings
 
 
@@ -94,16 +97,16 @@ def test_friction_of_another_shape_is_told_and_its_band_holds_the_truth() -> Non
     (leaving, coming) = base.model.elements
     assert isinstance(coming.friction, Stribeck)
     slip = np.linspace(0.0, 200.0, 401)
-    mu = coming.friction.at(slip) + 0.01 * np.exp(-(((slip - 25.0) / 10.0) ** 2))
+    mu = coming.friction.evaluate(slip) + 0.01 * np.exp(-(((slip - 25.0) / 10.0) ** 2))
     humped = replace(coming, friction=FrictionTable(tuple(slip), tuple(mu)))
     model = replace(base.model, elements=(leaving, humped))
     usual = record_bench(base, 0, Knowledge())
     made = record_bench(replace(base, model=model), 0, Knowledge())
     law = base.model.loss_law
-    posed, start = problem_of([made.signals], [made.driveline], law, truth_of(usual))
-    found = nearest(posed, start)
+    posed, start = build_problem([made.signals], [made.driveline], law, truth_of(usual))
+    found = fit_local(posed, start)
     assert found is not None
-    told = conclude(found, [made.signals], [made.driveline], {}, {})
+    told = build_estimates(found, [made.signals], [made.driveline], {}, {})
     assert any("the friction of B3 departs from a Stribeck law" in text for text in told.warnings)
     curve = told.friction["B3"]
     seen = (curve.slip > 5.0) & (curve.slip < 60.0)

@@ -7,25 +7,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.estimation.likelihood.diagnostics.residual_tests import against, unweighted
-from drivetwin.estimation.likelihood.estimates import conclude
-from drivetwin.estimation.likelihood.noise.residual_covariance import sensor_noise
+from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
+    describe_contradiction,
+    describe_unweighted,
+)
+from drivetwin.estimation.likelihood.estimates import build_estimates
+from drivetwin.estimation.likelihood.noise.residual_covariance import build_sensor_whitener
 from drivetwin.estimation.result.estimate import Verdict
 from tests.estimation.likelihood.fixtures import bench, fitted
 
 
 def test_a_residual_that_goes_with_an_input_speaks_against_every_value() -> None:
     fit = fitted()
-    assert against(fit) == ""
+    assert describe_contradiction(fit) == ""
     (part,), (residual,) = fit.problem.parts, fit.normal.residuals
     drive = part.record.engine_torque
     torque = part.record.outputs[0]
     missing = np.zeros_like(residual)
     shown = np.interp(part.record.time[torque.place], drive.time, drive.values)
     missing[: torque.values.size] = torque.sigma * (shown - shown.mean()) / shown.std()
-    plain = replace(fit.problem, parts=(replace(part, weighting=sensor_noise(part.record)),))
+    plain = replace(
+        fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record)),)
+    )
     wrong = replace(fit, problem=plain, normal=replace(fit.normal, residuals=(residual + missing,)))
-    assert "the residual of the output torque goes with the engine torque" in against(wrong)
+    assert (
+        "the residual of the output torque goes with the engine torque"
+        in describe_contradiction(wrong)
+    )
 
 
 def test_the_drift_of_a_sensor_speaks_against_every_value() -> None:
@@ -35,17 +43,19 @@ def test_the_drift_of_a_sensor_speaks_against_every_value() -> None:
     torque = part.record.outputs[0]
     drift = np.zeros_like(residual)
     drift[: torque.values.size] = torque.sigma * np.linspace(-1.0, 1.0, torque.values.size)
-    assert "a sensor drifts" in against(
+    assert "a sensor drifts" in describe_contradiction(
         replace(fit, normal=replace(fit.normal, residuals=(residual + drift,)))
     )
 
 
 def test_a_fit_that_leaves_out_the_noise_of_its_inputs_says_so() -> None:
     fit, made = fitted(), bench()
-    assert unweighted(fit, ["shift 2-3"]) == ""
+    assert describe_unweighted(fit, ["shift 2-3"]) == ""
     (part,) = fit.problem.parts
-    bare = replace(fit.problem, parts=(replace(part, weighting=sensor_noise(part.record)),))
-    told = conclude(replace(fit, problem=bare), [made.signals], [made.driveline], {}, {})
+    bare = replace(
+        fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record)),)
+    )
+    told = build_estimates(replace(fit, problem=bare), [made.signals], [made.driveline], {}, {})
     (text,) = [one for one in told.warnings if "noise of engine torque and pressures" in one]
     assert text.startswith("shift 2-3: ")
     assert all(one.verdict is not Verdict.IDENTIFIED for one in told.estimates.values())

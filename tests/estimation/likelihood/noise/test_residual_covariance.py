@@ -11,47 +11,54 @@ import pytest
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Output
-from drivetwin.estimation.likelihood.noise.linear_response import observed, response_of
-from drivetwin.estimation.likelihood.noise.residual_covariance import sensor_noise, with_input_noise
-from drivetwin.estimation.likelihood.objective import Part
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.noise.linear_response import build_output_row, linearise_run
+from drivetwin.estimation.likelihood.noise.residual_covariance import (
+    add_input_noise,
+    build_sensor_whitener,
+)
+from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 
 
-def _short() -> tuple[Part, Point]:
+def _short() -> tuple[ShiftTerm, ParameterVector]:
     posed, start = problem(bench())
     part = posed.parts[0]
-    return Part.unweighted(part.structure, part.record.until(part.record.time[0] + 0.15)), start
+    return ShiftTerm.from_sensor_noise(
+        part.structure, part.record.cut(part.record.time[0] + 0.15)
+    ), start
 
 
 def test_weighting_equals_the_dense_covariance() -> None:
     part, point = _short()
-    run = part.run(point)
+    run = part.simulate(point)
     assert run is not None
-    model, record = part.structure.model(point), part.record
-    response = response_of(model, run, record)
-    whiteness = with_input_noise(model, record, response)
+    model, record = part.structure.build_model(point), part.record
+    response = linearise_run(model, run, record)
+    whiteness = add_input_noise(model, record, response)
     assert whiteness.path is not None
     columns = []
     for name, power in whiteness.path.power.items():
         for k in range(record.time.size - 1):
             impulse = np.zeros(record.time.size - 1)
             impulse[k] = np.sqrt(power[k])
-            z = response.to({name: impulse})
+            z = response.propagate_inputs({name: impulse})
             columns.append(
-                np.concatenate([z[out.place] @ observed(model, out.name) for out in record.outputs])
+                np.concatenate(
+                    [z[out.place] @ build_output_row(model, out.name) for out in record.outputs]
+                )
             )
     G = np.column_stack(columns)
     dense = np.diag(record.sigma**2) + G @ G.T
     columns_in: FloatArray = np.random.default_rng(0).standard_normal((record.size, 3))
     columns_in *= record.sigma[:, None]
     expected = np.linalg.solve(dense, columns_in)
-    found = whiteness.weighted(columns_in) * record.sigma[:, None]
+    found = whiteness.apply_inverse(columns_in) * record.sigma[:, None]
     assert np.allclose(found, expected * record.sigma[:, None], rtol=1e-3, atol=1e-2)
 
 
-def _of_speeds(part: Part, slope: float, rest: float) -> Part:
+def _of_speeds(part: ShiftTerm, slope: float, rest: float) -> ShiftTerm:
     """The part with an engine torque computed from ω_e, on which it hangs by `slope`."""
     record, read = part.record, part.record.engine_torque
     torque = Signal(record.time, np.interp(record.time, read.time, read.values))
@@ -62,7 +69,7 @@ def _of_speeds(part: Part, slope: float, rest: float) -> Part:
     return replace(part, record=made)
 
 
-def _torque_by_speed(part: Part) -> FloatArray:
+def _torque_by_speed(part: ShiftTerm) -> FloatArray:
     """Noise of the engine torque over each step per that of a compared sample (N-1, n)."""
     record, torque = part.record, part.record.engine_torque.time
     assert record.of_speeds is not None
@@ -79,17 +86,17 @@ def _torque_by_speed(part: Part) -> FloatArray:
 def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
     part, point = _short()
     part = _of_speeds(part, slope=-400.0, rest=2.0)
-    run = part.run(point)
+    run = part.simulate(point)
     assert run is not None
-    model, record = part.structure.model(point), part.record
-    response = response_of(model, run, record)
-    whiteness = with_input_noise(model, record, response)
+    model, record = part.structure.build_model(point), part.record
+    response = linearise_run(model, run, record)
+    whiteness = add_input_noise(model, record, response)
     assert whiteness.path is not None
     effect = {}
     for name in response.drive:
         steps = np.eye(record.time.size - 1)
-        answers = [response.to({name: step}) for step in steps]
-        effect[name] = np.column_stack([part.seen(point, z) for z in answers])
+        answers = [response.propagate_inputs({name: step}) for step in steps]
+        effect[name] = np.column_stack([part.observe(point, z) for z in answers])
     share, power = _torque_by_speed(part), whiteness.path.power
     assert power[TORQUE][[0, -1]] == pytest.approx(np.array([1.0, 9.0]), rel=0.1)
     own = np.eye(record.size) - effect[TORQUE] @ share
@@ -97,10 +104,10 @@ def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
     dense += sum((effect[name] * power[name]) @ effect[name].T for name in effect)
     columns = np.linalg.cholesky(dense) @ np.random.default_rng(0).standard_normal((record.size, 3))
     expected = np.linalg.solve(dense, columns)
-    assert np.diag(columns.T @ whiteness.weighted(columns)) == pytest.approx(
+    assert np.diag(columns.T @ whiteness.apply_inverse(columns)) == pytest.approx(
         np.diag(columns.T @ expected), rel=1e-4
     )
-    told = whiteness.input_noise(columns[:, 0])[TORQUE]
+    told = whiteness.estimate_input_noise(columns[:, 0])[TORQUE]
     common = share @ np.diag(record.sigma**2) @ own.T - power[TORQUE][:, None] * effect[TORQUE].T
     best = common @ expected[:, 0]
     assert np.max(np.abs(told - best)) < 1e-3 * np.max(np.abs(best))
@@ -108,9 +115,9 @@ def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
 
 def test_its_determinant_is_that_of_the_dense_covariance() -> None:
     part, point = _short()
-    weighting = part.weighted_by(point).weighting
+    weighting = part.update_weighting(point).weighting
     assert weighting.path is not None
-    dense = np.linalg.inv(weighting.weighted(np.eye(part.record.size)))
+    dense = np.linalg.inv(weighting.apply_inverse(np.eye(part.record.size)))
     sensors = part.weighting.log_determinant
     assert sensors == pytest.approx(2.0 * np.sum(np.log(part.record.sigma)), rel=1e-12)
     more = weighting.log_determinant - sensors
@@ -119,11 +126,11 @@ def test_its_determinant_is_that_of_the_dense_covariance() -> None:
     assert weighting.log_determinant == pytest.approx(expected, abs=1e-3 * more)
 
 
-def _sparse(every: int) -> tuple[Part, Point]:
+def _sparse(every: int) -> tuple[ShiftTerm, ParameterVector]:
     """A shift up to lock-up of which outputs and pressures show one sample in so many."""
     made = bench()
     posed, start = problem(made)
-    part = posed.until([made.signals.shift.lockup_time - 0.02]).parts[0]
+    part = posed.cut([made.signals.shift.lockup_time - 0.02]).parts[0]
     record = part.record
     outputs = tuple(
         Output(out.name, out.place[::every], out.values[::every], out.sigma)
@@ -134,14 +141,14 @@ def _sparse(every: int) -> tuple[Part, Point]:
     }
     sigma = {**record.input_sigma, TORQUE: 0.03}
     sparse = replace(record, outputs=outputs, pressures=pressures, input_sigma=sigma, held_back={})
-    return Part.unweighted(part.structure, sparse).weighted_by(start), start
+    return ShiftTerm.from_sensor_noise(part.structure, sparse).update_weighting(start), start
 
 
-def _filtered(part: Part, point: Point, columns: FloatArray) -> FloatArray:
+def _filtered(part: ShiftTerm, point: ParameterVector, columns: FloatArray) -> FloatArray:
     """Products (q, q) of columns (n, q) weighted by a Kalman filter, sample after sample."""
     path, record = part.weighting.path, part.record
     assert path is not None
-    response, model = path.response, part.structure.model(point)
+    response, model = path.response, part.structure.build_model(point)
     quiet = np.diag(1.0 / np.diag(path.inverse[0]))
     spread, state = quiet.copy(), np.zeros((len(quiet), columns.shape[1]))
     products = np.zeros((columns.shape[1], columns.shape[1]))
@@ -157,7 +164,7 @@ def _filtered(part: Part, point: Point, columns: FloatArray) -> FloatArray:
             past = response.transition[step]
             spread, state = past @ spread @ past.T + quiet + pushed, past @ state
         now = k
-        row, out = observed(model, record.outputs[o].name), record.outputs[o]
+        row, out = build_output_row(model, record.outputs[o].name), record.outputs[o]
         error = columns[first[o]] - row @ state
         first[o] += 1
         variance = float(row @ spread @ row) + out.sigma**2
@@ -171,19 +178,21 @@ def _filtered(part: Part, point: Point, columns: FloatArray) -> FloatArray:
 @pytest.mark.parametrize("every", [10, 20])
 def test_slow_samples_weigh_as_a_kalman_filter_weighs_them(every: int) -> None:
     part, point = _sparse(every)
-    found = part.linearised(point)
+    found = part.linearise(point)
     assert found is not None
     slopes = found[1] / np.linalg.norm(found[1], axis=0)
     expected = np.diag(_filtered(part, point, slopes))
-    weighed = np.einsum("ni,ni->i", slopes, part.weighting.weighted(slopes))
+    weighed = np.einsum("ni,ni->i", slopes, part.weighting.apply_inverse(slopes))
     assert np.allclose(weighed, expected, rtol=1e-2, atol=0.0)
 
 
 def test_without_input_noise_the_sensors_weigh_alone() -> None:
     part, _ = _short()
     residual = np.ones(part.record.size)
-    assert np.allclose(sensor_noise(part.record).weighted(residual), part.record.sigma**-2)
-    assert not np.any(sensor_noise(part.record).driven(residual))
+    assert np.allclose(
+        build_sensor_whitener(part.record).apply_inverse(residual), part.record.sigma**-2
+    )
+    assert not np.any(build_sensor_whitener(part.record).estimate_input_part(residual))
 
 
 def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> None:
@@ -191,14 +200,14 @@ def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> 
     speeds = tuple(one for one in part.record.outputs if one.name.endswith("speed"))
     silent = {**part.record.input_sigma, TORQUE: 0.0}
     record = replace(part.record, outputs=speeds, input_sigma=silent)
-    weighted = Part.unweighted(part.structure, record).weighted_by(point)
+    weighted = ShiftTerm.from_sensor_noise(part.structure, record).update_weighting(point)
     assert weighted.weighting.path is not None
 
 
 def test_expected_inputs_move_back_towards_the_truth() -> None:
     found = fitted(0)
     part = found.problem.parts[0]
-    run = part.run(found.point)
+    run = part.simulate(found.point)
     assert run is not None
     measured, _ = problem(bench())
     record, exact = measured.parts[0].record, bench(noise=0.0).signals.pressures["B3"]
@@ -215,19 +224,19 @@ def test_expected_inputs_move_back_towards_the_truth() -> None:
 
 def test_what_is_held_back_acts_on_the_residual_as_on_a_run() -> None:
     posed, truth = problem(bench())
-    part = posed.until([bench().signals.shift.lockup_time - 0.02]).parts[0]
+    part = posed.cut([bench().signals.shift.lockup_time - 0.02]).parts[0]
     small = {name: 0.05 * values for name, values in part.record.held_back.items()}
     whole = {
         name: Signal(p.time, p.values + small[name]) for name, p in part.record.pressures.items()
     }
     smooth = replace(part, record=replace(part.record, held_back=small))
     read = replace(part, record=replace(part.record, pressures=whole, held_back={}))
-    runs = smooth.run(truth), read.run(truth)
+    runs = smooth.simulate(truth), read.simulate(truth)
     assert runs[0] is not None
     assert runs[1] is not None
-    before = smooth.residual(runs[0])
-    expected = (read.residual(runs[1]) - before) / part.record.sigma
-    found = (smooth.weighted_by(truth).residual(runs[0]) - before) / part.record.sigma
+    before = smooth.compute_residual(runs[0])
+    expected = (read.compute_residual(runs[1]) - before) / part.record.sigma
+    found = (smooth.update_weighting(truth).compute_residual(runs[0]) - before) / part.record.sigma
     assert np.linalg.norm(found - expected) < 0.1 * np.linalg.norm(expected)
 
 
@@ -237,7 +246,7 @@ def test_expected_noise_of_samples_is_the_transpose_of_interpolation() -> None:
     steps = {
         name: rng.standard_normal(record.time.size - 1) for name in (TORQUE, *record.pressures)
     }
-    held = record.less(steps, 0.007).held_back[TORQUE] - record.held_back.get(TORQUE, 0.0)
+    held = record.subtract_noise(steps, 0.007).held_back[TORQUE] - record.held_back.get(TORQUE, 0.0)
     stamps = record.engine_torque.time - 0.007
     values = rng.standard_normal(stamps.size)
     middle = 0.5 * (record.time[1:] + record.time[:-1])

@@ -9,7 +9,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW, guess_of
+from drivetwin.estimation.likelihood.optimize.initial_guess import (
+    TYPICAL_LAW,
+    estimate_initial_values,
+)
 from drivetwin.vehicle.spec import PriorValue
 
 IDS = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
@@ -41,16 +44,18 @@ def test_an_element_starts_from_the_curve_that_reaches_the_largest_slip() -> Non
     """Whichever shift is last: one without a curve, or with one over a few rad/s, tells nothing."""
     shifts = [_shift(_friction(0.11, 80.0)), _shift(_friction(0.13, 10.0)), _shift()]
     drivelines = [_driveline("B3", "B4"), _driveline("B5", "B4"), _driveline("B3", "B4")]
-    found = guess_of(shifts, drivelines)
+    found = estimate_initial_values(shifts, drivelines)
     for element in ("B4", "B3", "B5"):
         assert found[f"{element}.mu_c"] == pytest.approx(0.11)
-    alone = guess_of([_shift()], [_driveline("B1", "B2")])
+    alone = estimate_initial_values([_shift()], [_driveline("B1", "B2")])
     assert alone["B1.mu_c"] == alone["B2.mu_c"] == TYPICAL_LAW["mu_c"]
 
 
 def test_one_shift_that_tells_something_wrong_does_not_start_all() -> None:
     wrong = VALUES * np.array([1.0, 1.0, -0.5, 1.0, 1.0, 1.0, 1.0])
-    found = guess_of([_shift(values=wrong), _shift(), _shift()], [_driveline("B1", "B2")] * 3)
+    found = estimate_initial_values(
+        [_shift(values=wrong), _shift(), _shift()], [_driveline("B1", "B2")] * 3
+    )
     assert found["J_vehicle"] == 4000.0
 
 
@@ -66,7 +71,7 @@ def test_the_load_of_a_shift_is_taken_at_its_own_speed() -> None:
     shifts = [_shift(load=load(growth)) for growth in (1.0, 1.0, 10.0)]
     for shift, growth in zip(shifts, (1.0, 1.0, 10.0), strict=True):
         shift.ids, shift.values = (*IDS, "aero"), np.append(VALUES, growth)
-    found = guess_of(shifts, [_driveline("B1", "B2")] * 3)
+    found = estimate_initial_values(shifts, [_driveline("B1", "B2")] * 3)
     assert found["aero"] == 1.0
     assert found["Tv_over_if"] == pytest.approx(560.0)
     assert found["start2.load"] == pytest.approx(0.0, abs=1e-9)

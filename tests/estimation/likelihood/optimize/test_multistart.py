@@ -13,9 +13,14 @@ from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.optimize import multistart as fitting
-from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, Hopeless, fit, nearest
-from drivetwin.estimation.likelihood.optimize.staged_start import in_lower_gear
-from drivetwin.estimation.optimize.gauss_newton import Found
+from drivetwin.estimation.likelihood.optimize.multistart import (
+    MULTI_START,
+    NoConvergence,
+    fit_local,
+    fit_multistart,
+)
+from drivetwin.estimation.likelihood.optimize.staged_start import fit_lower_gear_only
+from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from tests.estimation.likelihood.fixtures import ROUGH, bench, fitted, problem, truth_of
 from tests.support.bench import Knowledge, record_bench
 
@@ -25,7 +30,7 @@ DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 def test_ideal_sensors_return_every_parameter_from_a_start_beside_it() -> None:
     made = bench(noise=0.0, know=Knowledge(J_out=1.0))
     posed, start = problem(made, off=0.05)
-    found = fit(posed, start, [made.signals.shift])
+    found = fit_multistart(posed, start, [made.signals.shift])
     truth = truth_of(made)
     for name in (*DRIVELINE, "B3.mu_c", "B3.mu_drop", "B3.mu_v", "B3.ln_v_s"):
         assert found.point[name] == pytest.approx(truth[name], rel=2e-4), name
@@ -49,7 +54,7 @@ def test_intervals_hold_the_truth_over_noise_realisations() -> None:
 def test_a_wrong_start_is_brought_in_by_stages() -> None:
     made = bench()
     posed, start = problem(made, off=0.4)
-    found = fit(posed, start, [made.signals.shift])
+    found = fit_multistart(posed, start, [made.signals.shift])
     assert found.chi2 < 1.05
     near = fitted()
     std = np.sqrt(np.diag(near.covariance))
@@ -69,9 +74,9 @@ def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
     }
     actuators = {name: replace(base.actuators[name], command=programs[name]) for name in programs}
     posed, start = problem(record_bench(replace(base, actuators=actuators, duration=4.6), 1, ROUGH))
-    found = nearest(posed, start)
+    found = fit_local(posed, start)
     assert found is not None
-    again = posed.weighted_by(found.point).with_expected_inputs(found.point)
+    again = posed.update_weighting(found.point).update_inputs(found.point)
     assert again.cost(found.point) > found.normal.cost - MULTI_START.min_input_decrease
 
 
@@ -82,23 +87,23 @@ def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
     driveline = replace(part.structure.driveline, i_f=1.3 * part.structure.driveline.i_f)
     wrong = replace(part, structure=replace(part.structure, driveline=driveline))
     with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
-        fit(replace(posed, parts=(wrong,)), start, [made.signals.shift])
+        fit_multistart(replace(posed, parts=(wrong,)), start, [made.signals.shift])
 
 
 def test_two_starts_that_lead_nowhere_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     made = bench()
     posed, start = problem(made)
     seen = []
-    monkeypatch.setattr(fitting, "staged", lambda *given: seen.append(given))
+    monkeypatch.setattr(fitting, "find_staged_start", lambda *given: seen.append(given))
     heavy = [5.0 if name == "J_e" else 1.0 for name in start.names]
-    far = start.moved(start.values * np.array(heavy))
+    far = start.replace_values(start.values * np.array(heavy))
     assert posed.cost(far) > MULTI_START.direct_chi2 * posed.size
-    with pytest.raises(Hopeless):
-        fit(posed, far, [made.signals.shift])
+    with pytest.raises(NoConvergence):
+        fit_multistart(posed, far, [made.signals.shift])
     assert len(seen) == MULTI_START.min_starts
     with pytest.raises(IdentificationError) as one:
-        fit(posed, far, [made.signals.shift], restarts=MULTI_START.shaft_factors[:1])
-    assert not isinstance(one.value, Hopeless)
+        fit_multistart(posed, far, [made.signals.shift], restarts=MULTI_START.shaft_factors[:1])
+    assert not isinstance(one.value, NoConvergence)
 
 
 def test_input_noise_that_stages_leave_out_is_no_doubt() -> None:
@@ -107,11 +112,11 @@ def test_input_noise_that_stages_leave_out_is_no_doubt() -> None:
     normal = posed.normal(start)
     assert normal is not None
     assert normal.cost > MULTI_START.doubtful_chi2 * posed.size
-    assert not fitting._is_doubtful(posed, Found(posed, start, normal, True, 0))
+    assert not fitting._is_doubtful(posed, OptimizeResult(posed, start, normal, True, 0))
     posed, start = problem(bench(noise=0.02), off=0.05)
     normal = posed.normal(start)
     assert normal is not None
-    assert fitting._is_doubtful(posed, Found(posed, start, normal, True, 0))
+    assert fitting._is_doubtful(posed, OptimizeResult(posed, start, normal, True, 0))
 
 
 def test_what_starts_at_zero_is_sought_too() -> None:
@@ -119,6 +124,6 @@ def test_what_starts_at_zero_is_sought_too() -> None:
     posed, start = problem(made)
     values = start.values.copy()
     values[start.names.index("J_out")] = 0.0
-    found = in_lower_gear(posed, start.moved(values), [made.signals.shift])
+    found = fit_lower_gear_only(posed, start.replace_values(values), [made.signals.shift])
     assert found is not None
     assert found.point["J_out"] > 0.0

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
-from drivetwin.estimation.likelihood.priors import problem_of
-from drivetwin.estimation.likelihood.selection.aero_load import _moments, allowed_for
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.selection.aero_load import (
+    _moments,
+    average_with_boundary_model,
+)
 from drivetwin.estimation.linear.load_balance import AERO
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.optimize.objective import ParameterVector
 from tests.estimation.likelihood.fixtures import bench, truth_of
 from tests.support.coverage import assert_covers, vary_draws
 from tests.support.shared_results import shared
@@ -28,8 +31,8 @@ def _fits() -> tuple[LikelihoodFit, LikelihoodFit]:
     law, truth = made.run.scenario.model.loss_law, truth_of(made)
     found = []
     for guess in (truth, truth | {AERO: 1.0}):
-        posed, start = problem_of([made.signals], [made.driveline], law, guess)
-        fit = nearest(posed, start)
+        posed, start = build_problem([made.signals], [made.driveline], law, guess)
+        fit = fit_local(posed, start)
         assert fit is not None
         found.append(fit)
     return found[0], found[1]
@@ -44,7 +47,7 @@ def _seen(size: float, own: float) -> tuple[LikelihoodFit, LikelihoodFit]:
     covariance[i, i], covariance[i, k], covariance[k, i] = 1.0 + own**2, 1.0, 1.0
     values = wide.point.values.copy()
     values[k] = size
-    wide = replace(wide, point=wide.point.moved(values), covariance=covariance)
+    wide = replace(wide, point=wide.point.replace_values(values), covariance=covariance)
     within = np.diag(np.ones(len(narrow.point.names)))
     j = narrow.point.names.index(MOVED)
     within[j, j] = own**2
@@ -77,10 +80,10 @@ def test_intervals_without_the_growing_part_cover_a_growth_that_hardly_shows(
         narrow, wide = _seen(size + noise, own)
         values = narrow.mean.values.copy()
         values[j] += own * error
-        narrow = replace(narrow, mean=narrow.mean.moved(values))
+        narrow = replace(narrow, mean=narrow.mean.replace_values(values))
         if size + noise < 0.0:
             wide = _at_bound(wide, size + noise)
-        told = allowed_for(narrow, wide)
+        told = average_with_boundary_model(narrow, wide)
         inside += abs(told.mean[MOVED] - truth) < 1.96 * np.sqrt(told.covariance[j, j])
         alone += abs(narrow.mean[MOVED] - truth) < 1.96 * own
     assert_covers(inside, draws, conservative=True)
@@ -94,12 +97,12 @@ def _at_bound(wide: LikelihoodFit, size: float) -> LikelihoodFit:
     inside[k], away[k] = 0.0, size
     information = np.asarray(np.linalg.inv(wide.covariance), dtype=float)
     normal = replace(wide.normal, information=information, gradient=-information @ away)
-    return replace(wide, point=Point(wide.point.names, inside), normal=normal)
+    return replace(wide, point=ParameterVector(wide.point.names, inside), normal=normal)
 
 
 def test_a_log_that_would_show_growth_is_told_as_it_was() -> None:
     narrow, wide = _fits()
-    told = allowed_for(narrow, wide)
+    told = average_with_boundary_model(narrow, wide)
     std = np.sqrt(np.diag(narrow.covariance))
     assert np.sqrt(np.diag(told.covariance)) == pytest.approx(std, rel=0.1)
     assert np.all(np.abs(told.mean.values - narrow.mean.values) < std)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.likelihood.estimates import conclude
+from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
-from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection import loss_law
 from drivetwin.simulation.dual_clutch import LossLaw
 from tests.estimation.likelihood.fixtures import bench, fitted, truth_of
@@ -33,13 +33,13 @@ def _made(law: LossLaw) -> Bench:
 @shared
 def _fit(true: LossLaw, card: LossLaw) -> LikelihoodFit:
     made = _made(true)
-    found = nearest(*problem_of([made.signals], [made.driveline], card, truth_of(made)))
+    found = fit_local(*build_problem([made.signals], [made.driveline], card, truth_of(made)))
     assert found is not None
     return found
 
 
 def _said(made: Bench, fit: LikelihoodFit) -> list[str]:
-    told = conclude(fit, [made.signals], [made.driveline], {}, {})
+    told = build_estimates(fit, [made.signals], [made.driveline], {}, {})
     return [text for text in told.warnings if "loss_law" in text]
 
 

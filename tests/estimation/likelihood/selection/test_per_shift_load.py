@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import Span
-from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals
-from drivetwin.estimation.likelihood.parametrization import departures_of
-from drivetwin.estimation.likelihood.priors import problem_of
-from drivetwin.estimation.likelihood.selection.per_shift_load import with_one_load
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
+from drivetwin.estimation.likelihood.parametrization import build_load_deviations
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.selection.per_shift_load import fit_common_load
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.likelihood.fixtures import bench, truth_of
 
@@ -28,13 +28,13 @@ PHASES = ("before", "torque_phase", "inertia_phase", "after")
 def _fit(departures: tuple[float, float]) -> Any:
     """Unknowns whose departures have a standard deviation of 10 N m, and go with J3."""
     rows = np.array([[2.0, 0, 0, 0], [0, 5, 3, 0], [0, 0, 10, 0], [0, 0, 4, 10]])
-    point = Point(NAMES, np.array([500.0, 4000.0, *departures]))
+    point = ParameterVector(NAMES, np.array([500.0, 4000.0, *departures]))
     return cast("Any", SimpleNamespace(point=point, covariance=rows @ rows.T))
 
 
 def test_loads_that_may_be_one_are_taken_for_one() -> None:
     fit = _fit((8.0, 3.0))
-    told = with_one_load(fit)
+    told = fit_common_load(fit)
     assert told is not None
     point, covariance = told
     assert point.names == NAMES[:2]
@@ -46,13 +46,13 @@ def test_loads_that_may_be_one_are_taken_for_one() -> None:
 
 
 def test_loads_that_differ_stay_apart() -> None:
-    assert with_one_load(_fit((40.0, 3.0))) is None
+    assert fit_common_load(_fit((40.0, 3.0))) is None
 
 
 def _later(signals: ShiftSignals, by: float) -> ShiftSignals:
     """The same shift `by` seconds later."""
 
-    def moved(one: Sampled) -> Sampled:
+    def moved(one: MeasuredSignal) -> MeasuredSignal:
         return replace(one, time=one.time + by)
 
     def span(one: Span) -> Span:
@@ -73,10 +73,10 @@ def _three(known: dict[str, PriorValue] | None = None) -> Any:
     """The fit of one shift three times over, on a hilly road."""
     made = bench()
     driveline = replace(made.driveline, known=known or {})
-    guess = truth_of(made) | departures_of(LOADS)
+    guess = truth_of(made) | build_load_deviations(LOADS)
     law = made.run.scenario.model.loss_law
     signals = [_later(made.signals, 20.0 * k) for k in range(3)]
-    return problem_of(signals, [driveline] * 3, law, guess, hilly=True)
+    return build_problem(signals, [driveline] * 3, law, guess, hilly=True)
 
 
 def test_departures_add_up_to_zero_about_the_load_of_the_log() -> None:

@@ -11,22 +11,22 @@ import pytest
 
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.noise.residual_covariance import Whiteness
-from drivetwin.estimation.likelihood.objective import Problem
-from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, nearest
-from drivetwin.estimation.likelihood.priors import problem_of
+from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
+from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection import sampling_mode as of_signals
 from drivetwin.estimation.likelihood.selection.sampling_mode import (
     SPEEDS,
-    averaged_over_kinds,
-    likely_kinds,
-    with_best_kinds,
-    with_either_kind,
-    with_slow_outputs,
+    average_modes,
+    refit_best_mode,
+    refit_slow_outputs,
+    select_sampling_mode,
+    widen_over_modes,
 )
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.optimize.objective import ParameterVector
 from tests.estimation.likelihood.fixtures import ROUGH, problem, truth_of
 from tests.support.bench import record_bench
 from tests.support.shared_results import shared
@@ -40,14 +40,14 @@ AS_READ = 2
 
 
 @cache
-def _posed() -> Problem:
+def _posed() -> LikelihoodObjective:
     return problem(record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH))[0]
 
 
 @shared
 def _fit(kinds: frozenset[str]) -> LikelihoodFit:
     _, start = problem(record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH))
-    found = nearest(_posed().of_kinds(kinds), start)
+    found = fit_local(_posed().select_modes(kinds), start)
     assert found is not None
     return found
 
@@ -62,7 +62,7 @@ def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> N
     ages = [_fit(kinds).point["te_delay"] for kinds in (frozenset[str](), MEANS)]
     sharp = _age(_fit(MEANS))[1]
     assert abs(ages[0] - ages[1]) > 5.0 * sharp
-    told, doubts = averaged_over_kinds(_posed(), _fit(MEANS))
+    told, doubts = average_modes(_posed(), _fit(MEANS))
     value, std = _age(told)
     assert all(abs(age - value) < 1.96 * std for age in ages)
     truth = record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH).truth["te_delay"]
@@ -73,7 +73,7 @@ def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> N
 
 def test_it_does_not_matter_from_which_kind_one_comes() -> None:
     one, other = (
-        _age(averaged_over_kinds(_posed(), with_best_kinds(_posed(), _fit(kinds)))[0])
+        _age(average_modes(_posed(), refit_best_mode(_posed(), _fit(kinds)))[0])
         for kinds in (frozenset[str](), MEANS)
     )
     assert one[0] == pytest.approx(other[0], abs=0.1 * one[1])
@@ -82,9 +82,9 @@ def test_it_does_not_matter_from_which_kind_one_comes() -> None:
 
 def test_a_clear_log_is_left_as_it_is() -> None:
     posed, start = problem(record_bench(load_scenario("paper_steps"), 0, ROUGH))
-    fit = nearest(posed, start)
+    fit = fit_local(posed, start)
     assert fit is not None
-    told, doubts = averaged_over_kinds(posed, fit)
+    told, doubts = average_modes(posed, fit)
     std = np.sqrt(np.diag(fit.covariance))
     assert doubts == []
     assert np.all(np.abs(told.mean.values - fit.point.values) < 1e-3 * std)
@@ -93,7 +93,7 @@ def test_a_clear_log_is_left_as_it_is() -> None:
 
 def test_the_expansion_foretells_the_other_minimum() -> None:
     here, there = _fit(MEANS), _fit(frozenset[str]())
-    told, _ = averaged_over_kinds(_posed(), here)
+    told, _ = average_modes(_posed(), here)
     added = told.covariance - here.covariance
     k = here.point.names.index("te_delay")
     apart = there.point["te_delay"] - here.point["te_delay"]
@@ -115,7 +115,7 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
             for one in (here, there)
         }
         monkeypatch.setattr(of_signals, "_nearby", lambda posed, *_: again.get(posed.kinds))
-        return averaged_over_kinds(_posed(), here)[0].mean["te_delay"]
+        return average_modes(_posed(), here)[0].mean["te_delay"]
 
     std = _age(here)[1]
     assert abs(told(0.0) - here.point["te_delay"]) > 0.1 * std
@@ -123,10 +123,10 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
 
 
 @shared
-def _without_torque() -> tuple[Problem, Point, LikelihoodFit]:
+def _without_torque() -> tuple[LikelihoodObjective, ParameterVector, LikelihoodFit]:
     """A problem of samples without an output torque, where its search starts, and its minimum."""
     made = record_bench(load_scenario("throttle_steps"), 0, ROUGH)
-    signals = replace(made.signals, output_torque=Sampled(np.empty(0), np.empty(0)))
+    signals = replace(made.signals, output_torque=MeasuredSignal(np.empty(0), np.empty(0)))
     eta = made.truth["eta"]
     scaled = ("J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
     guess = {
@@ -134,8 +134,8 @@ def _without_torque() -> tuple[Problem, Point, LikelihoodFit]:
         for name, value in truth_of(made).items()
     }
     law = made.run.scenario.model.loss_law
-    posed, start = problem_of([signals], [made.driveline], law, guess)
-    best = nearest(posed, start)
+    posed, start = build_problem([signals], [made.driveline], law, guess)
+    best = fit_local(posed, start)
     assert best is not None
     return posed, start, best
 
@@ -145,8 +145,8 @@ def test_a_weighting_with_more_room_that_leaves_less_is_no_better_kind(
 ) -> None:
     posed, _, best = _without_torque()
     parts = [
-        replace(part, weighting=Whiteness(2.0 * part.record.sigma**2))
-        for part in posed.of_kinds(SPEEDS).parts
+        replace(part, weighting=Whitener(2.0 * part.record.sigma**2))
+        for part in posed.select_modes(SPEEDS).parts
     ]
     roomy = replace(
         best,
@@ -156,23 +156,23 @@ def test_a_weighting_with_more_room_that_leaves_less_is_no_better_kind(
     )
     monkeypatch.setattr(of_signals, "_promising", lambda *_: frozenset(SPEEDS))
     monkeypatch.setattr(of_signals, "_nearby", lambda *_: roomy)
-    assert with_best_kinds(posed, best) is best
+    assert refit_best_mode(posed, best) is best
 
 
 def test_kinds_are_compared_by_the_same_samples() -> None:
-    assert _posed().of_kinds(SPEEDS).size == _posed().size
+    assert _posed().select_modes(SPEEDS).size == _posed().size
 
 
 def test_from_far_off_signals_are_taken_as_read() -> None:
     posed, start, best = _without_torque()
     way = start.values - best.point.values
-    far = start.moved(best.point.values + 0.5 * way)
-    weighted = posed.weighted_by(far)
+    far = start.replace_values(best.point.values + 0.5 * way)
+    weighted = posed.update_weighting(far)
     normal = weighted.normal(far)
     assert normal is not None
     assert MULTI_START.far_chi2 < normal.cost / posed.size < MULTI_START.direct_chi2
     assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
-    likely, other = likely_kinds(
+    likely, other = select_sampling_mode(
         posed, far, [record_bench(load_scenario("throttle_steps"), 0, ROUGH).signals.shift]
     )
     assert likely.kinds == frozenset()
@@ -188,8 +188,8 @@ def test_from_far_off_the_lower_gear_tells_kinds() -> None:
     ]
     made = record_bench(replace(base, sensors=tuple(sensors)), 0, ROUGH)
     posed, start = problem(made, off=0.1)
-    assert posed.weighted_by(start).cost(start) > MULTI_START.far_chi2 * posed.size
-    likely, _ = likely_kinds(posed, start, [made.signals.shift])
+    assert posed.update_weighting(start).cost(start) > MULTI_START.far_chi2 * posed.size
+    likely, _ = select_sampling_mode(posed, start, [made.signals.shift])
     assert frozenset(SPEEDS) <= likely.kinds
 
 
@@ -198,24 +198,24 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
 ) -> None:
     posed, _, best = _without_torque()
     monkeypatch.setattr(of_signals, "EITHER_KIND", np.inf)
-    wide, doubts = with_either_kind(posed, best)
-    other = nearest(posed.of_kinds(frozenset(SPEEDS)), best.point)
+    wide, doubts = widen_over_modes(posed, best)
+    other = fit_local(posed.select_modes(frozenset(SPEEDS)), best.point)
     assert other is not None
     far = abs(other.point["te_delay"] - best.point["te_delay"])
     assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
     assert far < 1.96 * _age(wide)[1]
     assert "engine speed" in doubts[0]
     monkeypatch.setattr(of_signals, "EITHER_KIND", -np.inf)
-    assert with_either_kind(posed, best) == (best, [])
+    assert widen_over_modes(posed, best) == (best, [])
 
 
 def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
     fit = _fit(MEANS)
-    assert with_either_kind(_posed(), fit) == (fit, [])
+    assert widen_over_modes(_posed(), fit) == (fit, [])
 
 
 @shared
-def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
+def _at_50_hertz(window: float) -> tuple[LikelihoodObjective, LikelihoodFit]:
     """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
     the kinds that an expansion tells."""
     base = load_scenario("throttle_steps")
@@ -226,16 +226,16 @@ def _at_50_hertz(window: float) -> tuple[Problem, LikelihoodFit]:
         for one in base.sensors
     ]
     posed, start = problem(record_bench(replace(base, sensors=tuple(sensors)), AS_READ, ROUGH))
-    fit = nearest(posed, start)
+    fit = fit_local(posed, start)
     assert fit is not None
-    return posed, with_best_kinds(posed, fit)
+    return posed, refit_best_mode(posed, fit)
 
 
 def test_slow_outputs_are_tried_as_the_other_kind_for_no_expansion_reaches_so_far() -> None:
     posed, known = _at_50_hertz(0.02)
     assert known.problem.kinds == frozenset()
     assert abs(_age(known)[0]) > 20.0 * _age(known)[1]  # half a period of the outputs
-    told = with_slow_outputs(posed, known)
+    told = refit_slow_outputs(posed, known)
     assert told.problem.kinds == {*SPEEDS, "output_torque"}
     assert abs(_age(told)[0]) < 2.0 * _age(told)[1]
 
@@ -243,8 +243,8 @@ def test_slow_outputs_are_tried_as_the_other_kind_for_no_expansion_reaches_so_fa
 def test_slow_samples_stay_samples() -> None:
     posed, known = _at_50_hertz(0.0)
     assert known.problem.kinds == frozenset()
-    assert with_slow_outputs(posed, known) is known
+    assert refit_slow_outputs(posed, known) is known
 
 
 def test_fast_outputs_of_the_other_kind_are_within_reach_of_the_expansion() -> None:
-    assert with_slow_outputs(_posed(), _fit(frozenset())) is _fit(frozenset())
+    assert refit_slow_outputs(_posed(), _fit(frozenset())) is _fit(frozenset())

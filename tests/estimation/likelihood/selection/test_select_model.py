@@ -13,13 +13,14 @@ from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, spread_of
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
-from drivetwin.estimation.likelihood.selection import aero_load, select_model
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.selection import aero_load
+from drivetwin.estimation.likelihood.selection import select_model as selection_module
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS
-from drivetwin.estimation.likelihood.selection.select_model import choose
+from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.simulation.dual_clutch import RoadLoad
 from tests.estimation.likelihood.fixtures import truth_of
@@ -39,7 +40,7 @@ def _sent(scenario: Scenario, rate: float, means: bool) -> Scenario:
 
 def _chosen(made: Bench) -> tuple[LikelihoodFit, tuple[str, ...]]:
     law = made.run.scenario.model.loss_law
-    return choose([made.signals], [made.driveline], law, truth_of(made))
+    return select_model([made.signals], [made.driveline], law, truth_of(made))
 
 
 def _deviation(fit: LikelihoodFit, name: str, truth: float) -> float:
@@ -55,7 +56,7 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
     assert any("grows with the square of the speed" in note for note in notes)
     speed = fit.problem.parts[0].structure.mean_speed
     assert _deviation(fit, AERO, GROWTH) < 3.5
-    assert _deviation(fit, "Tv_over_if", load.at(speed) / base.model.i_f) < 3.5
+    assert _deviation(fit, "Tv_over_if", load.evaluate(speed) / base.model.i_f) < 3.5
     assert _deviation(fit, "J_vehicle", base.model.J_v) < 3.5
 
 
@@ -63,13 +64,13 @@ def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.Monk
     base = load_scenario("throttle_steps")
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
-    monkeypatch.setattr(aero_load, "grows", lambda *_: False)
+    monkeypatch.setattr(aero_load, "is_significant", lambda *_: False)
     fit, notes = _chosen(made)
     assert AERO not in fit.point.names
     assert not any("grows" in note for note in notes)
     k = fit.point.names.index("J_vehicle")
     far = abs(fit.point["J_vehicle"] - base.model.J_v)
-    assert far > 5.0 * np.sqrt(spread_of(fit.problem, fit.normal, fit.chi2)[k, k])
+    assert far > 5.0 * np.sqrt(compute_covariance(fit.problem, fit.normal, fit.chi2)[k, k])
     assert _deviation(fit, "J_vehicle", base.model.J_v) < 2.0
 
 
@@ -78,14 +79,14 @@ def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search
 ) -> None:
     made = record_bench(load_scenario("paper_steps"), 0, Knowledge())
     monkeypatch.setattr(
-        select_model, "SELECTION", replace(select_model.SELECTION, max_restricted_work=0.0)
+        selection_module, "SELECTION", replace(selection_module.SELECTION, max_restricted_work=0.0)
     )
     fit, _ = _chosen(made)
     names, truth = fit.point.names, truth_of(made)
     assert AERO not in names
     assert fit.mean.names == names
-    assert all(part.structure.value(fit.point, AERO) == 0.0 for part in fit.problem.parts)
-    again = nearest(fit.problem, fit.point)
+    assert all(part.structure.get_value(fit.point, AERO) == 0.0 for part in fit.problem.parts)
+    again = fit_local(fit.problem, fit.point)
     assert again is not None
     std, expected = (np.sqrt(np.diag(one.covariance)) for one in (fit, again))
     assert std == pytest.approx(expected, rel=0.02)
@@ -109,7 +110,7 @@ def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
 
 def test_without_an_output_torque_speeds_are_told_apart_all_the_same() -> None:
     made = record_bench(_sent(load_scenario("paper_steps"), 100.0, True), 0, Knowledge(J_out=0.1))
-    nothing = Sampled(np.empty(0), np.empty(0))
+    nothing = MeasuredSignal(np.empty(0), np.empty(0))
     fit, _ = _chosen(replace(made, signals=replace(made.signals, output_torque=nothing)))
     assert fit.problem.kinds == frozenset(SPEEDS)
     assert _deviation(fit, "te_delay", truth_of(made)["te_delay"]) < 3.5
@@ -118,7 +119,7 @@ def test_without_an_output_torque_speeds_are_told_apart_all_the_same() -> None:
 def test_an_engine_torque_that_comes_rarely_is_taken_for_a_curve() -> None:
     base = load_scenario("paper_steps")
     time = np.arange(0.0, base.duration, 2e-3)
-    smooth = uniform_filter1d(uniform_filter1d(base.engine_torque.at(time), 25), 25)
+    smooth = uniform_filter1d(uniform_filter1d(base.engine_torque.evaluate(time), 25), 25)
     pedal = Program(tuple(zip(time.tolist(), smooth.tolist(), strict=True)))
     sensors = [
         replace(one, rate=50.0, noise=0.5, resolution=0.0) if one.role == "engine_torque" else one

@@ -11,10 +11,10 @@ from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, nearest
-from drivetwin.estimation.likelihood.priors import problem_of
-from drivetwin.estimation.likelihood.selection.select_model import choose
-from drivetwin.estimation.likelihood.selection.touch_point_minima import lowest
+from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.selection.select_model import select_model
+from drivetwin.estimation.likelihood.selection.touch_point_minima import find_best_minimum
 from tests.estimation.likelihood.fixtures import truth_of
 from tests.support.bench import Bench, Knowledge, record_bench
 
@@ -42,7 +42,7 @@ def test_five_kilopascals_above_p0_noise_does_not_end_the_search() -> None:
     made = record_bench(_lingering(5e3), 1, ROUGH)
     design = {f"{one.name}.P0": one.P0.value for one in made.driveline.couplings.values()}
     guess = truth_of(made) | design
-    fit, _ = choose([made.signals], [made.driveline], made.run.scenario.model.loss_law, guess)
+    fit, _ = select_model([made.signals], [made.driveline], made.run.scenario.model.loss_law, guess)
     assert fit.chi2 < MULTI_START.accept_chi2
     assert abs(_deviation(fit, made)) < 3.0
 
@@ -52,10 +52,10 @@ def test_the_lower_of_two_minima_about_p0_is_taken() -> None:
     truth = truth_of(made)
     law = made.run.scenario.model.loss_law
     guess = truth | {PRESSURE: truth[PRESSURE] + 12e3}
-    problem, start = problem_of([made.signals], [made.driveline], law, guess)
-    one = nearest(problem, start)
+    problem, start = build_problem([made.signals], [made.driveline], law, guess)
+    one = fit_local(problem, start)
     assert one is not None
-    other = lowest(problem, one)
+    other = find_best_minimum(problem, one)
     assert other.normal.cost < one.normal.cost - 10.0
     assert abs(_deviation(other, made)) < abs(_deviation(one, made))
 
@@ -63,7 +63,7 @@ def test_the_lower_of_two_minima_about_p0_is_taken() -> None:
 def test_an_element_that_just_lets_go_is_not_looked_at_again() -> None:
     made = record_bench(load_scenario("paper_steps"), 0, ROUGH)
     law = made.run.scenario.model.loss_law
-    problem, start = problem_of([made.signals], [made.driveline], law, truth_of(made))
-    one = nearest(problem, start)
+    problem, start = build_problem([made.signals], [made.driveline], law, truth_of(made))
+    one = fit_local(problem, start)
     assert one is not None
-    assert lowest(problem, one) is one
+    assert find_best_minimum(problem, one) is one

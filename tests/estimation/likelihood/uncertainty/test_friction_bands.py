@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.estimation.likelihood.objective import Part
-from drivetwin.estimation.likelihood.uncertainty.friction_bands import curves_of
+from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
 from tests.estimation.likelihood.fixtures import fitted
 
 
@@ -18,14 +18,14 @@ def test_a_curve_goes_over_the_slips_of_all_shifts_and_not_of_the_first_alone() 
     fit = fitted()
     (whole,) = fit.problem.parts
     oncoming = whole.structure.driveline.oncoming.name
-    run = whole.run(fit.point)
+    run = whole.simulate(fit.point)
     assert run is not None
     lock = next(one.time for one in run.events if (one.kind, one.element) == ("lock", oncoming))
-    brief = Part.unweighted(whole.structure, whole.record.until(lock - 0.15))
+    brief = ShiftTerm.from_sensor_noise(whole.structure, whole.record.cut(lock - 0.15))
     nothing = np.zeros_like(fit.covariance)
-    alone = curves_of(fit, {}, nothing)[oncoming]
+    alone = build_friction_curves(fit, {}, nothing)[oncoming]
     both = replace(fit, problem=replace(fit.problem, parts=(brief, whole)))
-    joined = curves_of(both, {}, nothing)[oncoming]
+    joined = build_friction_curves(both, {}, nothing)[oncoming]
     assert joined.slip[[0, -1]] == pytest.approx(alone.slip[[0, -1]])
     short = replace(fit, problem=replace(fit.problem, parts=(brief,)))
-    assert curves_of(short, {}, nothing)[oncoming].slip[0] > 10.0 * alone.slip[0]
+    assert build_friction_curves(short, {}, nothing)[oncoming].slip[0] > 10.0 * alone.slip[0]

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.optimize.multistart import fit
-from drivetwin.estimation.likelihood.uncertainty.friction_bands import curves_of
+from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     Sensitivity,
-    sensitivity,
-    sensor_shifts,
+    compute_sensitivity,
+    compute_sensor_shifts,
 )
-from drivetwin.estimation.linear.multi_shift import disturbed
+from drivetwin.estimation.linear.multi_shift import apply_sensor_error
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 from tests.support.shared_results import shared
@@ -34,7 +34,7 @@ OTHERS = (
 
 def shifts(*roles: str) -> FloatArray:
     """Sum of the shifts of all unknowns by values of `roles` that are `AGE` older."""
-    found = sensor_shifts(fitted(), {role: SensorTolerance(age=AGE) for role in roles})
+    found = compute_sensor_shifts(fitted(), {role: SensorTolerance(age=AGE) for role in roles})
     assert set(found) <= {f"{role} age" for role in roles}
     return np.asarray(sum(found.values()))
 
@@ -63,9 +63,9 @@ def test_where_all_else_is_older_the_engine_torque_is_younger() -> None:
 
 def test_the_shift_is_that_of_a_fit_of_older_values() -> None:
     made = bench()
-    older = disturbed(made.signals, "output_torque", SensorTolerance(age=AGE))
+    older = apply_sensor_error(made.signals, "output_torque", SensorTolerance(age=AGE))
     posed, _ = problem(replace(made, signals=older))
-    again = fit(posed, fitted().point, [older.shift])
+    again = fit_multistart(posed, fitted().point, [older.shift])
     moved = in_deviations(again.point.values - fitted().point.values)
     told = in_deviations(shifts("output_torque"))
     assert abs(told["te_delay"]) > 10.0
@@ -77,8 +77,8 @@ def test_the_shift_is_that_of_a_fit_of_older_values() -> None:
 @shared
 def found() -> Sensitivity:
     fit = fitted()
-    friction = curves_of(fit, {}, np.zeros_like(fit.covariance))
-    return sensitivity(fit, [bench().signals], friction)
+    friction = build_friction_curves(fit, {}, np.zeros_like(fit.covariance))
+    return compute_sensitivity(fit, [bench().signals], friction)
 
 
 def percent(name: str, error: str) -> float:

@@ -13,7 +13,12 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.can.database import admitted, codes, physical, read_database
+from drivetwin.logs.formats.can.database import (
+    decode_codes,
+    decode_physical,
+    read_database,
+    select_valid_payloads,
+)
 from drivetwin.logs.formats.frames import Signal
 
 DBC = """VERSION ""
@@ -59,7 +64,7 @@ def test_signals_agree_with_the_reference_decoder(path: Path) -> None:
     data = chance.integers(0, 256, (200, 8)).astype(np.uint8)
     data[:, 4:8] = chance.normal(0.0, 100.0, 200).astype("<f4").view(np.uint8).reshape(-1, 4)
     for signal in mixed.signals:
-        values = physical(data, signal)
+        values = decode_physical(data, signal)
         expected = [_decoded(reference, row.tobytes(), signal.name) for row in data]
         assert values == pytest.approx(np.array(expected, np.float64), rel=1e-12), signal.name
 
@@ -72,7 +77,7 @@ def test_signals_agree_with_the_reference_decoder(path: Path) -> None:
 def test_bits_of_any_layout(start: int, length: int, intel: bool, payload: bytes) -> None:
     signal = Signal("x", start, length, intel=intel)
     assume(signal.end <= 8)
-    code = int(codes(np.frombuffer(payload, np.uint8)[None, :], signal)[0])
+    code = int(decode_codes(np.frombuffer(payload, np.uint8)[None, :], signal)[0])
     bits = "".join(f"{byte:08b}" for byte in payload)
     if intel:
         positions = [8 * (bit // 8) + 7 - bit % 8 for bit in range(start, start + length)][::-1]
@@ -87,9 +92,9 @@ def test_a_multiplexer_admits_its_own(path: Path) -> None:
     data = np.array([[1, 5, 0, 0, 0, 0, 0, 0], [2, 5, 0, 0, 0, 0, 0, 0]], np.uint8)
     by_name = {signal.name: signal for signal in switched.signals}
     length = np.array([8, 8])
-    assert admitted(data, length, by_name["one"]).tolist() == [True, False]
-    assert admitted(data, length, by_name["two"]).tolist() == [False, True]
-    assert admitted(data, np.array([2, 2]), by_name["one"]).tolist() == [False, False]
+    assert select_valid_payloads(data, length, by_name["one"]).tolist() == [True, False]
+    assert select_valid_payloads(data, length, by_name["two"]).tolist() == [False, True]
+    assert select_valid_payloads(data, np.array([2, 2]), by_name["one"]).tolist() == [False, False]
 
 
 def test_a_multiplexer_inside_another_admits_only_where_it_is_sent(path: Path) -> None:
@@ -101,12 +106,12 @@ def test_a_multiplexer_inside_another_admits_only_where_it_is_sent(path: Path) -
     data = np.array([list(one) for one in payloads], np.uint8)
     for signal in nested.signals:
         sent = [signal.name in reference.decode_simple(one) for one in payloads]
-        assert admitted(data, np.array([8, 8]), signal).tolist() == sent, signal.name
+        assert select_valid_payloads(data, np.array([8, 8]), signal).tolist() == sent, signal.name
 
 
 def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(ValueError, match="x has 16 bits, ends in byte 9"):
-        codes(np.zeros((1, 8), np.uint8), Signal("x", 56, 16))
+        decode_codes(np.zeros((1, 8), np.uint8), Signal("x", 56, 16))
 
 
 def test_what_is_no_dbc(tmp_path: Path) -> None:

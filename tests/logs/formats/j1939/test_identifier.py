@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.logs.formats.j1939.identifier import group_of, receiver_of, sender_of
+from drivetwin.logs.formats.j1939.identifier import decode_group, decode_receiver, decode_sender
 
 
 @pytest.mark.parametrize(
@@ -21,4 +21,8 @@ from drivetwin.logs.formats.j1939.identifier import group_of, receiver_of, sende
 )
 def test_fields(identifier: int, group: int, sender: int, receiver: int) -> None:
     one = np.array([identifier], np.uint32)
-    assert (group_of(one)[0], sender_of(one)[0], receiver_of(one)[0]) == (group, sender, receiver)
+    assert (decode_group(one)[0], decode_sender(one)[0], decode_receiver(one)[0]) == (
+        group,
+        sender,
+        receiver,
+    )

@@ -24,22 +24,22 @@ def raw(name: str, time: list[float], values: list[float]) -> RawChannel:
 
 def test_percent_of_the_reference() -> None:
     percent = raw("ActualEngPercentTorque", [0.0, 0.02], [50.0, -10.0])
-    found = torque.in_newton_metres(percent, 1109.0, "told")
+    found = torque.convert_to_torque(percent, 1109.0, "told")
     assert (found.name, found.unit, found.notes) == ("ActualEngTorque", "Nm", ("told",))
     assert found.values.tolist() == pytest.approx([554.5, -110.9])
-    assert torque.torque_name("Retarder") == "Retarder_Nm"
+    assert torque.derive_torque_name("Retarder") == "Retarder_Nm"
 
 
 def test_the_fraction_is_added_where_it_is_sent() -> None:
     percent = raw("ActualEngPercentTorque", [0.0, 0.02, 0.04], [50.0, 51.0, 52.0])
-    found = torque.with_fraction(percent, raw("f", [0.0, 0.04], [0.125, 0.875]))
+    found = torque.add_fraction(percent, raw("f", [0.0, 0.04], [0.125, 0.875]))
     assert found.values.tolist() == [50.125, 51.0, 52.875]
 
 
 def test_net_torque_is_unknown_without_friction() -> None:
     actual = raw("a", [0.0, 0.1, 0.2, 0.3], [10.0, 11.0, 12.0, 13.0])
     friction = raw("f", [0.05, 0.15, 0.25], [1.0, 2.0, 3.0])
-    found = torque.net_torque(actual, friction)
+    found = torque.compute_net_torque(actual, friction)
     assert found.time.tolist() == [0.1, 0.2]
     assert found.values == pytest.approx([11.0 - 1.5, 12.0 - 2.5])
 
@@ -72,11 +72,11 @@ def test_a_truck_in_gear_runs_at_the_ratio_of_its_gear(truck: Path) -> None:
     gear, inlet, outlet = log["gear"], log["input_speed"], log["output_speed"]
     assert set(gear.values) <= {2.0, 3.0, 4.0}
     assert 600.0 * RPM < outlet.values.max() < 1600.0 * RPM
-    locked = log["lockup_engaged"].at(inlet.time) == 1.0
-    driving = (log["shift_in_process"].at(inlet.time) == 0.0) & locked
-    ratio = inlet.values / outlet.at(inlet.time)
+    locked = log["lockup_engaged"].interpolate(inlet.time) == 1.0
+    driving = (log["shift_in_process"].interpolate(inlet.time) == 0.0) & locked
+    ratio = inlet.values / outlet.interpolate(inlet.time)
     for name in ("2", "3"):
-        in_gear = driving & (gear.at(inlet.time) == float(name))
-        assert np.nanmedian(ratio[in_gear]) == pytest.approx(card.ratio(name), rel=2e-3)
+        in_gear = driving & (gear.interpolate(inlet.time) == float(name))
+        assert np.nanmedian(ratio[in_gear]) == pytest.approx(card.compute_ratio(name), rel=2e-3)
     assert log["engine_torque"].source_name == "EngNetTorque"
     assert log["engine_torque"].values.max() < 1109.0

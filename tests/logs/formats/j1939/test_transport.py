@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.logs.formats.frames import Frames, frame_table
-from drivetwin.logs.formats.j1939.transport import reassemble
+from drivetwin.logs.formats.frames import Frames, build_frames
+from drivetwin.logs.formats.j1939.transport import assemble_messages
 
 EC1 = 65251
 
@@ -41,7 +41,7 @@ def packets(payload: bytes, sender: int = 0, to: int = 255) -> list[Frame]:
 
 
 def table(sent: Sequence[Frame], stamps: Sequence[float] | None = None) -> Frames:
-    return frame_table(
+    return build_frames(
         stamps or [0.05 * index for index in range(len(sent))],
         [one.identifier for one in sent],
         [True] * len(sent),
@@ -54,7 +54,7 @@ PAYLOAD = bytes(range(34))
 
 
 def test_a_whole_message_bears_the_time_of_its_last_packet() -> None:
-    found = reassemble(table([announce(PAYLOAD), *packets(PAYLOAD)]))
+    found = assemble_messages(table([announce(PAYLOAD), *packets(PAYLOAD)]))
     (message,) = found.messages
     assert (message.group, message.sender, message.payload) == (EC1, 0, PAYLOAD)
     assert message.time == pytest.approx(0.25)
@@ -64,7 +64,7 @@ def test_a_whole_message_bears_the_time_of_its_last_packet() -> None:
 def test_a_message_to_one_receiver() -> None:
     answers = [Frame(0x1CEC0003, bytes([17, 5, 1, 255, 255, 0xE3, 0xFE, 0]))]
     sent = [announce(PAYLOAD, to=3), *answers, *packets(PAYLOAD, to=3)]
-    assert reassemble(table(sent)).messages[0].payload == PAYLOAD
+    assert assemble_messages(table(sent)).messages[0].payload == PAYLOAD
 
 
 def test_what_is_missing_is_counted_not_filled() -> None:
@@ -79,27 +79,27 @@ def test_what_is_missing_is_counted_not_filled() -> None:
         ],
     }
     for reason, frames in cases.items():
-        found = reassemble(table(frames))
+        found = assemble_messages(table(frames))
         assert found.faults[reason] >= 1, reason
         assert len(found.messages) == (reason == "replaced by the next before its end")
 
 
 def test_a_long_pause_ends_a_transfer() -> None:
     sent = [announce(PAYLOAD), *packets(PAYLOAD)]
-    found = reassemble(table(sent, [0.0, 0.1, 0.2, 2.0, 2.1, 2.2]))
+    found = assemble_messages(table(sent, [0.0, 0.1, 0.2, 2.0, 2.1, 2.2]))
     assert not found.messages
     assert found.faults["paused too long"] == 1
 
 
 def test_an_abort_ends_a_transfer() -> None:
     abort = Frame(0x1CECFF00, bytes([255, 1, 255, 255, 255, 0xE3, 0xFE, 0]))
-    found = reassemble(table([announce(PAYLOAD), *packets(PAYLOAD)[:2], abort]))
+    found = assemble_messages(table([announce(PAYLOAD), *packets(PAYLOAD)[:2], abort]))
     assert found.faults["aborted"] == 1
 
 
 def test_a_repeated_packet_is_taken_once() -> None:
     parts = packets(PAYLOAD)
-    found = reassemble(table([announce(PAYLOAD), parts[0], parts[0], *parts[1:]]))
+    found = assemble_messages(table([announce(PAYLOAD), parts[0], parts[0], *parts[1:]]))
     assert found.messages[0].payload == PAYLOAD
 
 
@@ -112,14 +112,14 @@ def test_frames_recorded_twice_count_once(order: str) -> None:
     else:
         doubled = [sent[0], sent[1], sent[0], sent[1], *sent[2:]]
         stamps = [0.0, 4e-4, 6e-4, 8e-4, *(0.05 * index for index in range(1, len(sent) - 1))]
-    found = reassemble(table(doubled, stamps))
+    found = assemble_messages(table(doubled, stamps))
     assert [one.payload for one in found.messages] == [PAYLOAD]
     assert not found.faults
 
 
 def test_an_equal_message_a_while_later_is_another() -> None:
     sent = [announce(PAYLOAD), *packets(PAYLOAD)]
-    assert len(reassemble(table([*sent, *sent])).messages) == 2
+    assert len(assemble_messages(table([*sent, *sent])).messages) == 2
 
 
 @given(
@@ -140,6 +140,6 @@ def test_any_interleaving_of_senders_gives_all_messages(
         queue = chance.choice(queues)
         sent.append(queue.pop(0))
         queues = [one for one in queues if one]
-    found = reassemble(table(sent, [0.001 * index for index in range(len(sent))]))
+    found = assemble_messages(table(sent, [0.001 * index for index in range(len(sent))]))
     assert {one.sender: one.payload for one in found.messages} == payloads
     assert not found.faults

@@ -18,7 +18,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import Sampled
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.vehicle.spec import PriorValue
 
 CUBIC = 3
@@ -52,63 +52,65 @@ class InputSmoothingSettings:
 SMOOTHING = InputSmoothingSettings()
 
 
-def smooth_pressure(pressure: Sampled, fill: PriorValue | None = None) -> FloatArray:
+def smooth_pressure(pressure: MeasuredSignal, fill: PriorValue | None = None) -> FloatArray:
     """Remove the fast noise of a pressure (n,); corners too sharp for a local cubic stay as read.
 
     `fill` is P0 [Pa] as the card has it: about it the noise is taken off that a longer cubic takes.
     """
-    smooth = local_cubic(pressure.time, pressure.values)
+    smooth = smooth_local_cubic(pressure.time, pressure.values)
     apart = np.abs(pressure.values - smooth) > SMOOTHING.corner_sigma * pressure.sigma
     if fill is not None:
-        steady = _steady(pressure, smooth)
+        steady = _select_steady(pressure, smooth)
         band = SMOOTHING.fill_sigma * pressure.sigma + 2.0 * fill.std
         smooth = np.where(np.abs(steady - fill.value) < band, steady, smooth)
-    return np.where(maximum_filter1d(apart, _samples(pressure.time)), pressure.values, smooth)
+    return np.where(maximum_filter1d(apart, _count_samples(pressure.time)), pressure.values, smooth)
 
 
-def _steady(pressure: Sampled, smooth: FloatArray) -> FloatArray:
+def _select_steady(pressure: MeasuredSignal, smooth: FloatArray) -> FloatArray:
     """Compute the middle (n,) of the longest cubic about each sample that agrees with all shorter
-    ones and with `smooth`, that over `SMOOTHING.window` (as `local_mean`).
+    ones and with `smooth`, that over `SMOOTHING.window` (as `smooth_adaptive`).
 
     Noise that flickers about P0 gives the fit many minima, and in each a torque that comes and goes
     with the noise seems to tell P0 from μ: 5 kPa above P0 an estimate may be four standard
     deviations off.
     """
     values, steady = pressure.values, smooth
-    margin = SMOOTHING.cubic_sigma * pressure.sigma * _noise_left(_samples(pressure.time))
+    margin = (
+        SMOOTHING.cubic_sigma * pressure.sigma * _compute_noise_gain(_count_samples(pressure.time))
+    )
     low, high = smooth - margin, smooth + margin
     open_ = np.ones(values.size, dtype=bool)
     for window in SMOOTHING.longer_windows:
-        size = _samples(pressure.time, window)
+        size = _count_samples(pressure.time, window)
         if not CUBIC + 1 < size <= values.size:
             continue
         trial = savgol_filter(values, size, CUBIC)
-        margin = SMOOTHING.cubic_sigma * pressure.sigma * _noise_left(size)
+        margin = SMOOTHING.cubic_sigma * pressure.sigma * _compute_noise_gain(size)
         low, high = np.maximum(low, trial - margin), np.minimum(high, trial + margin)
         open_ &= low <= high
         steady = np.where(open_, trial, steady)
     return np.asarray(steady)
 
 
-def _noise_left(size: int) -> float:
+def _compute_noise_gain(size: int) -> float:
     """Compute the noise of the middle of a cubic over `size` samples, over that of a sample."""
     if size <= CUBIC + 1:
         return 1.0
     return float(np.linalg.norm(savgol_coeffs(size, CUBIC)))
 
 
-def local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
+def smooth_local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
     """Fit cubics over `SMOOTHING.window` about each sample (n,) (Savitzky and Golay 1964).
 
     The values as they are where the window holds too few samples for a cubic.
     """
-    size = _samples(time)
+    size = _count_samples(time)
     if size <= CUBIC + 1 or size > values.size:
         return values
     return np.asarray(savgol_filter(values, size, CUBIC), dtype=np.float64)
 
 
-def bend_of(time: FloatArray, values: FloatArray) -> FloatArray:
+def compute_bend(time: FloatArray, values: FloatArray) -> FloatArray:
     """Compute the correction (n,) that gives samples joined by straight lines the mean of a curve.
 
     Chords lie inside a curve, by h²/12 of its second derivative in the mean: in an engine torque
@@ -122,12 +124,12 @@ def bend_of(time: FloatArray, values: FloatArray) -> FloatArray:
     return np.pad(np.where(even, -second * before * after / 12.0, 0.0), 1)
 
 
-def _samples(time: FloatArray, window: float = SMOOTHING.window) -> int:
+def _count_samples(time: FloatArray, window: float = SMOOTHING.window) -> int:
     """Return the odd number of samples in a `window` [s]."""
     return 2 * int(0.5 * window / float(np.median(np.diff(time)))) + 1
 
 
-def local_mean(signal: Sampled) -> FloatArray:
+def smooth_adaptive(signal: MeasuredSignal) -> FloatArray:
     """Remove the noise of a signal (n,) by adaptive local averaging.
 
     At every sample the mean over the longest window that agrees with those over all shorter ones

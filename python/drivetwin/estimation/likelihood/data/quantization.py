@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.estimation.likelihood.data.input_smoothing import local_mean
-from drivetwin.estimation.linear.momentum_balance import rounding_error
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
+from drivetwin.estimation.linear.momentum_balance import estimate_rounding_error
 
 
 @dataclass(frozen=True, eq=False)
-class Rounding:
+class Quantization:
     """Errors of the samples of a rounded signal that do not average out.
 
     `error` is the standard deviation of the mean error of one stay at a level, in the signal's
@@ -36,16 +36,16 @@ class Rounding:
         """White noise (m,) of the samples with the same power: its mean over a stay is `error`."""
         return np.asarray(self.error * np.sqrt(np.bincount(self.stay)[self.stay]))
 
-    def drawn(self, rng: np.random.Generator) -> FloatArray:
+    def draw(self, rng: np.random.Generator) -> FloatArray:
         """Draw random errors (m,)."""
         return np.asarray(self.error * rng.standard_normal(int(self.stay[-1]) + 1)[self.stay])
 
 
-def rounding_of(signal: Sampled, step: float) -> Rounding | None:
+def estimate_quantization(signal: MeasuredSignal, step: float) -> Quantization | None:
     """Compute the errors that quantization to `step` leaves, in the signal's unit; None if noise
     dithers them."""
-    error = rounding_error(signal, step)
+    error = estimate_rounding_error(signal, step)
     if error == 0.0:
         return None
-    level = np.round(local_mean(signal) / step)
-    return Rounding(error, np.cumsum(np.diff(level, prepend=level[0]) != 0.0))
+    level = np.round(smooth_adaptive(signal) / step)
+    return Quantization(error, np.cumsum(np.diff(level, prepend=level[0]) != 0.0))

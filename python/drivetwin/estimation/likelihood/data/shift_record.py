@@ -12,15 +12,15 @@ from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import resolution
-from drivetwin.estimation.data.shift_data import Sampled, ShiftSignals, TorqueOfSpeeds
+from drivetwin.estimation.data.noise import estimate_resolution
+from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals, TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.input_smoothing import (
-    bend_of,
-    local_cubic,
-    local_mean,
+    compute_bend,
+    smooth_adaptive,
+    smooth_local_cubic,
     smooth_pressure,
 )
-from drivetwin.estimation.likelihood.data.quantization import Rounding, rounding_of
+from drivetwin.estimation.likelihood.data.quantization import Quantization, estimate_quantization
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal, Trajectory
 from drivetwin.vehicle.spec import PriorValue
 
@@ -32,15 +32,15 @@ OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""
 ESSENTIAL = ("engine_speed", "output_speed")
 """Outputs without which no shift can be fitted."""
-LATEST = 0.06
+MAX_DELAY_S = 0.06
 """Greatest age of an engine torque value [s]: so much of the end of a log has no input."""
-GRID = 1e-3
+GRID_STEP_S = 1e-3
 """Step of the simulation's grid [s] where outputs are sampled more slowly."""
-SLOW = 1.5 * GRID
+MAX_GRID_GAP_S = 1.5 * GRID_STEP_S
 """Distance of outputs' stamps [s] above which there are points of the grid between them."""
-SHORTEST = 0.1
+MIN_OUTPUT_S = 0.1
 """Time [s] that an output must cover of a shift's span to be compared there."""
-FLOOR = 2e-5
+MIN_RELATIVE_NOISE = 2e-5
 """Least noise of a compared signal as a share of its range, and of an input as a share of its
 largest value: what an ideal sensor is given. With none at all the weighting loses its digits."""
 
@@ -72,38 +72,38 @@ class Output:
             self, place=self.place[:keep], values=self.values[:keep], centre=self.centre[:keep]
         )
 
-    def period(self, time: FloatArray) -> float:
+    def get_period(self, time: FloatArray) -> float:
         """Return the sampling time [s]."""
         return float(np.median(np.diff(time[self.place])))
 
-    def after_period(self, time: FloatArray) -> Output:
+    def drop_first_period(self, time: FloatArray) -> Output:
         """Keep the samples stamped a period or more after the grid `time` (N,) starts: point
         samples and means are then both defined on it."""
-        first = int(np.searchsorted(time[self.place], time[0] + self.period(time)))
+        first = int(np.searchsorted(time[self.place], time[0] + self.get_period(time)))
         return replace(
             self, place=self.place[first:], values=self.values[first:], centre=self.centre[first:]
         )
 
-    def averaged(self, time: FloatArray) -> Output:
+    def convert_to_means(self, time: FloatArray) -> Output:
         """Interpret the samples as means over the time since the previous one."""
-        window = self.period(time)
+        window = self.get_period(time)
         centre = np.searchsorted(time, time[self.place] - 0.5 * window)
         return replace(self, window=window, centre=centre)
 
-    def seen(self, time: FloatArray, column: FloatArray) -> FloatArray:
+    def sample(self, time: FloatArray, column: FloatArray) -> FloatArray:
         """Sample a quantity (N,) on the grid `time` (N,) as this sensor does; shape (n,)."""
         if self.window == 0.0:
             return column[self.place]
-        return self._mean(time, column, self.window)
+        return self._compute_means(time, column, self.window)
 
-    def otherwise(self, time: FloatArray, column: FloatArray) -> FloatArray:
+    def sample_other_mode(self, time: FloatArray, column: FloatArray) -> FloatArray:
         """Sample a quantity in the other mode (n,): means instead of point samples, or the
         reverse."""
         if self.window > 0.0:
             return column[self.place]
-        return self._mean(time, column, self.period(time))
+        return self._compute_means(time, column, self.get_period(time))
 
-    def _mean(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
+    def _compute_means(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
         """Compute means (n,) over the `window` [s] before each stamp."""
         total = np.concatenate([[0.0], np.cumsum(0.5 * (column[1:] + column[:-1]) * np.diff(time))])
         before = np.interp(time[self.place] - window, time, total)
@@ -111,7 +111,7 @@ class Output:
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class ShiftRecord:
     """One shift's span of a log.
 
     `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
@@ -138,7 +138,7 @@ class Record:
     curved: bool = False
     of_speeds: TorqueOfSpeeds | None = None
     """Where the engine torque is computed from speeds: the noise of the compared one is in both."""
-    rounding: Mapping[str, Rounding] = field(default_factory=dict)
+    rounding: Mapping[str, Quantization] = field(default_factory=dict)
     """What rounding leaves of the samples of an input, by name; no entry where noise dithers it."""
 
     @property
@@ -156,10 +156,10 @@ class Record:
         """All compared samples, stacked (size,)."""
         return np.concatenate([out.values for out in self.outputs])
 
-    def stacked(self, run: Trajectory) -> FloatArray:
+    def sample_run(self, run: Trajectory) -> FloatArray:
         """Sample a trajectory (or a sensitivity) at the measured stamps; shape (size,)."""
-        columns = columns_of(run)
-        return np.concatenate([out.seen(run.time, columns[out.name]) for out in self.outputs])
+        columns = get_columns(run)
+        return np.concatenate([out.sample(run.time, columns[out.name]) for out in self.outputs])
 
     @property
     def kinds(self) -> frozenset[str]:
@@ -168,9 +168,11 @@ class Record:
         means = frozenset(out.name for out in self.outputs if out.window > 0.0)
         return means | {TORQUE} if self.curved else means
 
-    def of_kinds(self, names: Collection[str]) -> Record:
+    def select_modes(self, names: Collection[str]) -> ShiftRecord:
         """Set the sampling modes of `names` in a record of point samples and straight lines."""
-        outputs = [out.averaged(self.time) if out.name in names else out for out in self.outputs]
+        outputs = [
+            out.convert_to_means(self.time) if out.name in names else out for out in self.outputs
+        ]
         found = replace(self, outputs=tuple(outputs))
         if TORQUE not in names:
             return found
@@ -179,28 +181,30 @@ class Record:
             found, engine_torque=replace(torque, values=torque.values + self.bend), curved=True
         )
 
-    def bend_over(self, age: float) -> FloatArray:
+    def interpolate_bend(self, age: float) -> FloatArray:
         """Compute the difference (N-1,) of a curved engine torque from a straight one over each
         step."""
         middle = 0.5 * (self.time[1:] + self.time[:-1])
         return np.interp(middle, self.engine_torque.time - age, self.bend)
 
-    def less(self, noise: Mapping[str, FloatArray], age: float) -> Record:
+    def subtract_noise(self, noise: Mapping[str, FloatArray], age: float) -> ShiftRecord:
         """Subtract the expected `noise` (N-1,) per step of the grid from the inputs.
 
         Of a pressure's noise only the part that passes the local cubic still drives the run.
         """
         torque = self.engine_torque
-        held = {TORQUE: _at_samples(self.time, noise[TORQUE], torque.time - age)}
+        held = {TORQUE: _average_at_samples(self.time, noise[TORQUE], torque.time - age)}
         pressures = {}
         for name, p in self.pressures.items():
-            held[name] = local_cubic(p.time, _at_samples(self.time, noise[name], p.time))
+            held[name] = smooth_local_cubic(
+                p.time, _average_at_samples(self.time, noise[name], p.time)
+            )
             pressures[name] = Signal(p.time, p.values - held[name])
         torque = Signal(torque.time, torque.values - held[TORQUE])
         held = {name: self.held_back.get(name, 0.0) + values for name, values in held.items()}
         return replace(self, engine_torque=torque, pressures=pressures, held_back=held)
 
-    def held_back_over(self, age: float) -> dict[str, FloatArray]:
+    def interpolate_held_back(self, age: float) -> dict[str, FloatArray]:
         """Compute the held-back part of each input (N-1,) in the middle of each step of the
         grid."""
         middle = 0.5 * (self.time[1:] + self.time[:-1])
@@ -215,10 +219,10 @@ class Record:
         time, sigma = self.engine_torque.time, self.input_sigma[TORQUE]
         if self.of_speeds is None:
             return np.full(time.size, sigma)
-        least = FLOOR * float(np.max(np.abs(self.engine_torque.values)))
+        least = MIN_RELATIVE_NOISE * float(np.max(np.abs(self.engine_torque.values)))
         return np.maximum(np.interp(time, self.of_speeds.time, self.of_speeds.rest), least)
 
-    def variance_of(self, name: str) -> FloatArray:
+    def compute_variance(self, name: str) -> FloatArray:
         """Compute the variance (m,) of white samples with the power of an input's own noise and
         rounding."""
         if name == TORQUE:
@@ -229,7 +233,7 @@ class Record:
             noise = noise + self.rounding[name].sigma ** 2
         return noise
 
-    def torque_share(self) -> csr_array | None:
+    def compute_torque_share(self) -> csr_array | None:
         """Compute the noise of the engine torque over each step per that of a compared sample (N-1,
         size).
 
@@ -239,17 +243,17 @@ class Record:
             return None
         middle = 0.5 * (self.time[1:] + self.time[:-1])
         torque = self.engine_torque.time
-        by_step = _interpolation(torque, middle, (0, torque.size))
-        return csr_array(by_step @ self._torque_by_sample(self.of_speeds))
+        by_step = _build_interpolation(torque, middle, (0, torque.size))
+        return csr_array(by_step @ self._build_torque_map(self.of_speeds))
 
-    def torque_noise(self, noise: FloatArray) -> FloatArray:
+    def map_torque_noise(self, noise: FloatArray) -> FloatArray:
         """Map `noise` (size,) of the compared samples to noise of the engine torque samples
         (m,)."""
         if self.of_speeds is None:
             return np.zeros(self.engine_torque.time.size)
-        return np.asarray(self._torque_by_sample(self.of_speeds) @ noise)
+        return np.asarray(self._build_torque_map(self.of_speeds) @ noise)
 
-    def _torque_by_sample(self, of_speeds: TorqueOfSpeeds) -> csr_array:
+    def _build_torque_map(self, of_speeds: TorqueOfSpeeds) -> csr_array:
         """Compute the noise of engine torque samples per that of a compared sample (m, size)."""
         torque = self.engine_torque.time
         slope = np.interp(torque, of_speeds.time, of_speeds.slope)
@@ -258,24 +262,24 @@ class Record:
             if out.name == "engine_speed":
                 break
             first += out.values.size
-        of_speed = _interpolation(self.time[out.place], torque, (first, self.size))
+        of_speed = _build_interpolation(self.time[out.place], torque, (first, self.size))
         return csr_array(of_speed * slope[:, None])
 
-    def torque_rate(self, age: float) -> FloatArray:
+    def compute_torque_rate(self, age: float) -> FloatArray:
         """Compute the rate of the engine torque [N m/s] as it acts over each step of the grid
         (N-1,)."""
         signal = self.steady_torque
         ends = np.interp(self.time + age, signal.time, signal.values)
         return np.asarray(np.diff(ends) / np.diff(self.time))
 
-    def until(self, end: float) -> Record:
+    def cut(self, end: float) -> ShiftRecord:
         """Cut the record at `end` [s]."""
         count = int(np.searchsorted(self.time, end, side="right"))
         outputs = tuple(out.cut(count) for out in self.outputs)
         return replace(self, time=self.time[:count], outputs=outputs)
 
 
-def columns_of(run: Trajectory) -> dict[str, FloatArray]:
+def get_columns(run: Trajectory) -> dict[str, FloatArray]:
     """Return the comparable quantities (N,) of a run, by name of the output."""
     return {
         "output_torque": run.shaft_torque,
@@ -285,9 +289,9 @@ def columns_of(run: Trajectory) -> dict[str, FloatArray]:
     }
 
 
-def record_of(
+def build_record(
     signals: ShiftSignals, span: Span, fills: Mapping[str, PriorValue] | None = None
-) -> Record:
+) -> ShiftRecord:
     """Build the record of one shift over `span` [s]; `fills` is P0 [Pa] by element from the card.
 
     An output that stops before the span, or starts at its end, is not compared. The first sample of
@@ -303,16 +307,18 @@ def record_of(
     }
     inputs = (signals.engine_torque, *signals.pressures.values())
     start = max(span[0], *(s.time[0] for s in inputs))
-    end = min(span[1], *(s.time[-1] for s in inputs)) - LATEST
-    inside = {n: s.within((start, end)) for n, s in channels.items() if s is not None}
-    parts = {name: s for name, s in inside.items() if s.time.size and np.ptp(s.time) >= SHORTEST}
+    end = min(span[1], *(s.time[-1] for s in inputs)) - MAX_DELAY_S
+    inside = {n: s.select_span((start, end)) for n, s in channels.items() if s is not None}
+    parts = {
+        name: s for name, s in inside.items() if s.time.size and np.ptp(s.time) >= MIN_OUTPUT_S
+    }
     if missing := [name for name in ESSENTIAL if name not in parts]:
         raise IdentificationError(
             f"{' and '.join(missing).replace('_', ' ')} hardly recorded between {start:.3f} s and "
             f"{end:.3f} s",
             "record engine and output speed throughout the shift",
         )
-    time = _filled(np.unique(np.concatenate([part.time for part in parts.values()])))
+    time = _fill_grid(np.unique(np.concatenate([part.time for part in parts.values()])))
     if time.size < 100:
         raise IdentificationError(
             f"only {time.size} samples between {start:.3f} s and {end:.3f} s to fit a model to",
@@ -323,8 +329,8 @@ def record_of(
             name,
             np.searchsorted(time, part.time),
             part.values,
-            max(part.sigma, FLOOR * float(np.ptp(part.values))),
-        ).after_period(time)
+            max(part.sigma, MIN_RELATIVE_NOISE * float(np.ptp(part.values))),
+        ).drop_first_period(time)
         for name, part in parts.items()
     )
     torque, of_speeds = signals.engine_torque, signals.torque_of_speeds
@@ -332,55 +338,60 @@ def record_of(
     noise = replace(torque, sigma=sigma)
     fills = fills or {}
     smooth = {n: smooth_pressure(p, fills.get(n)) for n, p in signals.pressures.items()}
-    return Record(
+    return ShiftRecord(
         time,
-        _held(torque),
+        _extend_ends(torque),
         {name: Signal(p.time, smooth[name]) for name, p in signals.pressures.items()},
         outputs,
-        _held(replace(torque, values=local_mean(torque))),
-        np.pad(bend_of(torque.time, torque.values), 1),
-        {TORQUE: _noise(noise)} | {n: _noise(p) for n, p in signals.pressures.items()},
+        _extend_ends(replace(torque, values=smooth_adaptive(torque))),
+        np.pad(compute_bend(torque.time, torque.values), 1),
+        {TORQUE: _bound_noise(noise)} | {n: _bound_noise(p) for n, p in signals.pressures.items()},
         {name: p.values - smooth[name] for name, p in signals.pressures.items()},
         fills,
         of_speeds=of_speeds,
-        rounding=_rounding(signals),
+        rounding=_collect_quantization(signals),
     )
 
 
-def _rounding(signals: ShiftSignals) -> dict[str, Rounding]:
+def _collect_quantization(signals: ShiftSignals) -> dict[str, Quantization]:
     """Compute the quantization errors of the inputs by name; those of the torque as extended by
     `_held`."""
-    found = {n: rounding_of(p, resolution(p.values)) for n, p in signals.pressures.items()}
-    torque = rounding_of(signals.engine_torque, signals.torque_resolution)
+    found = {
+        n: estimate_quantization(p, estimate_resolution(p.values))
+        for n, p in signals.pressures.items()
+    }
+    torque = estimate_quantization(signals.engine_torque, signals.torque_resolution)
     if torque is not None:
         found[TORQUE] = replace(torque, stay=np.pad(torque.stay, 1, mode="edge"))
     return {name: one for name, one in found.items() if one is not None}
 
 
-def _noise(of_input: Sampled) -> float:
+def _bound_noise(of_input: MeasuredSignal) -> float:
     """Return the noise of an input's samples, at least that of an ideal sensor."""
-    return max(of_input.sigma, FLOOR * float(np.max(np.abs(of_input.values))))
+    return max(of_input.sigma, MIN_RELATIVE_NOISE * float(np.max(np.abs(of_input.values))))
 
 
-def _filled(time: FloatArray) -> FloatArray:
+def _fill_grid(time: FloatArray) -> FloatArray:
     """Insert grid points between output stamps that are further apart than SLOW."""
-    wide = np.flatnonzero(np.diff(time) > SLOW)
-    steps = [np.arange(time[k] + GRID, time[k + 1] - 0.5 * GRID, GRID) for k in wide]
+    wide = np.flatnonzero(np.diff(time) > MAX_GRID_GAP_S)
+    steps = [
+        np.arange(time[k] + GRID_STEP_S, time[k + 1] - 0.5 * GRID_STEP_S, GRID_STEP_S) for k in wide
+    ]
     return np.sort(np.concatenate([time, *steps]))
 
 
-def _at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
+def _average_at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
     """Compute the noise of samples at `stamps` (m,) from that over each step of `grid` (N-1,).
 
     A sample acts on the steps about it as interpolation has it; its expected noise is their mean
     with the same weights, the transpose of interpolation.
     """
     middle, width = 0.5 * (grid[1:] + grid[:-1]), np.diff(grid)
-    total = _interpolation(stamps, middle, (0, stamps.size)).T @ (width * steps)
+    total = _build_interpolation(stamps, middle, (0, stamps.size)).T @ (width * steps)
     return np.asarray(total / float(np.median(np.diff(stamps))))
 
 
-def _interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int, int]) -> csr_array:
+def _build_interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int, int]) -> csr_array:
     """Build the matrix (m, count) that interpolates linearly from `stamps` (n,) to `at` (m,).
 
     Held beyond both ends. `columns` are the first of the stamps' columns and the count of all.
@@ -394,9 +405,9 @@ def _interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int, int])
     return csr_array((data, index, 2 * np.arange(at.size + 1)), shape=(at.size, count))
 
 
-def _held(signal: Sampled) -> Signal:
+def _extend_ends(signal: MeasuredSignal) -> Signal:
     """Extend a signal by its end values over any plausible delay."""
-    beyond = 2.0 * LATEST
+    beyond = 2.0 * MAX_DELAY_S
     time = np.concatenate([[signal.time[0] - beyond], signal.time, [signal.time[-1] + beyond]])
     values = np.concatenate([signal.values[:1], signal.values, signal.values[-1:]])
     return Signal(time, values)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
-from drivetwin.estimation.likelihood.data.input_smoothing import local_mean
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,12 @@ class SlippingElementSettings:
 SLIPPING = SlippingElementSettings()
 
 
-def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
+def find_slipping_elements(signals: ShiftSignals, driveline: KnownDriveline) -> tuple[str, ...]:
     """Find the elements of one shift whose law is free, the on-coming one first."""
     coming, leaving = driveline.oncoming, driveline.offgoing
     pressure = signals.pressures[leaving.name]
     start, end = signals.shift.inertia_phase
-    steady = local_mean(pressure)  # noise lifts single samples above P0
+    steady = smooth_adaptive(pressure)  # noise lifts single samples above P0
     inside = (pressure.time > start) & (pressure.time < end)
     limit = leaving.P0.value + 2.0 * leaving.P0.std + SLIPPING.filled_sigma * pressure.sigma
     filled = np.count_nonzero(inside & (steady > limit))
@@ -43,9 +43,9 @@ def carriers(signals: ShiftSignals, driveline: Driveline) -> tuple[str, ...]:
     return (coming.name, leaving.name) if slides else (coming.name,)
 
 
-def all_carriers(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[Driveline]
+def find_all_slipping_elements(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline]
 ) -> tuple[str, ...]:
     """Find the elements whose law is free over all shifts, without repetition."""
     pairs = zip(signals, drivelines, strict=True)
-    return tuple(dict.fromkeys(name for s, d in pairs for name in carriers(s, d)))
+    return tuple(dict.fromkeys(name for s, d in pairs for name in find_slipping_elements(s, d)))

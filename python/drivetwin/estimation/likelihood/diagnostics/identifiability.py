@@ -12,14 +12,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 
-LOOSE = 0.2
+MAX_RELATIVE_STD = 0.2
 """Relative standard deviation along a direction from which it counts as not told."""
-AT = 1e-3
+BOUND_STD = 1e-3
 """Distance from a bound, in standard deviations, within which an unknown stands on it."""
 SHARE = 0.3
 """Share of a parameter in a direction from which it is named."""
@@ -27,21 +27,21 @@ NAMED = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "mu_c",
 SHOWN = {"eta": "η", "J_e": "J′", "J_out": "Jo′", "J_vehicle": "J3", "Tv_over_if": "T_v"}
 
 
-def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
+def describe_null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
     """Return one sentence for each direction that is not identifiable without the priors."""
     names = fit.point.names
-    keep = [k for k, name in enumerate(names) if _is_told(name, names)]
+    keep = [k for k, name in enumerate(names) if _is_reported(name, names)]
     rest = [k for k in range(len(names)) if k not in keep]
     size = np.abs(fit.point.values[keep])
-    relative = reduced(fit.normal.data, keep, rest) * np.outer(size, size)
+    relative = reduce_information(fit.normal.data, keep, rest) * np.outer(size, size)
     power, directions = np.linalg.eigh(relative)
     texts = []
     for value, direction in zip(power, directions.T, strict=True):
         std = 1.0 / np.sqrt(max(float(value), 1e-12))
-        if std < LOOSE:
+        if std < MAX_RELATIVE_STD:
             break
         strong = [k for k in np.argsort(-np.abs(direction)) if abs(direction[k]) > SHARE]
-        shown = " and ".join(_shown(names[keep[k]]) for k in strong)
+        shown = " and ".join(_format_unknown(names[keep[k]]) for k in strong)
         texts.append(
             f"without the card's design values the log leaves {shown} open "
             + ("together: only their combination is told" if len(strong) > 1 else "")
@@ -49,13 +49,13 @@ def null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
     return tuple(text.strip() for text in texts)
 
 
-def _is_told(name: str, names: Sequence[str]) -> bool:
+def _is_reported(name: str, names: Sequence[str]) -> bool:
     """Return whether an unknown is reported; μ only of elements whose whole law is free."""
     element, _, key = name.rpartition(".")
     return key in NAMED and (key != LAW[0] or f"{element}.{LAW[-1]}" in names)
 
 
-def reduced(matrix: FloatArray, keep: list[int], rest: list[int]) -> FloatArray:
+def reduce_information(matrix: FloatArray, keep: list[int], rest: list[int]) -> FloatArray:
     """Compute the information on `keep` with the `rest` unknown (Schur complement), after
     scaling."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
@@ -66,18 +66,18 @@ def reduced(matrix: FloatArray, keep: list[int], rest: list[int]) -> FloatArray:
     return np.asarray(reduced * np.outer(scale[keep], scale[keep]))
 
 
-def _shown(name: str) -> str:
+def _format_unknown(name: str) -> str:
     element, _, key = name.rpartition(".")
     symbol = SHOWN.get(key, {"mu_c": "μ", "drum": "drum inertia"}.get(key, key))
     return f"{symbol} of {element}" if element else symbol
 
 
-def at_limits(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -> dict[str, str]:
+def find_at_bounds(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -> dict[str, str]:
     """Return a warning by id for each parameter that is an unknown on one of its bounds.
 
     `slopes` (q, p) is the derivative of the parameters `ids` by the unknowns of the fit.
     """
-    values, near = fit.point.values, AT * np.sqrt(np.diag(fit.covariance))
+    values, near = fit.point.values, BOUND_STD * np.sqrt(np.diag(fit.covariance))
     below, above = values <= fit.problem.lower + near, values >= fit.problem.upper - near
     found = {}
     for name, row in zip(ids, slopes, strict=True):
@@ -85,6 +85,6 @@ def at_limits(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -> dic
         if acting.size != 1 or not (below | above)[acting[0]]:
             continue
         side = "more" if above[acting[0]] else "less"
-        limit = in_units(float(values[acting[0]]), spec_of(name).unit)
+        limit = format_with_unit(float(values[acting[0]]), get_parameter_spec(name).unit)
         found[name] = f"{limit} is the limit of the search: the log speaks for {side}"
     return found

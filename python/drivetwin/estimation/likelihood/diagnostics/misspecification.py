@@ -16,19 +16,23 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
-from drivetwin.estimation.data.shift_data import Sampled
-from drivetwin.estimation.likelihood.data.input_smoothing import local_mean
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of, spread_of
-from drivetwin.estimation.likelihood.objective import Part, Problem
+from drivetwin._util.display_units import format_with_unit
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
+from drivetwin.estimation.likelihood.fit import (
+    LikelihoodFit,
+    compute_covariance,
+    invert_information,
+)
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.estimation.likelihood.slip_contact import carried_slip, contact_of
-from drivetwin.estimation.linear.friction_points import stribeck
-from drivetwin.estimation.optimize.gauss_newton import step_of
-from drivetwin.estimation.optimize.objective import Normal
+from drivetwin.estimation.likelihood.slip_contact import evaluate_contact, find_loaded_slips
+from drivetwin.estimation.linear.friction_points import evaluate_stribeck
+from drivetwin.estimation.optimize.gauss_newton import solve_step
+from drivetwin.estimation.optimize.objective import NormalEquations
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
-from drivetwin.estimation.result.estimate_set import with_systematic_band
-from drivetwin.estimation.result.verdict import doubted
+from drivetwin.estimation.result.estimate_set import add_systematic_band
+from drivetwin.estimation.result.verdict import reject_identified
 from drivetwin.simulation.dual_clutch import Trajectory
 
 OUTPUT_TORQUE = "output_torque"
@@ -46,7 +50,7 @@ GRID = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class ScoreStep:
     """Estimate of q effects if they were free: `amounts` (q,) with their `covariance` (q, q).
 
     `moves` (p,) is where the unknowns of the fit would follow, `fall` how much Q would fall.
@@ -80,8 +84,10 @@ class Shapes:
     def at(self, slip: FloatArray) -> FloatArray:
         """Each shape (n, WAVES) over |slip| (n,)."""
         grid = self.largest * np.linspace(0.0, 1.0, GRID) ** 2
-        by_law = np.linalg.lstsq(stribeck(self.law, grid)[1].T, self._waves(grid), rcond=None)[0]
-        return np.asarray(self._waves(slip) - stribeck(self.law, slip)[1].T @ by_law)
+        by_law = np.linalg.lstsq(
+            evaluate_stribeck(self.law, grid)[1].T, self._waves(grid), rcond=None
+        )[0]
+        return np.asarray(self._waves(slip) - evaluate_stribeck(self.law, slip)[1].T @ by_law)
 
     def _waves(self, slip: FloatArray) -> FloatArray:
         place = np.sqrt(np.clip(slip / self.largest, 0.0, 1.0))
@@ -89,7 +95,7 @@ class Shapes:
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
+class Misspecification:
     """An effect that the log shows and the fit leaves out.
 
     `text` says what it is, `corrected` what the fit would have to be given. `moves` (p,) is where
@@ -114,37 +120,37 @@ class LeftOut:
             one = told[name]
             if one.value is None or one.std_total is None or abs(move) <= Z95 * one.std_total:
                 continue
-            value = in_units(one.value + move, one.unit, digits=5)
-            told[name] = doubted(one, f"with {self.corrected} the log gives {value}")
+            value = format_with_unit(one.value + move, one.unit, digits=5)
+            told[name] = reject_identified(one, f"with {self.corrected} the log gives {value}")
         return told
 
     def widened(self, fit: LikelihoodFit, name: str, curve: FrictionCurve) -> FrictionCurve:
         """The curve of an element, its band widened by how far μ would move with the effect."""
         index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
-        change = self.moves[index] @ stribeck(fit.point.values[index], curve.slip)[1]
+        change = self.moves[index] @ evaluate_stribeck(fit.point.values[index], curve.slip)[1]
         if name == self.element:
             change = change + self.beside(curve.slip)
-        return with_systematic_band(curve, np.abs(change))
+        return add_systematic_band(curve, np.abs(change))
 
 
-def left_out(fit: LikelihoodFit) -> Iterator[LeftOut]:
+def run_score_tests(fit: LikelihoodFit) -> Iterator[Misspecification]:
     """All that the log shows of effects the fit leaves out: an output torque or a pressure that is
     late, friction of another shape than Stribeck's."""
-    yield from _torque_told(late_torque(fit))
+    yield from _torque_told(check_torque_delay(fit))
     ending = f".{LAW[-1]}"
     for name in (n.removesuffix(ending) for n in fit.point.names if n.endswith(ending)):
-        yield from _pressure_told(late_pressure(fit, name), name)
+        yield from _pressure_told(check_pressure_delay(fit, name), name)
         shapes = _shapes(fit, name)
-        yield from _shape_told(other_shape(fit, name, shapes), name, shapes)
+        yield from _shape_told(check_friction_shape(fit, name, shapes), name, shapes)
 
 
-def late_torque(fit: LikelihoodFit) -> Step:
+def check_torque_delay(fit: LikelihoodFit) -> ScoreStep:
     """Estimate the delay of the output torque against the speeds [s]; empty without a sensor."""
 
-    def columns(part: Part, run: Trajectory) -> FloatArray:
+    def columns(part: ShiftTerm, run: Trajectory) -> FloatArray:
         rate = np.gradient(run.shaft_torque, run.time)
         shown = [
-            -out.seen(run.time, rate) if out.name == OUTPUT_TORQUE else np.zeros(out.values.size)
+            -out.sample(run.time, rate) if out.name == OUTPUT_TORQUE else np.zeros(out.values.size)
             for out in part.record.outputs
         ]
         return np.concatenate(shown)[:, None]
@@ -152,95 +158,95 @@ def late_torque(fit: LikelihoodFit) -> Step:
     return _step(fit, columns, LATEST)
 
 
-def late_pressure(fit: LikelihoodFit, name: str) -> Step:
+def check_pressure_delay(fit: LikelihoodFit, name: str) -> ScoreStep:
     """Estimate the delay of the measured pressure of an element against its torque [s]."""
 
-    def columns(part: Part, run: Trajectory) -> FloatArray:
-        response, record = part.response(fit.point, run), part.record
+    def columns(part: ShiftTerm, run: Trajectory) -> FloatArray:
+        response, record = part.compute_response(fit.point, run), part.record
         if name not in response.drive:
             return np.zeros((record.size, 1))
         seen = record.pressures[name]
-        steady = local_mean(Sampled(seen.time, seen.values, record.input_sigma[name]))
+        steady = smooth_adaptive(MeasuredSignal(seen.time, seen.values, record.input_sigma[name]))
         rate = np.diff(np.interp(run.time, seen.time, steady)) / np.diff(run.time)
-        return part.seen(fit.point, response.to({name: rate}))[:, None]
+        return part.observe(fit.point, response.propagate_inputs({name: rate}))[:, None]
 
     return _step(fit, columns, LATEST)
 
 
-def other_shape(fit: LikelihoodFit, name: str, shapes: Shapes) -> Step:
+def check_friction_shape(fit: LikelihoodFit, name: str, shapes: Shapes) -> ScoreStep:
     """Estimate the amount of each of `shapes` in the friction of an element."""
 
-    def columns(part: Part, run: Trajectory) -> FloatArray:
-        response = part.response(fit.point, run)
-        contact = contact_of(part, fit.point, run, name)
+    def columns(part: ShiftTerm, run: Trajectory) -> FloatArray:
+        response = part.compute_response(fit.point, run)
+        contact = evaluate_contact(part, fit.point, run, name)
         torques = shapes.at(np.abs(contact.slip)) * contact.per_mu[:, None]
-        answers = [response.forced(contact.forces(one)) for one in torques.T]
-        return np.column_stack([part.seen(fit.point, one) for one in answers])
+        answers = [response.propagate_forces(contact.compute_forces(one)) for one in torques.T]
+        return np.column_stack([part.observe(fit.point, one) for one in answers])
 
     return _step(fit, columns, PLAUSIBLE_MU)
 
 
 def _shapes(fit: LikelihoodFit, name: str) -> Shapes:
     """Shapes beside the law of an element, over the slips at which it carries torque."""
-    slips = [carried_slip(part, fit.point, name) for part in fit.problem.parts]
+    slips = [find_loaded_slips(part, fit.point, name) for part in fit.problem.parts]
     largest = float(np.max(np.concatenate(slips), initial=0.0))
     law = np.array([fit.point[f"{name}.{key}"] for key in LAW])
     return Shapes(law, max(largest, 1.0))
 
 
-def _run(fit: LikelihoodFit, part: Part) -> Trajectory:
-    run = part.run(fit.point)
+def _run(fit: LikelihoodFit, part: ShiftTerm) -> Trajectory:
+    run = part.simulate(fit.point)
     assert run is not None, "a fit can be simulated"
     return run
 
 
 def _step(
-    fit: LikelihoodFit, columns: Callable[[Part, Trajectory], FloatArray], plausible: float
-) -> Step:
+    fit: LikelihoodFit, columns: Callable[[ShiftTerm, Trajectory], FloatArray], plausible: float
+) -> ScoreStep:
     """The step in all unknowns and the amounts of `columns`, about zero by what is `plausible`.
 
     Columns of an unstable run, which has no finite response, tell nothing.
     """
     every = [columns(part, _run(fit, part)) for part in fit.problem.parts]
     every = [one if np.all(np.isfinite(one)) else np.zeros_like(one) for one in every]
-    score = score_of(fit.problem, fit.normal, every)
-    normal = score.beside(fit.normal, np.full(score.pull.size, plausible**-2.0))
-    step = step_of(normal.information, normal.gradient)
+    score = compute_score(fit.problem, fit.normal, every)
+    normal = score.extend_expansion(fit.normal, np.full(score.pull.size, plausible**-2.0))
+    step = solve_step(normal.information, normal.gradient)
     effects = slice(fit.point.values.size, None)
     amounts, moves = step[effects], step[: effects.start]
     fall = float(score.pull @ amounts)
-    noise = max(fit.chi2, 1.0) * covariance_of(normal.information)
-    alone = Step(amounts, noise[effects, effects], moves, fall)
+    noise = max(fit.chi2, 1.0) * invert_information(normal.information)
+    alone = ScoreStep(amounts, noise[effects, effects], moves, fall)
     if not alone.significant:
         return alone
-    spread = spread_of(fit.problem, normal, fit.chi2)
-    return Step(amounts, spread[effects, effects], moves, fall)
+    spread = compute_covariance(fit.problem, normal, fit.chi2)
+    return ScoreStep(amounts, spread[effects, effects], moves, fall)
 
 
-def _delay(found: Step) -> str:
+def _delay(found: ScoreStep) -> str:
     """A delay with its interval, and to which side."""
     side = "late" if found.amounts[0] > 0.0 else "early"
     half = Z95 * found.std[0]
     return f"{1e3 * abs(found.amounts[0]):.1f} ± {1e3 * half:.1f} ms {side}"
 
 
-def _shift(found: Step, channel: str) -> str:
+def _shift(found: ScoreStep, channel: str) -> str:
     """The line of the mapping that takes a delay away."""
     line = f"channels.{channel}.time_shift_s = {-found.amounts[0]:.4f}"
     return f"set {line} in the channel mapping and compare"
 
 
-def _torque_told(found: Step) -> Iterator[LeftOut]:
+def _torque_told(found: ScoreStep) -> Iterator[Misspecification]:
     if not found.significant:
         return
     text = (
         f"the output torque is {_delay(found)} against the speeds, if the model of the shaft "
         f"holds: c_o, ζ and the age of the engine torque hang on it; {_shift(found, OUTPUT_TORQUE)}"
     )
-    yield LeftOut(text, "the output torque in time", found.moves)
+    yield Misspecification(text, "the output torque in time", found.moves)
 
 
-def _pressure_told(found: Step, name: str) -> Iterator[LeftOut]:
+def _pressure_told(found: ScoreStep, name: str) -> Iterator[Misspecification]:
     if not found.significant:
         return
     text = (
@@ -248,10 +254,10 @@ def _pressure_told(found: Step, name: str) -> Iterator[LeftOut]:
         f"friction follows a Stribeck law (Q falls by {found.fall:.0f}): μ and P0 hang on it; "
         f"{_shift(found, f'pressure.{name}')}"
     )
-    yield LeftOut(text, f"the pressure of {name} in time", found.moves)
+    yield Misspecification(text, f"the pressure of {name} in time", found.moves)
 
 
-def _shape_told(found: Step, name: str, shapes: Shapes) -> Iterator[LeftOut]:
+def _shape_told(found: ScoreStep, name: str, shapes: Shapes) -> Iterator[Misspecification]:
     if not found.significant:
         return
     grid = shapes.largest * np.linspace(0.0, 1.0, GRID)
@@ -262,7 +268,7 @@ def _shape_told(found: Step, name: str, shapes: Shapes) -> Iterator[LeftOut]:
         "and P0 hang on it; compare with friction of free shape (examine --friction free), and "
         "check the sensor of that pressure"
     )
-    yield LeftOut(
+    yield Misspecification(
         text,
         f"friction of {name} of free shape",
         found.moves,
@@ -272,7 +278,7 @@ def _shape_told(found: Step, name: str, shapes: Shapes) -> Iterator[LeftOut]:
 
 
 @dataclass(frozen=True, eq=False)
-class Score:
+class ScoreSums:
     """Sums over all parts for q columns Z of the outputs, with J and r those of the fit.
 
     `own` (q, q) is ZᵀΣ⁻¹Z, `cross` (p, q) JᵀΣ⁻¹Z and `pull` (q,) ZᵀΣ⁻¹r; `weighted` (n, q) is
@@ -285,9 +291,9 @@ class Score:
     pull: FloatArray
     weighted: tuple[FloatArray, ...]
 
-    def beside(
-        self, minimum: Normal, precision: FloatArray, known: FloatArray | float = 0.0
-    ) -> Normal:
+    def extend_expansion(
+        self, minimum: NormalEquations, precision: FloatArray, known: FloatArray | float = 0.0
+    ) -> NormalEquations:
         """The expansion at a `minimum` with the effects as q more unknowns, behind its own.
 
         Of these `precision` (q,) is known beforehand, about zero, from which they are `known` (q,)
@@ -307,7 +313,9 @@ class Score:
         )
 
 
-def score_of(problem: Problem, normal: Normal, columns: Sequence[FloatArray]) -> Score:
+def compute_score(
+    problem: LikelihoodObjective, normal: NormalEquations, columns: Sequence[FloatArray]
+) -> ScoreSums:
     """Score of `columns` (n, q) of each part at the point of the expansion `normal`."""
     size = columns[0].shape[1]
     own, cross = np.zeros((size, size)), np.zeros((normal.gradient.size, size))
@@ -315,9 +323,9 @@ def score_of(problem: Problem, normal: Normal, columns: Sequence[FloatArray]) ->
     for part, z, residual, regressors in zip(
         problem.parts, columns, normal.residuals, normal.regressors, strict=True
     ):
-        weighted = part.weighting.weighted(z)
+        weighted = part.weighting.apply_inverse(z)
         own += z.T @ weighted
         cross += regressors.T @ z
         pull += weighted.T @ residual
         every.append(weighted)
-    return Score(own, cross, pull, tuple(every))
+    return ScoreSums(own, cross, pull, tuple(every))

@@ -14,12 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.coloured_noise import BLOCK, block_means, white_of
+from drivetwin.estimation.likelihood.coloured_noise import (
+    BLOCK,
+    compute_block_means,
+    split_whitened,
+)
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.simulation.dual_clutch import Signal
 
-EXCESS = 1.6
+MAX_EXCESS_POWER = 1.6
 """Power of block means over that of white noise above which a warning is due."""
 SIGNIFICANT = 5.0
 """Correlation with an input, in standard deviations of that of noise, from which it is no chance:
@@ -41,7 +45,7 @@ class ResidualTest:
         """Warnings of the test, as sentences."""
         name = self.output.replace("_", " ")
         texts = []
-        if self.excess > EXCESS:
+        if self.excess > MAX_EXCESS_POWER:
             texts.append(
                 f"the residual of the {name} is not white: over {1e3 * BLOCK:.0f} ms it has "
                 f"{self.excess:.1f} times the power of noise, which widens intervals; the noise of "
@@ -55,7 +59,9 @@ class ResidualTest:
         return tuple(texts)
 
 
-def white_residuals(fit: LikelihoodFit) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
+def compute_white_residuals(
+    fit: LikelihoodFit,
+) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
     """Return times (n,) and normalised residuals (n,), input noise removed, by shift and output.
 
     Of a right model they are white with variance one, or less where input noise explains a part.
@@ -63,26 +69,26 @@ def white_residuals(fit: LikelihoodFit) -> dict[str, dict[str, tuple[FloatArray,
     return {
         part.structure.label: {
             out.name: (part.record.time[out.place], white)
-            for out, _, white in white_of(part, residual)
+            for out, _, white in split_whitened(part, residual)
         }
         for part, residual in zip(fit.problem.parts, fit.normal.residuals, strict=True)
     }
 
 
-def residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
+def run_residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
     """Test every output by label of the shift."""
     found = {}
-    for part, outputs in zip(fit.problem.parts, white_residuals(fit).values(), strict=True):
+    for part, outputs in zip(fit.problem.parts, compute_white_residuals(fit).values(), strict=True):
         inputs = {TORQUE: part.record.engine_torque} | {
             f"pressure of {name}": signal for name, signal in part.record.pressures.items()
         }
         found[part.structure.label] = tuple(
-            _test(name, time, white, inputs) for name, (time, white) in outputs.items()
+            _run_test(name, time, white, inputs) for name, (time, white) in outputs.items()
         )
     return found
 
 
-def against(fit: LikelihoodFit) -> str:
+def describe_contradiction(fit: LikelihoodFit) -> str:
     """Return why the residuals contradict every value of the fit; empty if they do not.
 
     Noise is correlated with no input, unless it is as slow as the log is long. A correlated
@@ -91,7 +97,7 @@ def against(fit: LikelihoodFit) -> str:
     """
     found = {
         (test.output, source): abs(size)
-        for tests in residual_tests(fit).values()
+        for tests in run_residual_tests(fit).values()
         for test in tests
         for source, size in test.correlation.items()
     }
@@ -105,7 +111,7 @@ def against(fit: LikelihoodFit) -> str:
     )
 
 
-def unweighted(fit: LikelihoodFit, labels: Sequence[str]) -> str:
+def describe_unweighted(fit: LikelihoodFit, labels: Sequence[str]) -> str:
     """Return a warning if the weighting of a part omits the noise of the inputs; else empty.
 
     That is the case if a run has no finite response to the noise. `labels` are those of the shifts.
@@ -123,10 +129,10 @@ def unweighted(fit: LikelihoodFit, labels: Sequence[str]) -> str:
     )
 
 
-def _test(
+def _run_test(
     name: str, time: FloatArray, white: FloatArray, inputs: dict[str, Signal]
 ) -> ResidualTest:
-    _, means = block_means(time, white)
+    _, means = compute_block_means(time, white)
     excess = float(np.mean(means**2) / np.mean(white**2))
     correlation = {}
     for source, signal in inputs.items():

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Record
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Trajectory
 
 BoolArray = NDArray[np.bool_]
@@ -32,7 +32,7 @@ STATES = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class LinearResponse:
     """Discrete linear response on a time grid of N points.
 
     `transition` (N-1, 4, 4) takes z from one point to the next; `drive` (N-1, 4) by input name is
@@ -45,7 +45,7 @@ class Response:
     drive: dict[str, FloatArray]
     effect: FloatArray
 
-    def to(self, disturbance: dict[str, FloatArray]) -> FloatArray:
+    def propagate_inputs(self, disturbance: dict[str, FloatArray]) -> FloatArray:
         """Compute z (N, 4) for disturbances (N-1,) of inputs by name, from z = 0.
 
         Not finite where the run itself is unstable, as with a law that falls steeply with slip.
@@ -55,17 +55,17 @@ class Response:
         push = np.zeros_like(next(iter(self.drive.values())))
         for name, values in disturbance.items():
             push += self.drive[name] * values[:, None]
-        return self.pushed(push)
+        return self.propagate(push)
 
-    def forced(self, force: FloatArray) -> FloatArray:
+    def propagate_forces(self, force: FloatArray) -> FloatArray:
         """Compute z (N, 4) for forces (N-1, 4) on the speeds, the last column 0."""
-        return self.pushed(np.einsum("kij,kj->ki", self.effect, force))
+        return self.propagate(np.einsum("kij,kj->ki", self.effect, force))
 
-    def pushed(self, push: FloatArray) -> FloatArray:
+    def propagate(self, push: FloatArray) -> FloatArray:
         """Compute z (N, 4) for changes `push` (N-1, 4) over the steps, from z = 0."""
-        return self.pushed_each(push[:, :, None])[:, :, 0]
+        return self.propagate_columns(push[:, :, None])[:, :, 0]
 
-    def pushed_each(self, push: FloatArray) -> FloatArray:
+    def propagate_columns(self, push: FloatArray) -> FloatArray:
         """Compute z (N, 4, q) for q changes `push` (N-1, 4, q) over the steps, from z = 0."""
         start = np.zeros((1, *push.shape[1:]))
         pushed = np.concatenate([start, push])
@@ -77,8 +77,10 @@ class Response:
             return np.full_like(pushed, np.inf)
         return np.asarray(z.reshape(pushed.shape))
 
-    def pulled_each(self, pull: FloatArray) -> FloatArray:
-        """Apply the transpose of `pushed_each`: (N-1, 4, q) from weights `pull` (N, 4, q) on z."""
+    def propagate_adjoint(self, pull: FloatArray) -> FloatArray:
+        """Apply the transpose of `propagate_columns`: (N-1, 4, q) from weights `pull` (N, 4, q) on
+        z.
+        """
         lower, count = self._banded, len(pull) * STATES
         upper = np.zeros_like(lower)
         for below, diagonal in enumerate(lower):
@@ -88,7 +90,7 @@ class Response:
             back = solve_banded((0, 2 * STATES - 1), upper, columns, check_finite=False)
         return np.asarray(back.reshape(pull.shape)[1:])
 
-    def fed_back(self, slope: FloatArray) -> Response:
+    def apply_torque_feedback(self, slope: FloatArray) -> LinearResponse:
         """The response where the engine torque follows the engine speed by `slope` (N-1,)
         [N m s/rad], over each step by the mean of the speed at both its ends."""
         half = 0.5 * slope[:, None] * self.drive[TORQUE]
@@ -118,18 +120,18 @@ class Response:
         return bool(np.all(np.isfinite(self.transition)))
 
 
-def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
+def linearise_run(model: DualClutch, run: Trajectory, record: ShiftRecord) -> LinearResponse:
     """Linearise around `run`, simulated on the record's grid."""
     time = run.time
     step = np.diff(time)
     middle = 0.5 * (time[1:] + time[:-1])
-    locked = {one.name: _locked(run, one.name, middle) for one in model.elements}
-    driving = _driving(model, run)
+    locked = {one.name: _find_locked(run, one.name, middle) for one in model.elements}
+    driving = _find_driving(model, run)
     free = np.zeros((step.size, STATES, STATES))
-    free += _shaft(model)
+    free += _build_shaft_matrix(model)
     torque = np.zeros((step.size, STATES))
-    for way, inside in _ways(driving):
-        torque[inside, 0] = model.efficiency(driving=way)
+    for way, inside in _iterate_directions(driving):
+        torque[inside, 0] = model.get_efficiency(driving=way)
     force = {TORQUE: torque}
     for one in model.elements:
         if one.name not in record.pressures:
@@ -137,24 +139,24 @@ def response_of(model: DualClutch, run: Trajectory, record: Record) -> Response:
         signal = record.pressures[one.name]
         pressure = np.interp(middle, signal.time, signal.values)
         slip = 0.5 * (run.slip[one.name][1:] + run.slip[one.name][:-1])
-        stiffness, gain = _friction(one, slip, pressure)
+        stiffness, gain = _linearise_friction(one, slip, pressure)
         sliding = ~locked[one.name]
-        g = direction(model, one)
+        g = build_slip_row(model, one)
         free -= (stiffness * sliding)[:, None, None] * np.outer(g, g)
         force[one.name] = -(gain * sliding)[:, None] * g
-    inverse = _accelerating(model, locked, driving)
+    inverse = _build_acceleration(model, locked, driving)
     rate = inverse @ free
     rate[:, 3] = (0.0, 1.0, -model.i_f, 0.0)
     with np.errstate(over="ignore", invalid="ignore"):
-        transition, mean = exponential(rate * step[:, None, None])
+        transition, mean = compute_exponential(rate * step[:, None, None])
     effect = mean @ inverse * step[:, None, None]
-    for k, jump in _jumps(model, run, driving):
+    for k, jump in _iterate_jumps(model, run, driving):
         transition[k], effect[k] = jump @ transition[k], jump @ effect[k]
     drive = {name: np.einsum("kij,kj->ki", effect, f) for name, f in force.items()}
-    return Response(step, transition, drive, effect)
+    return LinearResponse(step, transition, drive, effect)
 
 
-def observed(model: DualClutch, name: str) -> FloatArray:
+def build_output_row(model: DualClutch, name: str) -> FloatArray:
     """Row (4,) that gives a compared signal from the state."""
     rows = {
         "output_torque": (0.0, model.c_o, -model.c_o * model.i_f, model.k_o),
@@ -165,7 +167,7 @@ def observed(model: DualClutch, name: str) -> FloatArray:
     return np.array(rows[name])
 
 
-def exponential(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+def compute_exponential(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
 
     Taylor's series of an eighth, doubled three times.
@@ -183,28 +185,28 @@ def exponential(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(result), np.asarray(mean)
 
 
-def direction(model: DualClutch, one: ShiftElement) -> FloatArray:
+def build_slip_row(model: DualClutch, one: ShiftElement) -> FloatArray:
     """Slip of an element as a row (4,) of the state: ω_in/i_c - i_out·ω_out (eq. 15)."""
     return np.array([1.0 / (model.i_in * one.i_c), -one.i_out, 0.0, 0.0])
 
 
-def _shaft(model: DualClutch) -> FloatArray:
+def _build_shaft_matrix(model: DualClutch) -> FloatArray:
     """Forces (4, 4) of the shaft on (ω_e, ω_out, ω_w): -T_o on the output, i_f·T_o at the wheel."""
-    return np.outer([0.0, -1.0, model.i_f, 0.0], observed(model, "output_torque"))
+    return np.outer([0.0, -1.0, model.i_f, 0.0], build_output_row(model, "output_torque"))
 
 
-def _friction(
+def _linearise_friction(
     one: ShiftElement, slip: FloatArray, pressure: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Derivatives of the sliding torque by slip and by pressure, (n,) each."""
     above = np.maximum(pressure - one.P0, 0.0) * one.gain
-    mu = one.friction.at(slip)
+    mu = one.friction.evaluate(slip)
     small = 1e-3
-    bend = (one.friction.at(np.abs(slip) + small) - mu) / small
+    bend = (one.friction.evaluate(np.abs(slip) + small) - mu) / small
     return bend * above, mu * one.gain * np.sign(slip) * (above > 0.0)
 
 
-def _locked(run: Trajectory, name: str, middle: FloatArray) -> BoolArray:
+def _find_locked(run: Trajectory, name: str, middle: FloatArray) -> BoolArray:
     """Return a mask (n,) of the instants `middle` (n,) at which the element is locked."""
     state = np.abs(run.slip[name][0]) < 1e-9
     result = np.full(middle.size, state)
@@ -214,7 +216,7 @@ def _locked(run: Trajectory, name: str, middle: FloatArray) -> BoolArray:
     return result
 
 
-def _driving(model: DualClutch, run: Trajectory) -> BoolArray:
+def _find_driving(model: DualClutch, run: Trajectory) -> BoolArray:
     """Return a mask (N-1,) of the steps in which power flows from the engine (two-sided loss law).
 
     φ(T_g) is what the input side and the elements take; its sign is that of T_g.
@@ -224,43 +226,45 @@ def _driving(model: DualClutch, run: Trajectory) -> BoolArray:
     for one in model.elements:
         torque, slip = run.clutch_torque[one.name], run.slip[one.name]
         carried = 0.5 * (torque[1:] + torque[:-1]) + one.drum_inertia * np.diff(slip) / step
-        taken += direction(model, one)[0] * carried
+        taken += build_slip_row(model, one)[0] * carried
     return np.asarray(taken >= 0.0)
 
 
-def _ways(driving: BoolArray) -> tuple[tuple[bool, BoolArray], tuple[bool, BoolArray]]:
+def _iterate_directions(
+    driving: BoolArray,
+) -> tuple[tuple[bool, BoolArray], tuple[bool, BoolArray]]:
     """Both ways of the power, and where (n,) it flows so."""
     return (True, driving), (False, ~driving)
 
 
-def _inverse_mass(model: DualClutch, driving: bool) -> FloatArray:
+def _invert_mass(model: DualClutch, driving: bool) -> FloatArray:
     """Accelerations per force (4, 4) with no element locked."""
-    engine = model.J1 * model.efficiency(driving=driving) + model.J2e
+    engine = model.J1 * model.get_efficiency(driving=driving) + model.J2e
     mass = np.diag([engine, model.J_out, model.J_v, 1.0])
     for one in model.elements:
-        g = direction(model, one)
+        g = build_slip_row(model, one)
         mass += one.drum_inertia * np.outer(g, g)
     inverse = np.asarray(np.linalg.inv(mass), dtype=np.float64)
     inverse[3] = 0.0
     return inverse
 
 
-def _accelerating(
+def _build_acceleration(
     model: DualClutch, locked: dict[str, BoolArray], driving: BoolArray
 ) -> FloatArray:
     """Accelerations per force (n, 4, 4), without those along the slip of locked elements."""
     result = np.empty((driving.size, STATES, STATES))
-    for way, inside in _ways(driving):
-        inverse = _inverse_mass(model, way)
+    for way, inside in _iterate_directions(driving):
+        inverse = _invert_mass(model, way)
         result[inside] = inverse
         for one in model.elements:
-            g = direction(model, one)
+            g = build_slip_row(model, one)
             along = inverse @ g
             result[inside & locked[one.name]] -= np.outer(along, along) / (g @ along)
     return result
 
 
-def _jumps(
+def _iterate_jumps(
     model: DualClutch, run: Trajectory, driving: BoolArray
 ) -> Iterator[tuple[int, FloatArray]]:
     """(step, saltation (4, 4)) of every lock: z moves by the change of acceleration times δt."""
@@ -268,8 +272,8 @@ def _jumps(
         if event.kind != "lock":
             continue
         one = next(e for e in model.elements if e.name == event.element)
-        g = direction(model, one)
+        g = build_slip_row(model, one)
         k = int(np.searchsorted(run.time, event.time)) - 1
         if 0 <= k < run.time.size - 1:
-            along = _inverse_mass(model, bool(driving[k])) @ g
+            along = _invert_mass(model, bool(driving[k])) @ g
             yield k, np.eye(STATES) - np.outer(along, g) / (g @ along)

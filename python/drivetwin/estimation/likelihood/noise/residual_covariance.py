@@ -31,11 +31,15 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Record
-from drivetwin.estimation.likelihood.noise.linear_response import STATES, Response, observed
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
+from drivetwin.estimation.likelihood.noise.linear_response import (
+    STATES,
+    LinearResponse,
+    build_output_row,
+)
 from drivetwin.simulation.dual_clutch import DualClutch
 
-QUIET = 1e-4
+MIN_PROCESS_NOISE = 1e-4
 """Process noise per step given to every state, as a share of a sensor's noise: W stays finite and
 the random walk over a log stays below what the sensors show of the state."""
 
@@ -49,34 +53,34 @@ class NoisePath:
     S (N-1, n), None where no input has the noise of an output.
     """
 
-    response: Response
+    response: LinearResponse
     power: dict[str, FloatArray]
     inverse: FloatArray
     seen: csr_array
     factor: FloatArray
     share: csr_array | None = None
 
-    def freed(self, columns: FloatArray) -> FloatArray:
+    def remove_feedback(self, columns: FloatArray) -> FloatArray:
         """Remove from residual columns (n, q) the effect of output noise through a computed
         torque."""
         if self.share is None:
             return columns
         push = self.response.drive[TORQUE][:, :, None] * (self.share @ columns)[:, None, :]
-        z = self.response.pushed_each(push)
+        z = self.response.propagate_columns(push)
         return np.asarray(columns + self.seen @ z.reshape(-1, columns.shape[1]))
 
-    def bound(self, columns: FloatArray) -> FloatArray:
+    def apply_adjoint_feedback(self, columns: FloatArray) -> FloatArray:
         """Apply the transpose of `freed` to columns (n, q)."""
         if self.share is None:
             return columns
         pull = self.seen.T @ columns
-        back = self.response.pulled_each(pull.reshape(-1, STATES, columns.shape[1]))
+        back = self.response.propagate_adjoint(pull.reshape(-1, STATES, columns.shape[1]))
         torque = np.einsum("ki,kiq->kq", self.response.drive[TORQUE], back)
         return np.asarray(columns + self.share.T @ torque)
 
 
 @dataclass(frozen=True, eq=False)
-class Whiteness:
+class Whitener:
     """Weighting of residuals (n,) by the inverse of their covariance.
 
     `path` describes the input noise; None where the outputs' noise counts alone.
@@ -94,24 +98,24 @@ class Whiteness:
         of_steps = np.linalg.slogdet(self.path.inverse).logabsdet
         return total + 2.0 * float(np.sum(np.log(self.path.factor[0]))) - float(np.sum(of_steps))
 
-    def weighted(self, columns: FloatArray) -> FloatArray:
+    def apply_inverse(self, columns: FloatArray) -> FloatArray:
         """Compute Σ⁻¹·columns, (n,) or (n, q)."""
         each = columns.reshape(len(columns), -1)
-        weighted = (each - self.driven(each)) / self.variance[:, None]
+        weighted = (each - self.estimate_input_part(each)) / self.variance[:, None]
         if self.path is not None:
-            weighted = self.path.bound(weighted)
+            weighted = self.path.apply_adjoint_feedback(weighted)
         return weighted.reshape(columns.shape)
 
-    def driven(self, columns: FloatArray) -> FloatArray:
+    def estimate_input_part(self, columns: FloatArray) -> FloatArray:
         """Compute the part of residual columns (n,) or (n, q) that input noise explains best."""
         if self.path is None:
             return np.zeros_like(columns)
         each = columns.reshape(len(columns), -1)
-        free = self.path.freed(each)
-        driven = (each - free) + self.path.seen @ self._state(self.path, free)
+        free = self.path.remove_feedback(each)
+        driven = (each - free) + self.path.seen @ self._estimate_state(self.path, free)
         return np.asarray(driven.reshape(columns.shape))
 
-    def input_noise(self, residual: FloatArray) -> dict[str, FloatArray]:
+    def estimate_input_noise(self, residual: FloatArray) -> dict[str, FloatArray]:
         """Compute the expected noise (N-1,) of every input per step, by name, given the residual
         (n,).
 
@@ -119,8 +123,8 @@ class Whiteness:
         """
         if self.path is None:
             return {}
-        free = self.path.freed(residual[:, None])[:, 0]
-        state = self._state(self.path, free)
+        free = self.path.remove_feedback(residual[:, None])[:, 0]
+        state = self._estimate_state(self.path, free)
         z = state.reshape(-1, STATES)
         w = z[1:] - np.einsum("kij,kj->ki", self.path.response.transition, z[:-1])
         pull = np.einsum("kij,kj->ki", self.path.inverse[1:], w)
@@ -132,49 +136,49 @@ class Whiteness:
             noise[TORQUE] += self.path.share @ (free - self.path.seen @ state)
         return noise
 
-    def _state(self, path: NoisePath, columns: FloatArray) -> FloatArray:
+    def _estimate_state(self, path: NoisePath, columns: FloatArray) -> FloatArray:
         """Expected disturbance of the state (4N,) or (4N, q), given residual columns."""
         variance = self.variance if columns.ndim == 1 else self.variance[:, None]
         pull = path.seen.T @ (columns / variance)
         return np.asarray(cho_solve_banded((path.factor, True), pull, check_finite=False))
 
 
-def sensor_noise(record: Record) -> Whiteness:
+def build_sensor_whitener(record: ShiftRecord) -> Whitener:
     """Build the weighting by the sensors' noise alone."""
-    return Whiteness(record.sigma**2)
+    return Whitener(record.sigma**2)
 
 
-def with_input_noise(model: DualClutch, record: Record, response: Response) -> Whiteness:
+def add_input_noise(model: DualClutch, record: ShiftRecord, response: LinearResponse) -> Whitener:
     """Build the weighting that includes the noise of engine torque and pressures."""
-    share = record.torque_share()
+    share = record.compute_torque_share()
     if share is not None:
-        response = response.fed_back(np.asarray(share.sum(axis=1)))
-    power = _power(record, response)
-    inverse = _inverse(_process(model, record, response, power))
+        response = response.apply_torque_feedback(np.asarray(share.sum(axis=1)))
+    power = _compute_input_power(record, response)
+    inverse = _invert_process_noise(_compute_process_noise(model, record, response, power))
     factor = cholesky_banded(
-        _information(inverse, response.transition, model, record),
+        _build_information(inverse, response.transition, model, record),
         overwrite_ab=True,
         lower=True,
         check_finite=False,
     )
-    path = NoisePath(response, power, inverse, _seen(model, record), factor, share)
-    return Whiteness(record.sigma**2, path)
+    path = NoisePath(response, power, inverse, _build_observation(model, record), factor, share)
+    return Whitener(record.sigma**2, path)
 
 
-def _power(record: Record, response: Response) -> dict[str, FloatArray]:
+def _compute_input_power(record: ShiftRecord, response: LinearResponse) -> dict[str, FloatArray]:
     """Compute the variance (N-1,) of an input's noise, constant over each step, by name."""
     found = {}
     middle = 0.5 * (record.time[1:] + record.time[:-1])
     for name in response.drive:
         signal = record.engine_torque if name == TORQUE else record.pressures[name]
         between = float(np.median(np.diff(signal.time)))
-        variance = np.interp(middle, signal.time, record.variance_of(name))
+        variance = np.interp(middle, signal.time, record.compute_variance(name))
         found[name] = variance * between / response.step
     return found
 
 
-def _process(
-    model: DualClutch, record: Record, response: Response, power: dict[str, FloatArray]
+def _compute_process_noise(
+    model: DualClutch, record: ShiftRecord, response: LinearResponse, power: dict[str, FloatArray]
 ) -> FloatArray:
     """Compute the process noise (N, 4, 4) between successive grid points; the first is that of the
     start.
@@ -186,7 +190,7 @@ def _process(
     wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
     impedance = float(np.sqrt(model.k_o * model.J_out))
     torque = sigma.get("output_torque", impedance * sigma["output_speed"])
-    quiet = QUIET * np.array(
+    quiet = MIN_PROCESS_NOISE * np.array(
         [sigma["engine_speed"], sigma["output_speed"], wheel, torque / model.k_o]
     )
     noise = np.zeros((record.time.size, STATES, STATES)) + np.diag(quiet**2)
@@ -195,7 +199,7 @@ def _process(
     return noise
 
 
-def _inverse(noise: FloatArray) -> FloatArray:
+def _invert_process_noise(noise: FloatArray) -> FloatArray:
     """Invert process noise (N, 4, 4), whose first entry is the quiet one.
 
     Formed in units of that: where states are counted in units of so different size, the digits of
@@ -207,8 +211,8 @@ def _inverse(noise: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (inverse + inverse.transpose(0, 2, 1)) / units)
 
 
-def _information(
-    inverse: FloatArray, transition: FloatArray, model: DualClutch, record: Record
+def _build_information(
+    inverse: FloatArray, transition: FloatArray, model: DualClutch, record: ShiftRecord
 ) -> FloatArray:
     """Compute P⁻¹ + Hᵀ R⁻¹ H in lower banded storage (8, 4N)."""
     count = record.time.size
@@ -216,7 +220,7 @@ def _information(
     diagonal = inverse.copy()
     diagonal[:-1] += transition.transpose(0, 2, 1) @ through
     for out in record.outputs:
-        row = observed(model, out.name)
+        row = build_output_row(model, out.name)
         np.add.at(diagonal, out.centre, np.outer(row, row) / out.sigma**2)
     banded = np.zeros((2 * STATES, STATES * count))
     for i in range(STATES):
@@ -227,11 +231,11 @@ def _information(
     return banded
 
 
-def _seen(model: DualClutch, record: Record) -> csr_array:
+def _build_observation(model: DualClutch, record: ShiftRecord) -> csr_array:
     """Build the observation matrix H (compared samples, 4N)."""
     data, columns, count = [], [], 0
     for out in record.outputs:
-        data.append(np.tile(observed(model, out.name), out.centre.size))
+        data.append(np.tile(build_output_row(model, out.name), out.centre.size))
         columns.append((STATES * out.centre[:, None] + np.arange(STATES)).ravel())
         count += out.centre.size
     start = np.arange(count + 1) * STATES

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin._util.progress import part
+from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.likelihood.budget import REMEDY, OutOfWork
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, spread_of
-from drivetwin.estimation.likelihood.objective import Problem
-from drivetwin.estimation.likelihood.optimize.staged_start import staged
-from drivetwin.estimation.optimize.gauss_newton import Found, minimise
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.budget import REMEDY, BudgetExceeded
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.optimize.staged_start import find_staged_start
+from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.shifts.shift import Shift
 
 
@@ -59,13 +59,13 @@ _FAILED = (
 )
 
 
-class Hopeless(IdentificationError):
+class NoConvergence(IdentificationError):
     """No start leads near the measurement, for any sampling mode of the signals."""
 
 
-def fit(
-    problem: Problem,
-    start: Point,
+def fit_multistart(
+    problem: LikelihoodObjective,
+    start: ParameterVector,
     shifts: Sequence[Shift],
     thorough: bool = True,
     restarts: Sequence[float] = MULTI_START.shaft_factors,
@@ -74,29 +74,32 @@ def fit(
 
     Unless `thorough` the first plausible minimum is taken, good or not. `restarts` are factors on
     the shaft's stiffness, the first of them 1.
-    Raises IdentificationError where no minimum is plausible, Hopeless where none is near.
+    Raises IdentificationError where no minimum is plausible, NoConvergence where none is near.
     """
-    best = _best_of(_attempts(problem, start, shifts, restarts), thorough=thorough)
+    best = _select_best(_iterate_attempts(problem, start, shifts, restarts), thorough=thorough)
     if best is None:
         raise IdentificationError(*_FAILED)
     return best
 
 
-def checked(
-    known: LikelihoodFit, problem: Problem, start: Point, shifts: Sequence[Shift]
+def refine(
+    known: LikelihoodFit,
+    problem: LikelihoodObjective,
+    start: ParameterVector,
+    shifts: Sequence[Shift],
 ) -> LikelihoodFit:
     """Try other starts than the one that led to `known`; return the best fit."""
-    return _best_of(_other_attempts(problem, start, shifts), known) or known
+    return _select_best(_iterate_other_attempts(problem, start, shifts), known) or known
 
 
-def _best_of(
+def _select_best(
     attempts: Iterator[LikelihoodFit | None],
     best: LikelihoodFit | None = None,
     thorough: bool = True,
 ) -> LikelihoodFit | None:
     """Return the best attempt, `best` included: a good one, or one that is found twice."""
     try:
-        for found in _told(attempts):
+        for found in _report_progress(attempts):
             if found is None:
                 continue
             if best is not None and abs(found.chi2 - best.chi2) < MULTI_START.same_chi2:
@@ -105,18 +108,18 @@ def _best_of(
                 best = found
             if best.chi2 < MULTI_START.accept_chi2 or not thorough:
                 return best
-    except OutOfWork:
+    except BudgetExceeded:
         if best is None:
             raise
     return best
 
 
-def _told(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | None]:
+def _report_progress(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | None]:
     """Report progress over the attempts; each counts as half of the remaining work, because
     their number is not known in advance."""
     done = 0.0
     while True:
-        with part(done, 0.5 + 0.5 * done):
+        with scale_progress(done, 0.5 + 0.5 * done):
             try:
                 found = next(attempts)
             except StopIteration:
@@ -125,70 +128,78 @@ def _told(attempts: Iterator[LikelihoodFit | None]) -> Iterator[LikelihoodFit | 
         yield found
 
 
-def _attempts(
-    problem: Problem, start: Point, shifts: Sequence[Shift], restarts: Sequence[float]
+def _iterate_attempts(
+    problem: LikelihoodObjective,
+    start: ParameterVector,
+    shifts: Sequence[Shift],
+    restarts: Sequence[float],
 ) -> Iterator[LikelihoodFit | None]:
     """Yield fits from `start` and from points near it, the most promising first.
 
-    Raises Hopeless where the first of these show that none will do.
+    Raises NoConvergence where the first of these show that none will do.
     """
     if _is_near(problem, start):
-        direct = nearest(problem, start)
+        direct = fit_local(problem, start)
         yield direct
         restarts = restarts if direct is None else restarts[:1]
-    led = yield from _by_stages(problem, start, shifts, restarts)
+    led = yield from _iterate_staged_starts(problem, start, shifts, restarts)
     if not led and len(restarts) >= MULTI_START.min_starts:
-        raise Hopeless(*_FAILED)
+        raise NoConvergence(*_FAILED)
 
 
-def _other_attempts(
-    problem: Problem, start: Point, shifts: Sequence[Shift]
+def _iterate_other_attempts(
+    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
 ) -> Iterator[LikelihoodFit | None]:
     """Yield fits by stages, without the start that `_attempts` began with."""
     restarts = (
         MULTI_START.shaft_factors[:1] if _is_near(problem, start) else MULTI_START.shaft_factors[1:]
     )
-    yield from _by_stages(problem, start, shifts, restarts)
+    yield from _iterate_staged_starts(problem, start, shifts, restarts)
 
 
-def _is_near(problem: Problem, start: Point) -> bool:
+def _is_near(problem: LikelihoodObjective, start: ParameterVector) -> bool:
     """Return whether the direct search comes first."""
-    return problem.weighted_by(start).cost(start) < MULTI_START.direct_chi2 * problem.size
+    return problem.update_weighting(start).cost(start) < MULTI_START.direct_chi2 * problem.size
 
 
-def _by_stages(
-    problem: Problem, start: Point, shifts: Sequence[Shift], restarts: Sequence[float]
+def _iterate_staged_starts(
+    problem: LikelihoodObjective,
+    start: ParameterVector,
+    shifts: Sequence[Shift],
+    restarts: Sequence[float],
 ) -> Generator[LikelihoodFit | None, None, bool]:
     """Yield fits from staged starts; return whether any of them came near the measurement."""
-    doubtful: list[Found[Problem]] = []
+    doubtful: list[OptimizeResult[LikelihoodObjective]] = []
     promising = 0
     for tried, shaft in enumerate(restarts, 1):
         factor = [shaft if name == "k_o" else 1.0 for name in start.names]
-        near = staged(problem, start.moved(start.values * np.array(factor)), shifts)
+        near = find_staged_start(
+            problem, start.replace_values(start.values * np.array(factor)), shifts
+        )
         if near is None:
             yield None
         elif _is_doubtful(problem, near):
             doubtful.append(near)
         else:
             promising += 1
-            yield nearest(problem, near.point)
+            yield fit_local(problem, near.point)
         if tried == MULTI_START.min_starts and promising == 0:
             break
     if doubtful:
-        yield nearest(problem, min(doubtful, key=lambda one: one.normal.cost).point)
+        yield fit_local(problem, min(doubtful, key=lambda one: one.normal.cost).point)
     return promising > 0 or bool(doubtful)
 
 
-def _is_doubtful(problem: Problem, near: Found[Problem]) -> bool:
+def _is_doubtful(problem: LikelihoodObjective, near: OptimizeResult[LikelihoodObjective]) -> bool:
     """Return whether a staged start ended too far from the measurement for the right minimum."""
     if near.normal.cost <= MULTI_START.doubtful_chi2 * problem.size:
         return False
-    with_inputs = problem.weighted_by(near.point)
+    with_inputs = problem.update_weighting(near.point)
     return with_inputs.cost(near.point) > MULTI_START.doubtful_input_chi2 * problem.size
 
 
-def nearest(
-    problem: Problem, start: Point, most: float = MULTI_START.far_chi2
+def fit_local(
+    problem: LikelihoodObjective, start: ParameterVector, most: float = MULTI_START.far_chi2
 ) -> LikelihoodFit | None:
     """Find the local minimum of Q with input noise; None if Q per sample stays above `most`.
 
@@ -196,35 +207,37 @@ def nearest(
     inputs expected at the minimum. Formed elsewhere they would explain a wrong model away.
     """
     limit = most * problem.size
-    found = minimise(problem, start, lambda _, point: problem.weighted_by(point), limit=limit)
+    found = minimise(problem, start, lambda _, point: problem.update_weighting(point), limit=limit)
     if found is None or found.normal.cost > limit:
         return None
-    found = _over_inputs(problem, found, limit)
+    found = _fit_inputs(problem, found, limit)
     if found is None:
         return None
-    chi2 = (found.normal.cost - problem.prior.cost(found.point.values)) / problem.size
+    chi2 = (found.normal.cost - problem.prior.compute_prior_cost(found.point.values)) / problem.size
     if chi2 > MULTI_START.plausible_chi2:
         return None
-    covariance = spread_of(found.problem, found.normal, chi2)
+    covariance = compute_covariance(found.problem, found.normal, chi2)
     point, count = found.point, found.iterations
     return LikelihoodFit(found.problem, point, point, covariance, found.normal, chi2, count)
 
 
-def _over_inputs(problem: Problem, found: Found[Problem], limit: float) -> Found[Problem] | None:
+def _fit_inputs(
+    problem: LikelihoodObjective, found: OptimizeResult[LikelihoodObjective], limit: float
+) -> OptimizeResult[LikelihoodObjective] | None:
     """Find the joint minimum over unknowns and inputs, from the one with the measured inputs.
 
     Where an element slips at a pressure that is steady but for its noise, that noise seems to tell
     μ from P0: the inputs expected at one minimum then lead to another, and so on. None where the
     first search does not end. `iterations` counts those of all searches.
     """
-    joint: Found[Problem] | None = None
-    expected = found.problem.with_expected_inputs(found.point)
+    joint: OptimizeResult[LikelihoodObjective] | None = None
+    expected = found.problem.update_inputs(found.point)
     for _ in range(MULTI_START.max_input_rounds):
         following = minimise(expected, found.point, limit=limit)
         if following is None or not following.converged:
             break
         joint = found = replace(following, iterations=found.iterations + following.iterations)
-        expected = problem.weighted_by(found.point).with_expected_inputs(found.point)
+        expected = problem.update_weighting(found.point).update_inputs(found.point)
         if found.normal.cost - expected.cost(found.point) < MULTI_START.min_input_decrease:
             break
     return joint

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.estimation.likelihood.objective import Part, Problem
-from drivetwin.estimation.optimize.gauss_newton import Found, minimise
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
+from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.shifts.shift import Shift
 
-SOUGHT = ("J_e", "J_out", "J_vehicle", "k_o", "c_o")
+LOCAL_UNKNOWNS = ("J_e", "J_out", "J_vehicle", "k_o", "c_o")
 """Unknowns that a stage seeks about its start only: a short span hardly shows some of them, and
 far off the driveline is so stiff that one run takes as long as a whole fit."""
 LEVEL = "mu_c"
@@ -50,51 +50,56 @@ class StagedStartSettings:
 STAGED_START = StagedStartSettings()
 
 
-def staged(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found[Problem] | None:
+def find_staged_start(
+    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> OptimizeResult[LikelihoodObjective] | None:
     """Fit the output error over growing spans, weighted by sensor noise.
 
     Returns None if a run fails, or if a stage ends far from the measurement.
     """
-    problem = _about(problem, start)
-    found = in_lower_gear(problem, start, shifts)
-    if found is None or _hopeless(found):
+    problem = _restrict_bounds(problem, start)
+    found = fit_lower_gear_only(problem, start, shifts)
+    if found is None or _is_too_far(found):
         return None
-    slipping = problem.until([s.lockup_time - STAGED_START.clearance for s in shifts])
-    found = minimise(slipping, _levelled(slipping, found.point), rough=True)
-    if found is None or _hopeless(found):
+    slipping = problem.cut([s.lockup_time - STAGED_START.clearance for s in shifts])
+    found = minimise(slipping, _scale_friction(slipping, found.point), rough=True)
+    if found is None or _is_too_far(found):
         return None
     plain = replace(
-        problem, parts=tuple(Part.unweighted(p.structure, p.record) for p in problem.parts)
+        problem,
+        parts=tuple(ShiftTerm.from_sensor_noise(p.structure, p.record) for p in problem.parts),
     )
     found = minimise(plain, found.point, rough=True)
-    return None if found is None or _hopeless(found) else found
+    return None if found is None or _is_too_far(found) else found
 
 
-def in_lower_gear(problem: Problem, start: Point, shifts: Sequence[Shift]) -> Found[Problem] | None:
+def fit_lower_gear_only(
+    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> OptimizeResult[LikelihoodObjective] | None:
     """Fit the output error over the gear before each shift alone; None if a run fails."""
-    gear = _without_friction(_about(problem, start), start)
+    gear = _fix_friction(_restrict_bounds(problem, start), start)
     return minimise(
-        gear.until([s.before[1] - STAGED_START.clearance for s in shifts]), start, rough=True
+        gear.cut([s.before[1] - STAGED_START.clearance for s in shifts]), start, rough=True
     )
 
 
-def _hopeless(found: Found[Problem]) -> bool:
+def _is_too_far(found: OptimizeResult[LikelihoodObjective]) -> bool:
     """Return whether a stage ended too far from the measurement for input noise to explain it."""
-    problem = found.problem.weighted_by(found.point)
+    problem = found.problem.update_weighting(found.point)
     return problem.cost(found.point) > STAGED_START.max_chi2 * problem.size
 
 
-def _without_friction(problem: Problem, start: Point) -> Problem:
+def _fix_friction(problem: LikelihoodObjective, start: ParameterVector) -> LikelihoodObjective:
     """Fix all parameters of the elements at the start."""
     prior = problem.prior
     elements = {one.name for part in problem.parts for one in part.structure.elements}
     for k, name in enumerate(start.names):
         if name.rpartition(".")[0] in elements:
-            prior = prior.held(k, start[name])
+            prior = prior.fix_parameter(k, start[name])
     return replace(problem, prior=prior)
 
 
-def _levelled(problem: Problem, point: Point) -> Point:
+def _scale_friction(problem: LikelihoodObjective, point: ParameterVector) -> ParameterVector:
     """Scale the friction levels to the tried factors with the smallest Q."""
     factors = np.geomspace(
         STAGED_START.min_friction_factor,
@@ -107,14 +112,14 @@ def _levelled(problem: Problem, point: Point) -> Point:
         for factor in factors:
             values = point.values.copy()
             values[k] = np.clip(factor * values[k], problem.lower[k], problem.upper[k])
-            trials.append(point.moved(values))
+            trials.append(point.replace_values(values))
         point = min(trials, key=problem.cost)
     return point
 
 
-def _about(problem: Problem, start: Point) -> Problem:
+def _restrict_bounds(problem: LikelihoodObjective, start: ParameterVector) -> LikelihoodObjective:
     """Restrict positive unknowns of `SOUGHT` to bounds about the start."""
-    sought = np.array([name in SOUGHT for name in start.names]) & (start.values > 0.0)
+    sought = np.array([name in LOCAL_UNKNOWNS for name in start.names]) & (start.values > 0.0)
     lower = np.where(
         sought, np.maximum(problem.lower, start.values / STAGED_START.search_factor), problem.lower
     )

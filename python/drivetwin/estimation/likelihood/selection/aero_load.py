@@ -15,31 +15,31 @@ import numpy as np
 from scipy.stats import truncnorm
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, spread_of
-from drivetwin.estimation.likelihood.objective import Problem
-from drivetwin.estimation.likelihood.selection.per_shift_load import with_one_load
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.selection.per_shift_load import fit_common_load
 from drivetwin.estimation.linear.load_balance import AERO, SIGNIFICANT
-from drivetwin.estimation.optimize.gauss_newton import step_of
-from drivetwin.estimation.optimize.objective import Point
-from drivetwin.estimation.result.estimate_set import growth_told
+from drivetwin.estimation.optimize.gauss_newton import solve_step
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.result.estimate_set import describe_growth
 
 
-def grows(point: Point, covariance: FloatArray) -> bool:
+def is_significant(point: ParameterVector, covariance: FloatArray) -> bool:
     """Return whether the growing part of the load is significant against its noise."""
     k = point.names.index(AERO)
     return bool(point[AERO] > SIGNIFICANT * np.sqrt(covariance[k, k]))
 
 
-def told(best: LikelihoodFit) -> list[str]:
+def describe(best: LikelihoodFit) -> list[str]:
     """Describe a load that grows with speed; empty if it does not."""
     if AERO not in best.point.names:
         return []
     k = best.point.names.index(AERO)
     std = float(np.sqrt(best.covariance[k, k]))
-    return [growth_told(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
+    return [describe_growth(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
 
 
-def allowed_for(best: LikelihoodFit, wider: LikelihoodFit) -> LikelihoodFit:
+def average_with_boundary_model(best: LikelihoodFit, wider: LikelihoodFit) -> LikelihoodFit:
     """The fit without the growing part as the average with the `wider` one, which has it.
 
     The unknowns follow the growing part along its covariances with them. Of that, which is none or
@@ -55,16 +55,16 @@ def allowed_for(best: LikelihoodFit, wider: LikelihoodFit) -> LikelihoodFit:
     lower, upper = best.problem.lower, best.problem.upper
     values = np.clip(best.mean.values + mean * along, lower, upper)
     spread = best.covariance + variance * np.outer(along, along)
-    return replace(best, mean=best.mean.moved(values), covariance=spread)
+    return replace(best, mean=best.mean.replace_values(values), covariance=spread)
 
 
-def _beyond_bound(wider: LikelihoodFit) -> tuple[Point, FloatArray]:
+def _beyond_bound(wider: LikelihoodFit) -> tuple[ParameterVector, FloatArray]:
     """Unknowns and covariance of the wider fit, with one load, if the growing part might be below
     none: where it ends at that bound, the minimum that is expected beyond it."""
     if wider.point[AERO] == 0.0:
-        step = step_of(wider.normal.information, wider.normal.gradient)
-        wider = replace(wider, point=wider.point.moved(wider.point.values + step))
-    return with_one_load(wider) or (wider.point, wider.covariance)
+        step = solve_step(wider.normal.information, wider.normal.gradient)
+        wider = replace(wider, point=wider.point.replace_values(wider.point.values + step))
+    return fit_common_load(wider) or (wider.point, wider.covariance)
 
 
 def _moments(size: float) -> tuple[float, float]:
@@ -76,7 +76,7 @@ def _moments(size: float) -> tuple[float, float]:
     return float(mean), float(weight * above.moment(2) - mean**2)
 
 
-def without(best: LikelihoodFit, narrower: Problem) -> LikelihoodFit:
+def drop_growth(best: LikelihoodFit, narrower: LikelihoodObjective) -> LikelihoodFit:
     """The fit of the model without the growing part, where that of the wider one ends without any.
 
     It is the same minimum. What lies on its bound has no place in the covariance: it would widen
@@ -101,14 +101,14 @@ def without(best: LikelihoodFit, narrower: Problem) -> LikelihoodFit:
         problem=problem,
         point=point,
         mean=_taken_out(best.mean, k),
-        covariance=spread_of(problem, normal, best.chi2),
+        covariance=compute_covariance(problem, normal, best.chi2),
         normal=normal,
     )
 
 
-def _taken_out(point: Point, k: int) -> Point:
+def _taken_out(point: ParameterVector, k: int) -> ParameterVector:
     """The point without its unknown number k."""
-    return Point((*point.names[:k], *point.names[k + 1 :]), np.delete(point.values, k))
+    return ParameterVector((*point.names[:k], *point.names[k + 1 :]), np.delete(point.values, k))
 
 
 def _without(matrix: FloatArray, k: int) -> FloatArray:

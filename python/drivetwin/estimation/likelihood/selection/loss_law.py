@@ -11,11 +11,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import in_units
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.optimize.gauss_newton import step_of
+from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.parameters import spec_of
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import LossLaw
 
 OTHER: dict[LossLaw, LossLaw] = {"paper": "dissipative", "dissipative": "paper"}
@@ -23,7 +23,7 @@ RULED_OUT = 10.0
 """Rise of Q from which a model has no support beside another (Burnham and Anderson 2002)."""
 
 
-def other_law_in_words(
+def describe_other_law(
     fit: LikelihoodFit, values: dict[str, float], slopes: FloatArray, std: FloatArray
 ) -> list[str]:
     """Return warnings if the other law, which the log does not exclude, gives other parameters.
@@ -39,11 +39,11 @@ def other_law_in_words(
     normal = replace(fit.problem, parts=tuple(other)).normal(fit.point)
     if normal is None:
         return []
-    step = step_of(normal.information, normal.gradient)
+    step = solve_step(normal.information, normal.gradient)
     rise = normal.cost - fit.normal.cost + float(normal.gradient @ step)
     moves = slopes @ step
     apart = [
-        f"{name} = {in_units(value + move, spec_of(name).unit, digits=5)}"
+        f"{name} = {format_with_unit(value + move, get_parameter_spec(name).unit, digits=5)}"
         for (name, value), move, one in zip(values.items(), moves, std, strict=True)
         if abs(move) > 2.0 * Z95 * one
     ]

@@ -3,9 +3,10 @@
 
 An output may be the mean over the time since the sample before, as encoders on a bus send it. That
 is half a sample late, and half a millisecond between torque and speed moves k_o and c_o by several
-standard deviations. Between its samples an engine torque may be straight or a curve (`bend_of`).
-Which kind may fit better is told by the expansion of Q for one of them: what the others would show
-differs by a known column each. Where that hardly tells, what is told of the unknowns is averaged.
+standard deviations. Between its samples an engine torque may be straight or a curve
+(`compute_bend`). Which kind may fit better is told by the expansion of Q for one of them: what the
+others would show differs by a known column each. Where that hardly tells, what is told of the
+unknowns is averaged.
 
 Where all outputs are of the other kind, which is nearly an age of the inputs, fits compare by their
 deviance and not by Q: with θ the unknowns, y the samples and δ the noise of the inputs u, of
@@ -30,15 +31,15 @@ from itertools import product
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.budget import OutOfWork
-from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, columns_of
-from drivetwin.estimation.likelihood.diagnostics.misspecification import score_of
+from drivetwin.estimation.likelihood.budget import BudgetExceeded
+from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
+from drivetwin.estimation.likelihood.diagnostics.misspecification import compute_score
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import Part, Problem
-from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, nearest
-from drivetwin.estimation.likelihood.optimize.staged_start import in_lower_gear
-from drivetwin.estimation.optimize.gauss_newton import step_of
-from drivetwin.estimation.optimize.objective import Normal, Point
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
+from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
+from drivetwin.estimation.likelihood.optimize.staged_start import fit_lower_gear_only
+from drivetwin.estimation.optimize.gauss_newton import solve_step
+from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.shifts.shift import Shift
 
@@ -74,9 +75,9 @@ ROUNDS = 3
 """Most changes of kind: far off, the expansion promises the way, not the end of it."""
 
 
-def likely_kinds(
-    problem: Problem, start: Point, shifts: Sequence[Shift]
-) -> tuple[Problem, Problem]:
+def select_sampling_mode(
+    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> tuple[LikelihoodObjective, LikelihoodObjective]:
     """The problem, which has signals as read, with the kinds that promise least from `start`, and
     with the speeds, or all slow outputs, of the other kind.
 
@@ -87,14 +88,14 @@ def likely_kinds(
     are taken as read.
     """
     kinds = _told_near(problem, start)
-    if kinds is None and (gear := in_lower_gear(problem, start, shifts)) is not None:
+    if kinds is None and (gear := fit_lower_gear_only(problem, start, shifts)) is not None:
         kinds = _told_near(gear.problem, gear.point)
     kinds = kinds or frozenset()
     other = kinds ^ (_far_apart(problem) or frozenset(SPEEDS))
-    return problem.of_kinds(kinds), problem.of_kinds(other)
+    return problem.select_modes(kinds), problem.select_modes(other)
 
 
-def _far_apart(problem: Problem) -> frozenset[str]:
+def _far_apart(problem: LikelihoodObjective) -> frozenset[str]:
     """The outputs of which half a period is nearly an age of the inputs and too far away for an
     expansion: the speeds of a log without an output torque, and all outputs where they are slow.
 
@@ -102,20 +103,22 @@ def _far_apart(problem: Problem) -> frozenset[str]:
     """
     if not problem.parts[0].scale_known:
         return frozenset(SPEEDS)
-    periods = [out.period(one.record.time) for one in problem.parts for out in one.record.outputs]
+    periods = [
+        out.get_period(one.record.time) for one in problem.parts for out in one.record.outputs
+    ]
     return _shown(problem) if min(periods) > SLOW else frozenset()
 
 
-def _told_near(problem: Problem, point: Point) -> frozenset[str] | None:
+def _told_near(problem: LikelihoodObjective, point: ParameterVector) -> frozenset[str] | None:
     """The kinds that promise least from `point`; None where it is far from the measurement."""
-    weighted = problem.weighted_by(point)
+    weighted = problem.update_weighting(point)
     normal = weighted.normal(point)
     if normal is None or normal.cost > MULTI_START.far_chi2 * problem.size:
         return None
     return _promising(weighted, point, normal)
 
 
-def with_best_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
+def refit_best_mode(problem: LikelihoodObjective, best: LikelihoodFit) -> LikelihoodFit:
     """The fit with every signal of the likeliest kind.
 
     `problem` has signals as read, `best` is its fit with some kinds. Without an output torque half
@@ -125,11 +128,13 @@ def with_best_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
 
     tried = {best.problem.kinds}
 
-    def better_of(one: LikelihoodFit, kinds: frozenset[str], start: Point) -> LikelihoodFit:
+    def better_of(
+        one: LikelihoodFit, kinds: frozenset[str], start: ParameterVector
+    ) -> LikelihoodFit:
         if kinds in tried:
             return one
         tried.add(kinds)
-        other = _nearby(problem.of_kinds(kinds), one, start)
+        other = _nearby(problem.select_modes(kinds), one, start)
         return one if other is None or _rise(problem, one, other) >= 0.0 else other
 
     for _ in range(ROUNDS):
@@ -142,23 +147,25 @@ def with_best_kinds(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
     return better_of(best, best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_outputs(best))
 
 
-def with_slow_outputs(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
+def refit_slow_outputs(problem: LikelihoodObjective, best: LikelihoodFit) -> LikelihoodFit:
     """The fit, or where the outputs of a log with an output torque are slow that with all of them
     of the other kind, if it is likelier. `problem` has signals as read."""
     outputs = _far_apart(problem)
     if not outputs or not problem.parts[0].scale_known:
         return best
     kinds = best.problem.kinds ^ outputs
-    other = _nearby(problem.of_kinds(kinds), best, _start_of_other_outputs(best))
+    other = _nearby(problem.select_modes(kinds), best, _start_of_other_outputs(best))
     if other is None or _rise(problem, best, other) >= 0.0:
         return best
     try:
-        return with_best_kinds(problem, other)
-    except OutOfWork:
+        return refit_best_mode(problem, other)
+    except BudgetExceeded:
         return other
 
 
-def averaged_over_kinds(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
+def average_modes(
+    problem: LikelihoodObjective, best: LikelihoodFit
+) -> tuple[LikelihoodFit, list[str]]:
     """The fit with mean and covariance over all kinds, weighted by their likelihood, and which
     kinds the log hardly tells, in words.
 
@@ -174,11 +181,13 @@ def averaged_over_kinds(problem: Problem, best: LikelihoodFit) -> tuple[Likeliho
     reached = np.where(choices.left < np.min(choices.left) + TIE, Z95**-2, 0.0)
     values = np.clip(best.point.values + step, best.problem.lower, best.problem.upper)
     covariance = best.covariance + apart.T @ (np.maximum(weight, reached)[:, None] * apart)
-    told = replace(best, mean=best.point.moved(values), covariance=covariance)
+    told = replace(best, mean=best.point.replace_values(values), covariance=covariance)
     return told, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
 
 
-def with_either_kind(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodFit, list[str]]:
+def widen_over_modes(
+    problem: LikelihoodObjective, best: LikelihoodFit
+) -> tuple[LikelihoodFit, list[str]]:
     """The fit with its covariance widened up to the minimum that has the outputs which lie
     `_far_apart` of the other kind, and that in words; as it is where the deviance rises much to
     there."""
@@ -187,8 +196,10 @@ def with_either_kind(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodF
         return best, []
     kinds, start = best.problem.kinds ^ outputs, _start_of_other_outputs(best)
     try:
-        other = nearest(problem.of_kinds(kinds), start, WORSE * best.normal.cost / problem.size)
-    except OutOfWork:  # nobody knows: what shows the same may be as good
+        other = fit_local(
+            problem.select_modes(kinds), start, WORSE * best.normal.cost / problem.size
+        )
+    except BudgetExceeded:  # nobody knows: what shows the same may be as good
         far = start.values - best.point.values
     else:
         if other is None or _rise(problem, best, other) > EITHER_KIND:
@@ -199,17 +210,17 @@ def with_either_kind(problem: Problem, best: LikelihoodFit) -> tuple[LikelihoodF
     return widened, [UNSURE.format(names)]
 
 
-def _start_of_other_outputs(best: LikelihoodFit) -> Point:
+def _start_of_other_outputs(best: LikelihoodFit) -> ParameterVector:
     """Build the initial point for the other sampling mode of the outputs: the minimum of `best`,
     with torque delays by which both modes give nearly the same samples."""
     values = best.point.values.copy()
-    ages = {part.structure.unknown("te_delay"): part.record for part in best.problem.parts}
+    ages = {part.structure.get_unknown("te_delay"): part.record for part in best.problem.parts}
     for name, record in ages.items():
         if name in best.point.names:
             speed = next(out for out in record.outputs if out.name in SPEEDS)
-            half = 0.5 * speed.period(record.time)
+            half = 0.5 * speed.get_period(record.time)
             values[best.point.names.index(name)] += half if speed.window == 0.0 else -half
-    return best.point.moved(np.clip(values, best.problem.lower, best.problem.upper))
+    return best.point.replace_values(np.clip(values, best.problem.lower, best.problem.upper))
 
 
 def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
@@ -218,7 +229,7 @@ def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
     return np.asarray(weight / np.sum(weight))
 
 
-def _fitted(problem: Problem, best: LikelihoodFit, choices: _Choices) -> _Choices:
+def _fitted(problem: LikelihoodObjective, best: LikelihoodFit, choices: _Choices) -> _Choices:
     """The choices as seen from the minimum of the first, those fitted that would matter: what an
     expansion says of a minimum far away is too rough to weigh it by.
 
@@ -231,28 +242,30 @@ def _fitted(problem: Problem, best: LikelihoodFit, choices: _Choices) -> _Choice
     far = np.max(np.abs(steps) / np.sqrt(np.diag(best.covariance)), axis=1) > MATTERS
     for k in np.flatnonzero(far & (_weights(seen, best) > UNLIKELY)):
         kinds = _flipped(best.problem.kinds, choices.flips[k])
-        other = _nearby(problem.of_kinds(kinds), best, best.point)
+        other = _nearby(problem.select_modes(kinds), best, best.point)
         if other is None:
             left[k] = np.inf
             continue
         left[k] = _rise(problem, best, other)
         steps[k] = other.point.values - best.point.values
-        first = problem.of_kinds(best.problem.kinds)
+        first = problem.select_modes(best.problem.kinds)
         if left[k] < TIE and (back := _nearby(first, other, other.point)):
             left[0] = min(left[0], _rise(problem, best, back))
     return seen
 
 
-def _nearby(problem: Problem, best: LikelihoodFit, start: Point) -> LikelihoodFit | None:
+def _nearby(
+    problem: LikelihoodObjective, best: LikelihoodFit, start: ParameterVector
+) -> LikelihoodFit | None:
     """The minimum from `start`; None where it is surely no better than `best`, of other kinds, or
     not found with the work that is left."""
     try:
-        return nearest(problem, start, WORSE * best.normal.cost / problem.size)
-    except OutOfWork:
+        return fit_local(problem, start, WORSE * best.normal.cost / problem.size)
+    except BudgetExceeded:
         return None
 
 
-def _rise(problem: Problem, one: LikelihoodFit, other: LikelihoodFit) -> float:
+def _rise(problem: LikelihoodObjective, one: LikelihoodFit, other: LikelihoodFit) -> float:
     """Rise from `one` to the `other` of what kinds compare by, with their prices: the deviance
     where all outputs are of the other kind, Q where not."""
     kinds, others = one.problem.kinds, other.problem.kinds
@@ -273,13 +286,15 @@ def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[str]
     return [UNSURE.format(", ".join(names))] if names else []
 
 
-def in_words(kinds: frozenset[str]) -> list[str]:
+def describe_modes(kinds: frozenset[str]) -> list[str]:
     """Describe the signals that are not as read."""
     means = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in kinds)
     return [f"samples are means over their period, which fits better: {means}"] if means else []
 
 
-def _promising(problem: Problem, point: Point, normal: Normal) -> frozenset[str]:
+def _promising(
+    problem: LikelihoodObjective, point: ParameterVector, normal: NormalEquations
+) -> frozenset[str]:
     """Names of the signals that are better taken for something else than read."""
     choices = _choices(problem, point, normal)
     return _flipped(problem.kinds, choices.flips[int(np.argmin(choices.left))])
@@ -290,7 +305,7 @@ def _flipped(kinds: frozenset[str], flips: FloatArray) -> frozenset[str]:
     return kinds ^ {name for name, flip in zip(SIGNALS, flips, strict=True) if flip}
 
 
-def _price(problem: Problem, kinds: frozenset[str]) -> float:
+def _price(problem: LikelihoodObjective, kinds: frozenset[str]) -> float:
     """Compute the penalty of modes other than read: twice the logarithm of the odds against
     them."""
     speeds = _shown(problem).intersection(SPEEDS)
@@ -300,7 +315,7 @@ def _price(problem: Problem, kinds: frozenset[str]) -> float:
     return COMMON_PRICE * common + RARE_PRICE * rare
 
 
-def _shown(problem: Problem) -> frozenset[str]:
+def _shown(problem: LikelihoodObjective) -> frozenset[str]:
     """Names of the outputs that the log holds."""
     return frozenset(out.name for part in problem.parts for out in part.record.outputs)
 
@@ -316,35 +331,37 @@ class _Choices:
     steps: FloatArray
 
 
-def _choices(problem: Problem, point: Point, normal: Normal) -> _Choices:
+def _choices(
+    problem: LikelihoodObjective, point: ParameterVector, normal: NormalEquations
+) -> _Choices:
     """All choices by the expansion `normal` at `point`: with the weighting there, so by Q alone."""
-    score = score_of(problem, normal, [_changes(part, point) for part in problem.parts])
+    score = compute_score(problem, normal, [_changes(part, point) for part in problem.parts])
     shown = {*_shown(problem), TORQUE}
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
     gradients = normal.gradient + flips @ score.cross.T
-    steps = np.array([step_of(normal.information, gradient) for gradient in gradients])
+    steps = np.array([solve_step(normal.information, gradient) for gradient in gradients])
     price = np.array([_price(problem, _flipped(problem.kinds, row)) for row in flips])
     followed = np.sum(gradients * steps, axis=1)
     before = np.sum((flips @ score.own) * flips, axis=1) - 2.0 * flips @ score.pull
     return _Choices(flips, before + followed + price, steps)
 
 
-def _changes(part: Part, point: Point) -> FloatArray:
+def _changes(part: ShiftTerm, point: ParameterVector) -> FloatArray:
     """Compute the change (n, m) of a run by the other mode of each of `SIGNALS`, one column
     each."""
-    run = part.run(point)
+    run = part.simulate(point)
     assert run is not None, "a fit can be simulated"
     record = part.record
-    columns, found, first = columns_of(run), np.zeros((record.size, len(SIGNALS))), 0
+    columns, found, first = get_columns(run), np.zeros((record.size, len(SIGNALS))), 0
     for out in record.outputs:
         rows = slice(first, first + out.values.size)
         first = rows.stop
         column = columns[out.name]
-        change = out.otherwise(run.time, column) - out.seen(run.time, column)
+        change = out.sample_other_mode(run.time, column) - out.sample(run.time, column)
         found[rows, SIGNALS.index(out.name)] = change
-    bend = record.bend_over(part.structure.value(point, "te_delay"))
+    bend = record.interpolate_bend(part.structure.get_value(point, "te_delay"))
     sign = -1.0 if record.curved else 1.0
-    answer = part.answer_to(point, run, {TORQUE: sign * bend})
+    answer = part.respond_to_inputs(point, run, {TORQUE: sign * bend})
     if np.all(np.isfinite(answer)):  # an unstable run has no finite response
         found[:, -1] = answer
     return found

@@ -14,27 +14,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin._util.progress import part
+from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import Driveline, ShiftSignals
-from drivetwin.estimation.likelihood.budget import OutOfWork, at_most
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import Problem
-from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, Hopeless, checked, fit
-from drivetwin.estimation.likelihood.priors import problem_of
-from drivetwin.estimation.likelihood.selection import aero_load
-from drivetwin.estimation.likelihood.selection.per_shift_load import with_one_load
-from drivetwin.estimation.likelihood.selection.sampling_mode import (
-    averaged_over_kinds,
-    in_words,
-    likely_kinds,
-    with_best_kinds,
-    with_either_kind,
-    with_slow_outputs,
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.optimize.multistart import (
+    MULTI_START,
+    NoConvergence,
+    fit_multistart,
+    refine,
 )
-from drivetwin.estimation.likelihood.selection.touch_point_minima import lowest
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.selection import aero_load
+from drivetwin.estimation.likelihood.selection.per_shift_load import fit_common_load
+from drivetwin.estimation.likelihood.selection.sampling_mode import (
+    average_modes,
+    describe_modes,
+    refit_best_mode,
+    refit_slow_outputs,
+    select_sampling_mode,
+    widen_over_modes,
+)
+from drivetwin.estimation.likelihood.selection.touch_point_minima import find_best_minimum
 from drivetwin.estimation.linear.load_balance import AERO
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import LossLaw
 
@@ -61,9 +66,9 @@ class SelectionSettings:
 SELECTION = SelectionSettings()
 
 
-def choose(
+def select_model(
     signals: Sequence[ShiftSignals],
-    drivelines: Sequence[Driveline],
+    drivelines: Sequence[KnownDriveline],
     loss_law: LossLaw,
     guess: Mapping[str, float],
 ) -> tuple[LikelihoodFit, tuple[str, ...]]:
@@ -74,39 +79,45 @@ def choose(
     shifts = [s.shift for s in signals]
     growing = {**guess, AERO: max(guess.get(AERO, 0.0), SELECTION.min_aero)}
     constant = {name: value for name, value in guess.items() if name != AERO}
-    problem, start = problem_of(signals, drivelines, loss_law, growing, hilly=True)
-    with part(0.0, 0.45), at_most(SELECTION.max_work) as search:
-        best = _fit_either(problem, start, shifts)
-    with part(0.45, 0.5, "kinds of signals"), at_most(SELECTION.max_sampling_mode_work):
-        best = with_slow_outputs(problem, best)
-    with part(0.5, 0.65), at_most(SELECTION.max_restricted_work):
-        level = with_one_load(best)
+    problem, start = build_problem(signals, drivelines, loss_law, growing, hilly=True)
+    with scale_progress(0.0, 0.45), limit_evaluations(SELECTION.max_work) as search:
+        best = fit_candidates(problem, start, shifts)
+    with (
+        scale_progress(0.45, 0.5, "kinds of signals"),
+        limit_evaluations(SELECTION.max_sampling_mode_work),
+    ):
+        best = refit_slow_outputs(problem, best)
+    with scale_progress(0.5, 0.65), limit_evaluations(SELECTION.max_restricted_work):
+        level = fit_common_load(best)
         point, covariance = level or (best.point, best.covariance)
-        guess = growing if aero_load.grows(point, covariance) else constant
-        narrower = problem_of(signals, drivelines, loss_law, guess, hilly=level is None)
+        guess = growing if aero_load.is_significant(point, covariance) else constant
+        narrower = build_problem(signals, drivelines, loss_law, guess, hilly=level is None)
         wider = best
-        best, problem = _narrowed(best, point, narrower, shifts) or (best, problem)
-    notes = aero_load.told(best)
+        best, problem = _restrict(best, point, narrower, shifts) or (best, problem)
+    notes = aero_load.describe(best)
     with (
-        part(0.65, 0.85, "other minima"),
-        at_most(min(SELECTION.max_touch_point_work, search.left)),
+        scale_progress(0.65, 0.85, "other minima"),
+        limit_evaluations(min(SELECTION.max_touch_point_work, search.left)),
     ):
-        best = lowest(problem, best)
+        best = find_best_minimum(problem, best)
     with (
-        part(0.85, 1.0, "kinds of signals"),
-        at_most(min(SELECTION.max_sampling_mode_work, search.left)),
+        scale_progress(0.85, 1.0, "kinds of signals"),
+        limit_evaluations(min(SELECTION.max_sampling_mode_work, search.left)),
     ):
-        best, doubts = averaged_over_kinds(problem, best)
-    with at_most(SELECTION.max_sampling_mode_work):
-        best, either = with_either_kind(problem, best)
+        best, doubts = average_modes(problem, best)
+    with limit_evaluations(SELECTION.max_sampling_mode_work):
+        best, either = widen_over_modes(problem, best)
     if AERO not in best.point.names:
-        best = aero_load.allowed_for(best, wider)
-    return best, (*notes, *in_words(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
+        best = aero_load.average_with_boundary_model(best, wider)
+    return best, (*notes, *describe_modes(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
 
-def _narrowed(
-    wider: LikelihoodFit, point: Point, narrower: tuple[Problem, Point], shifts: Sequence[Shift]
-) -> tuple[LikelihoodFit, Problem] | None:
+def _restrict(
+    wider: LikelihoodFit,
+    point: ParameterVector,
+    narrower: tuple[LikelihoodObjective, ParameterVector],
+    shifts: Sequence[Shift],
+) -> tuple[LikelihoodFit, LikelihoodObjective] | None:
     """Fit the model without the effects that the log does not show, and return its problem.
 
     Returns None if the log shows all effects, or if the work runs out: the wider model is correct
@@ -117,44 +128,48 @@ def _narrowed(
     if not left_out:
         return None
     if left_out == [AERO] and wider.point[AERO] == 0.0:
-        return aero_load.without(wider, problem), problem
+        return aero_load.drop_growth(wider, problem), problem
     try:
-        of_kinds = problem.of_kinds(wider.problem.kinds)
-        return fit(of_kinds, _taken(start, point), shifts, thorough=False), problem
-    except OutOfWork:
+        of_kinds = problem.select_modes(wider.problem.kinds)
+        return fit_multistart(of_kinds, _copy_values(start, point), shifts, thorough=False), problem
+    except BudgetExceeded:
         return None
 
 
-def _fit_either(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit:
+def fit_candidates(
+    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> LikelihoodFit:
     """Fit with every signal in its likeliest sampling mode.
 
     Raises IdentificationError where it does not converge with the likeliest kinds.
     """
-    likely, other = likely_kinds(problem, start, shifts)
-    best = _tried(likely, start, shifts) or fit(
+    likely, other = select_sampling_mode(problem, start, shifts)
+    best = _try_fit(likely, start, shifts) or fit_multistart(
         other, start, shifts, restarts=MULTI_START.shaft_factors[:1]
     )
-    best = with_best_kinds(problem, best)
+    best = refit_best_mode(problem, best)
     if best.chi2 < MULTI_START.accept_chi2:
         return best
-    second = checked(best, problem.of_kinds(best.problem.kinds), start, shifts)
-    return best if second is best else with_best_kinds(problem, second)
+    second = refine(best, problem.select_modes(best.problem.kinds), start, shifts)
+    return best if second is best else refit_best_mode(problem, second)
 
 
-def _tried(problem: Problem, start: Point, shifts: Sequence[Shift]) -> LikelihoodFit | None:
+def _try_fit(
+    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> LikelihoodFit | None:
     """Fit up to the first plausible minimum; None if there is none.
 
-    Raises Hopeless where none is near.
+    Raises NoConvergence where none is near.
     """
     try:
-        return fit(problem, start, shifts, thorough=False)
-    except Hopeless:
+        return fit_multistart(problem, start, shifts, thorough=False)
+    except NoConvergence:
         raise
     except IdentificationError:
         return None
 
 
-def _taken(start: Point, found: Point) -> Point:
+def _copy_values(start: ParameterVector, found: ParameterVector) -> ParameterVector:
     """Copy the values of `found` into `start` for the names that it has."""
     values = [found[n] if n in found.names else start[n] for n in start.names]
-    return start.moved(np.array(values))
+    return start.replace_values(np.array(values))

@@ -14,22 +14,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.progress import part as share_of
-from drivetwin.estimation.likelihood.budget import OutOfWork
+from drivetwin._util.progress import scale_progress
+from drivetwin.estimation.likelihood.budget import BudgetExceeded
 from drivetwin.estimation.likelihood.data.input_smoothing import SMOOTHING
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import Part, Problem
-from drivetwin.estimation.likelihood.optimize.multistart import nearest
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.selection.sampling_mode import TIE, WORSE
-from drivetwin.estimation.likelihood.slip_contact import SLIPPING, contact_of
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.slip_contact import SLIPPING, evaluate_contact
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95
 
 LINGERS = 0.05
 """Time [s] that an element must slip about P0: one that just lets go passes in half of it."""
 
 
-def lowest(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
+def find_best_minimum(problem: LikelihoodObjective, best: LikelihoodFit) -> LikelihoodFit:
     """The lowest of the minima about `best`, its covariance widened up to those that Q hardly tells
     from it. `problem` has signals as read.
 
@@ -46,9 +46,9 @@ def lowest(problem: Problem, best: LikelihoodFit) -> LikelihoodFit:
     return replace(found, covariance=found.covariance + np.outer(far, far) / Z95**2)
 
 
-def _others(problem: Problem, best: LikelihoodFit) -> Iterator[LikelihoodFit]:
+def _others(problem: LikelihoodObjective, best: LikelihoodFit) -> Iterator[LikelihoodFit]:
     """Minima found from either side of the P0 of each element that lingers about it."""
-    problem = problem.of_kinds(best.problem.kinds)
+    problem = problem.select_modes(best.problem.kinds)
     most = WORSE * best.normal.cost / problem.size
     starts = []
     for name, away in _lingering(best).items():
@@ -56,12 +56,12 @@ def _others(problem: Problem, best: LikelihoodFit) -> Iterator[LikelihoodFit]:
         for side in (-away, away):
             values = best.point.values.copy()
             values[k] += side
-            starts.append(best.point.moved(values))
+            starts.append(best.point.replace_values(values))
     for done, start in enumerate(starts):
         try:
-            with share_of(done / len(starts), (done + 1) / len(starts)):
-                other = nearest(problem, start, most)
-        except OutOfWork:
+            with scale_progress(done / len(starts), (done + 1) / len(starts)):
+                other = fit_local(problem, start, most)
+        except BudgetExceeded:
             return
         if other is not None:
             yield other
@@ -80,13 +80,13 @@ def _lingering(best: LikelihoodFit) -> dict[str, float]:
     return found
 
 
-def _time_about(part: Part, point: Point, name: str) -> float:
+def _time_about(part: ShiftTerm, point: ParameterVector, name: str) -> float:
     """Time [s] for which an element slips at a pressure that noise may lift above P0 or not."""
-    run = part.run(point)
+    run = part.simulate(point)
     if run is None or name not in part.record.pressures:
         return 0.0
-    contact, signal = contact_of(part, point, run, name), part.record.pressures[name]
-    P0 = part.structure.value(point, f"{name}.P0")
+    contact, signal = evaluate_contact(part, point, run, name), part.record.pressures[name]
+    P0 = part.structure.get_value(point, f"{name}.P0")
     away = np.abs(np.interp(contact.middle, signal.time, signal.values) - P0)
     near = away < SMOOTHING.fill_sigma * part.record.input_sigma[name]
     return float(np.sum(np.diff(run.time)[near & (np.abs(contact.slip) > SLIPPING)]))

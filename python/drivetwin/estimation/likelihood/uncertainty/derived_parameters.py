@@ -14,11 +14,11 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.likelihood.objective import Problem
-from drivetwin.estimation.likelihood.parametrization import OWN, Structure
-from drivetwin.estimation.optimize.objective import Point
-from drivetwin.parameters import OVER_ETA, spec_of
-from drivetwin.simulation.dual_clutch import in_series
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.parametrization import LOG_SPECIFIC, ShiftModel
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.simulation.dual_clutch import compute_series_inertia
 
 TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "drum")
 """Stems of parameters that share the one scale that only an output torque shows."""
@@ -26,67 +26,72 @@ DIRECT = ("J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Unknowns that are parameters themselves."""
 
 
-def parameters(problem: Problem, point: Point, signals: Sequence[ShiftSignals]) -> dict[str, float]:
+def compute_parameters(
+    problem: LikelihoodObjective, point: ParameterVector, signals: Sequence[ShiftSignals]
+) -> dict[str, float]:
     """Compute every reported parameter by id at `point`, in reporting order."""
     structures = [part.structure for part in problem.parts]
     first = structures[0]
-    values = {"eta": first.value(point, "eta")}
+    values = {"eta": first.get_value(point, "eta")}
     for structure, s in zip(structures, signals, strict=True):
         d = structure.driveline
         for gear, ratio in ((s.shift.start_gear, d.i_before), (s.shift.end_gear, d.i_after)):
-            J_out = structure.value(point, "J_out")
-            values[f"J_prime_{gear}"] = structure.value(point, "J_e") + J_out / ratio**2
+            J_out = structure.get_value(point, "J_out")
+            values[f"J_prime_{gear}"] = structure.get_value(point, "J_e") + J_out / ratio**2
     for name in DIRECT:
-        values |= {of_log(name, one.log): one.value(point, name) for one in structures}
+        values |= {make_log_id(name, one.log): one.get_value(point, name) for one in structures}
     for structure, s in zip(structures, signals, strict=True):
-        f_d, zeta = oscillation(structure, point)
+        f_d, zeta = compute_oscillation(structure, point)
         values |= {f"f_d_{s.shift.end_gear}": f_d, f"zeta_{s.shift.end_gear}": zeta}
         for element in structure.elements:
-            values[f"P0.{element.name}"] = structure.value(point, f"{element.name}.P0")
+            values[f"P0.{element.name}"] = structure.get_value(point, f"{element.name}.P0")
     for element in structures[0].driveline.drums:
-        values[f"drum.{element.name}"] = first.value(point, f"{element.name}.drum")
-    return values if signals[0].scale_known else _over_eta(values)
+        values[f"drum.{element.name}"] = first.get_value(point, f"{element.name}.drum")
+    return values if signals[0].scale_known else _rename_over_eta(values)
 
 
-def of_log(name: str, log: int) -> str:
+def make_log_id(name: str, log: int) -> str:
     """Return the id of a parameter in one of several logs, numbered from 1; `name` if shared."""
-    return f"{name}.{log}" if log and name in OWN else name
+    return f"{name}.{log}" if log and name in LOG_SPECIFIC else name
 
 
-def _over_eta(values: dict[str, float]) -> dict[str, float]:
+def _rename_over_eta(values: dict[str, float]) -> dict[str, float]:
     """Rename the parameters to ratios over η, for a log without an output torque (η = 1 in the
     model)."""
     return {
-        name + OVER_ETA if spec_of(name).stem in TORQUE_LIKE else name: value
+        name + OVER_ETA if get_parameter_spec(name).stem in TORQUE_LIKE else name: value
         for name, value in values.items()
         if name != "eta"
     }
 
 
-def absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
+def list_absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
     """Return the ids that are not identifiable without an output torque."""
     gears = dict.fromkeys(g for s in signals for g in (s.shift.start_gear, s.shift.end_gear))
     logs = dict.fromkeys(s.log for s in signals)
-    others = [of_log(stem, log) for stem in TORQUE_LIKE if stem in DIRECT for log in logs]
+    others = [make_log_id(stem, log) for stem in TORQUE_LIKE if stem in DIRECT for log in logs]
     return ("eta", *(f"J_prime_{gear}" for gear in gears), *dict.fromkeys(others))
 
 
-def oscillation(structure: Structure, point: Point) -> tuple[float, float]:
+def compute_oscillation(structure: ShiftModel, point: ParameterVector) -> tuple[float, float]:
     """Compute the damped frequency [Hz] and damping ratio of the lock-up oscillation."""
     d = structure.driveline
-    inertia = structure.value(point, "J_e")
+    inertia = structure.get_value(point, "J_e")
     for one in (*structure.elements, *structure.spinning):
-        inertia += structure.value(point, f"{one.name}.drum") * (one.a - one.b / d.i_after) ** 2
-    J4 = inertia * d.i_after**2 + structure.value(point, "J_out")
-    J5 = structure.value(point, "J_vehicle") / d.i_f**2
-    J = in_series(J4, J5)
-    k_o, c_o = structure.value(point, "k_o"), structure.value(point, "c_o")
+        inertia += structure.get_value(point, f"{one.name}.drum") * (one.a - one.b / d.i_after) ** 2
+    J4 = inertia * d.i_after**2 + structure.get_value(point, "J_out")
+    J5 = structure.get_value(point, "J_vehicle") / d.i_f**2
+    J = compute_series_inertia(J4, J5)
+    k_o, c_o = structure.get_value(point, "k_o"), structure.get_value(point, "c_o")
     zeta = c_o / (2.0 * np.sqrt(J * k_o))
     return float(np.sqrt(k_o / J * max(1.0 - zeta**2, 0.0)) / (2.0 * np.pi)), float(zeta)
 
 
-def slopes(
-    problem: Problem, point: Point, std: FloatArray, signals: Sequence[ShiftSignals]
+def compute_jacobian(
+    problem: LikelihoodObjective,
+    point: ParameterVector,
+    std: FloatArray,
+    signals: Sequence[ShiftSignals],
 ) -> FloatArray:
     """Compute the derivative (q, p) of the parameters by central differences over a part of
     `std` (p,)."""
@@ -95,7 +100,7 @@ def slopes(
         shift = np.zeros_like(std)
         shift[k] = width
         ahead, behind = (
-            np.array(list(parameters(problem, point.moved(x), signals).values()))
+            np.array(list(compute_parameters(problem, point.replace_values(x), signals).values()))
             for x in (point.values + shift, point.values - shift)
         )
         columns.append((ahead - behind) / (2.0 * width))

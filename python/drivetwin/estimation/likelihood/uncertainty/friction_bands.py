@@ -11,8 +11,8 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.estimation.likelihood.slip_contact import carried_slip
-from drivetwin.estimation.linear.friction_points import stribeck
+from drivetwin.estimation.likelihood.slip_contact import find_loaded_slips
+from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
 
@@ -20,7 +20,7 @@ METHOD = "likelihood"
 POINTS = 60
 
 
-def curves_of(
+def build_friction_curves(
     fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], systematic: FloatArray
 ) -> dict[str, FrictionCurve]:
     """Compute the curve of every element whose law is free (carriers.py).
@@ -34,10 +34,10 @@ def curves_of(
     for name in dict.fromkeys(one.name for part in parts for one in part.structure.elements):
         if f"{name}.{LAW[-1]}" not in fit.point.names:
             continue
-        base = linear.get(name) or _seen(fit, name)
+        base = linear.get(name) or _build_empty_curve(fit, name)
         index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
         theta, square = fit.mean.values[index], np.ix_(index, index)
-        mu, slopes = stribeck(theta, base.slip)
+        mu, slopes = evaluate_stribeck(theta, base.slip)
         total = (fit.covariance + systematic)[square]
         half = Z95 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, total, slopes))
         mu_c, drop, mu_v, ln_v_s = (float(v) for v in theta)
@@ -56,10 +56,10 @@ def curves_of(
     return found
 
 
-def _seen(fit: LikelihoodFit, name: str) -> FrictionCurve:
+def _build_empty_curve(fit: LikelihoodFit, name: str) -> FrictionCurve:
     """Build an empty curve over the slips at which the element transmits torque in a simulated
     shift."""
-    slip = np.concatenate([carried_slip(part, fit.point, name) for part in fit.problem.parts])
+    slip = np.concatenate([find_loaded_slips(part, fit.point, name) for part in fit.problem.parts])
     grid = np.linspace(float(slip.min()), float(slip.max()), POINTS)
     nothing, empty = np.zeros(POINTS), np.empty(0)
     return FrictionCurve(grid, nothing, nothing, nothing, empty, empty, None, METHOD)

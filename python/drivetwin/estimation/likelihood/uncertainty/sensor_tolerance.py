@@ -13,13 +13,13 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.pressure_roles import pressed_element, pressure_role
+from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Output, columns_of
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, covariance_of
-from drivetwin.estimation.likelihood.objective import Part
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import parameters
-from drivetwin.estimation.optimize.objective import Point
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Output, get_columns
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
+from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.simulation.dual_clutch import Trajectory
 from drivetwin.vehicle.spec import SensorTolerance
@@ -32,7 +32,7 @@ FRICTION = "mu."
 """Start of the id of μ of an element, at `slips` of the sensitivity."""
 
 
-def sensor_shifts(
+def compute_sensor_shifts(
     fit: LikelihoodFit, tolerances: Mapping[str, SensorTolerance]
 ) -> dict[str, FloatArray]:
     """Compute the shift (p,) of all unknowns by one standard deviation of each sensor error.
@@ -41,7 +41,7 @@ def sensor_shifts(
     none.
     """
     found = {}
-    follows = covariance_of(fit.normal.information)
+    follows = invert_information(fit.normal.information)
     for role, tolerance in tolerances.items():
         for kind, size in asdict(tolerance).items():
             if size == 0.0:
@@ -56,15 +56,15 @@ def sensor_shifts(
     return found
 
 
-def _error(part: Part, fit: LikelihoodFit, role: str, kind: str) -> FloatArray | None:
+def _error(part: ShiftTerm, fit: LikelihoodFit, role: str, kind: str) -> FloatArray | None:
     """Change (n,) of the residuals for an error of size one of a `kind`; None for other roles.
 
     Values that are older than their stamps lag by their rate: of an output that of the run, for
     measured ones jitter.
     """
     name = "engine_speed" if role == "input_speed" else role
-    source = TORQUE if role == "engine_torque" else pressed_element(role)
-    run = part.run(fit.point)
+    source = TORQUE if role == "engine_torque" else get_pressure_element(role)
+    run = part.simulate(fit.point)
     if run is None:
         return None
     if name in [out.name for out in part.record.outputs]:
@@ -76,7 +76,7 @@ def _error(part: Part, fit: LikelihoodFit, role: str, kind: str) -> FloatArray |
     if source is None or source not in (TORQUE, *part.record.pressures):
         return None
     error = _input_error(part, fit.point, source, kind)
-    return -part.answer_to(fit.point, run, {source: error})
+    return -part.respond_to_inputs(fit.point, run, {source: error})
 
 
 def _output_error(out: Output, run: Trajectory, kind: str) -> FloatArray:
@@ -87,10 +87,10 @@ def _output_error(out: Output, run: Trajectory, kind: str) -> FloatArray:
         case "offset":
             return np.ones_like(out.values)
         case _:
-            return -out.seen(run.time, np.gradient(columns_of(run)[out.name], run.time))
+            return -out.sample(run.time, np.gradient(get_columns(run)[out.name], run.time))
 
 
-def _input_error(part: Part, point: Point, source: str, kind: str) -> FloatArray:
+def _input_error(part: ShiftTerm, point: ParameterVector, source: str, kind: str) -> FloatArray:
     """Compute the change of an input (N-1,) over each step of the grid by an error of size one."""
     record, time = part.record, part.record.time
     one = record.engine_torque if source == TORQUE else record.pressures[source]
@@ -100,7 +100,7 @@ def _input_error(part: Part, point: Point, source: str, kind: str) -> FloatArray
         case "offset":
             return np.ones(time.size - 1)
         case _ if source == TORQUE:
-            return -record.torque_rate(part.structure.value(point, "te_delay"))
+            return -record.compute_torque_rate(part.structure.get_value(point, "te_delay"))
         case _:
             return -np.diff(np.interp(time, one.time, one.values)) / np.diff(time)
 
@@ -122,24 +122,26 @@ class Sensitivity:
     slips: Mapping[str, float]
 
 
-def sensitivity(
+def compute_sensitivity(
     fit: LikelihoodFit, signals: Sequence[ShiftSignals], friction: Mapping[str, FrictionCurve]
 ) -> Sensitivity:
     """Compute the change of every parameter and of μ in the middle of the observed slip range.
 
     To first order in the fit's unknowns; costs one linear response of the run per input and kind.
     """
-    largest = _largest_readings(fit)
+    largest = _find_largest_readings(fit)
     sizes = {role: SensorTolerance(SIZE, SIZE * value, AGE) for role, value in largest.items()}
     slips = {name: float(np.mean(curve.slip[[0, -1]])) for name, curve in friction.items()}
 
     def results(unknowns: FloatArray) -> dict[str, float]:
-        point = fit.point.moved(unknowns)
-        return parameters(fit.problem, point, signals) | _friction(fit, point, slips)
+        point = fit.point.replace_values(unknowns)
+        return compute_parameters(fit.problem, point, signals) | _compute_friction(
+            fit, point, slips
+        )
 
     base = results(fit.point.values)
     columns, errors = [], []
-    for error, shift in sensor_shifts(fit, sizes).items():
+    for error, shift in compute_sensor_shifts(fit, sizes).items():
         ahead, behind = (results(fit.point.values + sign * shift) for sign in (0.5, -0.5))
         columns.append([ahead[name] - behind[name] for name in base])
         errors.append(error)
@@ -147,31 +149,34 @@ def sensitivity(
         ids=tuple(base),
         values=np.array(list(base.values())),
         errors=tuple(errors),
-        sizes=np.array([_size(sizes, error) for error in errors]),
+        sizes=np.array([_get_size(sizes, error) for error in errors]),
         change=np.array(columns).reshape(len(errors), len(base)).T,
         slips=slips,
     )
 
 
-def _friction(fit: LikelihoodFit, point: Point, slips: Mapping[str, float]) -> dict[str, float]:
+def _compute_friction(
+    fit: LikelihoodFit, point: ParameterVector, slips: Mapping[str, float]
+) -> dict[str, float]:
     """Compute μ of each element at its slip."""
     laws = {
         element.name: element.friction
         for part in fit.problem.parts
-        for element in part.structure.model(point).elements
+        for element in part.structure.build_model(point).elements
     }
     return {
-        FRICTION + name: float(laws[name].at(np.array([slip]))[0]) for name, slip in slips.items()
+        FRICTION + name: float(laws[name].evaluate(np.array([slip]))[0])
+        for name, slip in slips.items()
     }
 
 
-def _largest_readings(fit: LikelihoodFit) -> dict[str, float]:
+def _find_largest_readings(fit: LikelihoodFit) -> dict[str, float]:
     """Return the largest absolute reading by role over all shifts, SI."""
     found: dict[str, float] = {}
     for part in fit.problem.parts:
         record = part.record
         readings = {"engine_torque": record.engine_torque.values}
-        readings |= {pressure_role(name): one.values for name, one in record.pressures.items()}
+        readings |= {make_pressure_role(name): one.values for name, one in record.pressures.items()}
         for out in record.outputs:
             readings["input_speed" if out.name == "engine_speed" else out.name] = out.values
         for role, values in readings.items():
@@ -179,6 +184,6 @@ def _largest_readings(fit: LikelihoodFit) -> dict[str, float]:
     return found
 
 
-def _size(sizes: Mapping[str, SensorTolerance], error: str) -> float:
+def _get_size(sizes: Mapping[str, SensorTolerance], error: str) -> float:
     role, kind = error.rsplit(" ", 1)
     return float(getattr(sizes[role], kind))

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from itertools import takewhile
 
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import LONGEST, PAYLOAD, Frames, frame_table
+from drivetwin.logs.formats.frames import LONGEST, PAYLOAD, Frames, build_frames
 
 _IS_ASC = re.compile(
     rb"^(?:date [A-Z][a-z]{2} |base\s+(?:hex|dec)\b|Begin Triggerblock"
@@ -68,7 +68,7 @@ def read_asc(data: bytes, file: str) -> Frames:
     if _RELATIVE.search(data[:_HEAD]):
         what = "its time stamps count from event to event"
         raise FileFormatError(what, "export with absolute time stamps", where)
-    rows = list(_rows(data, 10 if _DECIMAL.search(data[:_HEAD]) else 16))
+    rows = list(_parse_rows(data, 10 if _DECIMAL.search(data[:_HEAD]) else 16))
     if not rows:
         raise FileFormatError("no frame in the file", "record it again", where)
     other = len(_OTHER.findall(data))
@@ -79,10 +79,10 @@ def read_asc(data: bytes, file: str) -> Frames:
     if damaged := total - other - len(rows):
         warnings.append(f"{damaged} damaged lines left out of {total}")
     stamps, identifiers, extended, payloads, buses = zip(*rows, strict=True)
-    return frame_table(stamps, identifiers, extended, payloads, buses, tuple(warnings))
+    return build_frames(stamps, identifiers, extended, payloads, buses, tuple(warnings))
 
 
-def _rows(data: bytes, base: int) -> Iterator[_Row]:
+def _parse_rows(data: bytes, base: int) -> Iterator[_Row]:
     """Time [s], identifier, whether it is extended, payload and bus of each sound line."""
     part = _BYTES[base]
     line = re.compile(
@@ -96,14 +96,14 @@ def _rows(data: bytes, base: int) -> Iterator[_Row]:
         if fd_bus is not None:
             bus, number, x, digits, length = fd_bus, fd_number, fd_x, fd_digits, int(fd_length)
         else:
-            length = min(_number(code, base), PAYLOAD)
-        payload = _payload(digits, base)[:length]
-        identifier, extended = _number(number, base), bool(x)
+            length = min(_parse_number(code, base), PAYLOAD)
+        payload = _parse_payload(digits, base)[:length]
+        identifier, extended = _parse_number(number, base), bool(x)
         if len(payload) == length <= LONGEST and 0 <= identifier <= _MOST[extended]:
             yield float(time), identifier, extended, payload, f"channel {int(bus) - 1}"
 
 
-def _payload(digits: bytes, base: int) -> bytes:
+def _parse_payload(digits: bytes, base: int) -> bytes:
     """Parse the payload bytes; stop before the first number that exceeds one byte."""
     if base == 16:
         return bytes.fromhex(digits.decode())
@@ -112,6 +112,6 @@ def _payload(digits: bytes, base: int) -> bytes:
     return bytes(whole)
 
 
-def _number(digits: bytes, base: int) -> int:
+def _parse_number(digits: bytes, base: int) -> int:
     """Parse a number; -1 if a decimal log contains letters."""
     return -1 if base == 10 and not digits.isdigit() else int(digits, base)

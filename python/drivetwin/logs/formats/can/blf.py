@@ -7,27 +7,27 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.optional_dependencies import foreign_parser, require
+from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import LONGEST, Frames, frame_table
+from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
 
 
 def read_blf(path: Path) -> Frames:
     """Read the data frames of a BLF file; raises MissingExtraError, FileFormatError."""
     kind = "a BLF bus log"
-    can = require("can", "can", kind, path)
-    with path.open("rb") as file, foreign_parser(kind, path):
-        return _read(can.BLFReader(file), kind, path)
+    can = import_extra("can", "can", kind, path)
+    with path.open("rb") as file, handle_parser_errors(kind, path):
+        return _read_frames(can.BLFReader(file), kind, path)
 
 
-def _read(reader: Any, kind: str, path: Path) -> Frames:
+def _read_frames(reader: Any, kind: str, path: Path) -> Frames:
     """The table of data frames; what breaks off is read up to there."""
     frames: list[tuple[float, int, bool, bytes, str]] = []
     left_out = 0
     warnings: list[str] = []
     try:
-        with foreign_parser(kind, path):
-            left_out = _collect(reader, frames)
+        with handle_parser_errors(kind, path):
+            left_out = _collect_frames(reader, frames)
     except FileFormatError as fault:
         if not frames:
             raise
@@ -37,10 +37,12 @@ def _read(reader: Any, kind: str, path: Path) -> Frames:
     if left_out:
         warnings.append(f"{left_out} remote or error frames left out")
     stamps, identifiers, extended, payloads, buses = zip(*frames, strict=True)
-    return frame_table(stamps, identifiers, extended, payloads, buses, tuple(warnings))
+    return build_frames(stamps, identifiers, extended, payloads, buses, tuple(warnings))
 
 
-def _collect(reader: Iterable[Any], frames: list[tuple[float, int, bool, bytes, str]]) -> int:
+def _collect_frames(
+    reader: Iterable[Any], frames: list[tuple[float, int, bool, bytes, str]]
+) -> int:
     """Append the data frames; return how many others there were."""
     left_out = 0
     for message in reader:

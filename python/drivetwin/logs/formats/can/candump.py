@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import LONGEST, Frames, frame_table
+from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
 
 _STAMP = rb"^[ \t]*\((?P<time>(?:\d{4}-\d{2}-\d{2} \d{2}:\d{2}:)?\d{1,12}\.\d{1,9})\)[ \t]+"
 _LINE = re.compile(
@@ -55,9 +55,9 @@ def read_candump(data: bytes, file: str) -> Frames:
     buses: list[str] = []
     for match in _LINE.finditer(data):
         stamp, bus, identifier, count, spaced, packed = match.groups()
-        digits = _without_flags(packed) if spaced is None else spaced
+        digits = _drop_flags(packed) if spaced is None else spaced
         payload = bytes.fromhex(digits.replace(b".", b"").decode())
-        time = _seconds(stamp)
+        time = _parse_seconds(stamp)
         wrong = count is not None and int(count) != len(payload)
         if time is None or len(payload) > LONGEST or wrong:
             continue
@@ -81,10 +81,10 @@ def read_candump(data: bytes, file: str) -> Frames:
         warnings.append(f"{other} remote or error frames left out")
     if damaged:
         warnings.append(f"{damaged} damaged lines left out of {len(stamps) + damaged + other}")
-    return frame_table(stamps, identifiers, extended, payloads, buses, tuple(warnings))
+    return build_frames(stamps, identifiers, extended, payloads, buses, tuple(warnings))
 
 
-def _seconds(stamp: bytes) -> float | None:
+def _parse_seconds(stamp: bytes) -> float | None:
     """A stamp [s], counted from 1970 where it is a date; None for a date that does not exist."""
     if b"-" not in stamp:
         return float(stamp)
@@ -96,6 +96,6 @@ def _seconds(stamp: bytes) -> float | None:
     return minute.timestamp() + float(seconds)
 
 
-def _without_flags(packed: bytes) -> bytes:
+def _drop_flags(packed: bytes) -> bytes:
     """The data of the compact form; a CAN FD frame has a second `#` and a digit of flags first."""
     return packed[2:] if packed.startswith(b"#") else packed

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.optional_dependencies import foreign_parser, require
+from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.frames import Signal
@@ -39,33 +39,33 @@ def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:
     """
     messages: list[Message] = []
     for path in paths:
-        cantools = require("cantools.database", "can", "decoding a bus log", path)
+        cantools = import_extra("cantools.database", "can", "decoding a bus log", path)
         if not path.is_file():
             raise FileFormatError(
                 "there is no such DBC file", "correct dbc under [bus]", Where(file=str(path))
             )
-        with foreign_parser("a DBC file", path):
+        with handle_parser_errors("a DBC file", path):
             text = path.read_text(encoding="cp1252", errors="replace")
             content = cantools.load_string(text, "dbc", strict=False)
-            messages += [_message(one) for one in content.messages]
+            messages += [_convert_message(one) for one in content.messages]
     return tuple(messages)
 
 
-def _message(source: Any) -> Message:
+def _convert_message(source: Any) -> Message:
     by_name = {one.name: one for one in source.signals}
     return Message(
         name=source.name,
         identifier=int(source.frame_id),
         extended=bool(source.is_extended_frame),
         j1939=source.protocol == "j1939",
-        signals=tuple(_signal(one, by_name) for one in source.signals),
+        signals=tuple(_convert_signal(one, by_name) for one in source.signals),
     )
 
 
-def _signal(source: Any, by_name: dict[str, Any]) -> Signal:
+def _convert_signal(source: Any, by_name: dict[str, Any]) -> Signal:
     selector = None
     if source.multiplexer_ids and source.multiplexer_signal in by_name:
-        switch = _signal(by_name[source.multiplexer_signal], by_name)
+        switch = _convert_signal(by_name[source.multiplexer_signal], by_name)
         selector = (switch, frozenset(int(each) for each in source.multiplexer_ids))
     low, high = source.minimum, source.maximum
     stated = low is not None and high is not None and low < high
@@ -85,7 +85,7 @@ def _signal(source: Any, by_name: dict[str, Any]) -> Signal:
     )
 
 
-def codes(data: Bytes, signal: Signal) -> NDArray[np.int64]:
+def decode_codes(data: Bytes, signal: Signal) -> NDArray[np.int64]:
     """Return the unsigned codes (n,) of a signal in payloads `data` (n, bytes).
 
     Raises ValueError where the signal is too long or does not fit the payloads.
@@ -105,17 +105,17 @@ def codes(data: Bytes, signal: Signal) -> NDArray[np.int64]:
     return (total & np.uint64((1 << signal.length) - 1)).astype(np.int64)
 
 
-def physical(data: Bytes, signal: Signal) -> FloatArray:
+def decode_physical(data: Bytes, signal: Signal) -> FloatArray:
     """Return the values (n,) of a signal in its unit; ValueError as in `codes`."""
     if signal.is_float:
-        return signal.scale * _floats(data, signal) + signal.offset
-    raw = codes(data, signal)
+        return signal.scale * _decode_floats(data, signal) + signal.offset
+    raw = decode_codes(data, signal)
     if signal.signed:
         raw = np.where(raw >> (signal.length - 1), raw - (1 << signal.length), raw)
     return signal.scale * raw.astype(np.float64) + signal.offset
 
 
-def _floats(data: Bytes, signal: Signal) -> FloatArray:
+def _decode_floats(data: Bytes, signal: Signal) -> FloatArray:
     """IEEE numbers that start on a byte border."""
     width = signal.length // 8
     first = signal.start // 8
@@ -127,7 +127,7 @@ def _floats(data: Bytes, signal: Signal) -> FloatArray:
     return part.view(kind)[:, 0].astype(np.float64)
 
 
-def admitted(
+def select_valid_payloads(
     data: Bytes, length: NDArray[np.uint8] | NDArray[np.intp], signal: Signal
 ) -> NDArray[np.bool_]:
     """Select the payloads (n,) that are long enough and whose multiplexer selects the signal.
@@ -137,5 +137,7 @@ def admitted(
     there: NDArray[np.bool_] = np.asarray(length >= signal.end)
     if signal.selector is not None:
         switch, allowed = signal.selector
-        there &= np.isin(codes(data, switch), list(allowed)) & admitted(data, length, switch)
+        there &= np.isin(decode_codes(data, switch), list(allowed)) & select_valid_payloads(
+            data, length, switch
+        )
     return there

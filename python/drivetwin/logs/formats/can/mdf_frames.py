@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.logs.formats.frames import PAYLOAD, Frames
-from drivetwin.logs.origin import since
+from drivetwin.logs.origin import subtract_origin
 
 DATA_FRAME = "CAN_DataFrame"
 """Name of the record of a data frame; its parts follow after a dot."""
@@ -20,12 +20,12 @@ _LENGTHS = np.array([*range(9), 12, 16, 20, 24, 32, 48, 64], np.uint8)
 """Data bytes by the code of CAN FD."""
 
 
-def holds_frames(group: Any) -> bool:
+def has_only_frames(group: Any) -> bool:
     """Return True if a group of a file holds raw frames and no signals."""
     return any(str(channel.name).partition(".")[0] in _RECORDS for channel in group.channels)
 
 
-def bus_frames(mdf: Any, origin: float) -> Frames | None:
+def read_bus_frames(mdf: Any, origin: float) -> Frames | None:
     """Return the data frames of all groups in order of time; None where the file has none.
 
     Their time counts from the `origin` of the file [s].
@@ -34,7 +34,7 @@ def bus_frames(mdf: Any, origin: float) -> Frames | None:
     parts = [
         part
         for number in range(len(mdf.groups))
-        if number in mdf.masters_db and (part := _frames(mdf, number)) and part.time.size
+        if number in mdf.masters_db and (part := _read_group_frames(mdf, number)) and part.time.size
     ]
     if not parts:
         return None
@@ -50,7 +50,7 @@ def bus_frames(mdf: Any, origin: float) -> Frames | None:
         for part in parts
     ]
     return Frames(
-        time=since(time[order], origin),
+        time=subtract_origin(time[order], origin),
         identifier=np.concatenate([part.identifier for part in parts])[order],
         extended=np.concatenate([part.extended for part in parts])[order],
         data=np.concatenate(padded)[order],
@@ -61,13 +61,13 @@ def bus_frames(mdf: Any, origin: float) -> Frames | None:
     )
 
 
-def _names(group: Any) -> frozenset[str]:
+def _get_channel_names(group: Any) -> frozenset[str]:
     return frozenset(str(channel.name) for channel in group.channels)
 
 
-def _frames(mdf: Any, number: int) -> Frames | None:
+def _read_group_frames(mdf: Any, number: int) -> Frames | None:
     """The frames of one group; parts that the logger left out have their usual meaning."""
-    names = _names(mdf.groups[number])
+    names = _get_channel_names(mdf.groups[number])
 
     def part(name: str) -> NDArray[Any] | None:
         if f"{DATA_FRAME}.{name}" not in names:

@@ -30,26 +30,26 @@ def open_bus_text(path: Path, options: ReadOptions) -> Iterator[Recording]:
     data = path.read_bytes()
     read = read_candump if is_candump(data[:8192]) else read_asc
     frames = read(data, str(path))
-    yield bus_recording(frames, options, path)
+    yield decode_recording(frames, options, path)
 
 
 @contextmanager
 def open_blf(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a BLF log; raises FileFormatError, MissingExtraError, MissingChannelError."""
-    yield bus_recording(read_blf(path), options, path)
+    yield decode_recording(read_blf(path), options, path)
 
 
-def bus_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
+def decode_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
     """Decode frames by the databases stated; raises MissingChannelError, MissingExtraError."""
-    return BusRecording(frames, _messages(options.bus.databases), options.bus, path)
+    return BusRecording(frames, _select_messages(options.bus.databases), options.bus, path)
 
 
-def _messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:
+def _select_messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:
     """Messages of the stated databases, else the built-in ones of J1939."""
-    return read_database(databases) if databases else _j1939()
+    return read_database(databases) if databases else _load_j1939_messages()
 
 
 @cache
-def _j1939() -> tuple[Message, ...]:
+def _load_j1939_messages() -> tuple[Message, ...]:
     with as_file(files("drivetwin.logs.formats.j1939") / "driveline.dbc") as path:
         return read_database((path,))

@@ -14,12 +14,22 @@ from numpy.typing import NDArray
 from drivetwin.channels.read_options import BusOptions, Column
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError, MissingChannelError, Where
-from drivetwin.logs.formats.can.database import Message, admitted, codes, physical
+from drivetwin.logs.formats.can.database import (
+    Message,
+    decode_codes,
+    decode_physical,
+    select_valid_payloads,
+)
 from drivetwin.logs.formats.frames import Frames, Signal
 from drivetwin.logs.formats.j1939 import torque
 from drivetwin.logs.formats.j1939.codes import check_codes
-from drivetwin.logs.formats.j1939.identifier import ENGINE, TRANSMISSION, group_of, sender_of
-from drivetwin.logs.formats.j1939.transport import REPEATED, Assembled, reassemble
+from drivetwin.logs.formats.j1939.identifier import (
+    ENGINE,
+    TRANSMISSION,
+    decode_group,
+    decode_sender,
+)
+from drivetwin.logs.formats.j1939.transport import REPEATED, Assembled, assemble_messages
 from drivetwin.logs.quality.channel_checks import MIN_SAMPLES
 from drivetwin.logs.raw import RawChannel, Window
 
@@ -40,7 +50,7 @@ class Track:
     length: NDArray[np.intp]
     aside: bool = False
 
-    def column(self, name: str, unit: str | None) -> Column:
+    def make_column(self, name: str, unit: str | None) -> Column:
         """One of its signals as a column."""
         return Column(name, unit, self.group, aside=self.aside)
 
@@ -58,9 +68,12 @@ class BusRecording:
         self, frames: Frames, messages: Sequence[Message], options: BusOptions, path: Path
     ) -> None:
         self._path = path
-        transport = reassemble(frames)
-        tracks = _with_aside(
-            [*_single(frames, messages), *_multiple(transport.messages, messages, frames)]
+        transport = assemble_messages(frames)
+        tracks = _mark_echoes(
+            [
+                *_collect_single_frames(frames, messages),
+                *_collect_multi_packet(transport.messages, messages, frames),
+            ]
         )
         if not tracks:
             raise MissingChannelError(
@@ -73,23 +86,28 @@ class BusRecording:
         incomplete = (f"multi-packet messages incomplete: {faults}",) if faults else ()
         self.warnings: tuple[str, ...] = (*frames.warnings, *incomplete)
         entries = [
-            _Entry(track.column(signal.name, signal.unit), partial(self._decode, track, signal))
+            _Entry(
+                track.make_column(signal.name, signal.unit),
+                partial(self._decode_signal, track, signal),
+            )
             for track in tracks
             for signal in track.message.signals
         ]
-        self._entries = [*entries, *self._torques(tracks, options)]
-        self.columns: Sequence[Column] = tuple(_marked(entry) for entry in self._entries)
+        self._entries = [*entries, *self._convert_percent_torques(tracks, options)]
+        self.columns: Sequence[Column] = tuple(
+            _make_marked_column(entry) for entry in self._entries
+        )
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Decode one signal; see `Recording`. Codes that are no values are dropped and noted."""
-        return self._entries[index].decode().within(window)
+        return self._entries[index].decode().select_window(window)
 
-    def _decode(self, track: Track, signal: Signal) -> RawChannel:
+    def _decode_signal(self, track: Track, signal: Signal) -> RawChannel:
         where = Where(file=str(self._path), channel=f"{signal.name} ({track.group})")
         try:
-            there = admitted(track.data, track.length, signal)
-            values = physical(track.data, signal)
-            raw = None if signal.is_float else codes(track.data, signal)
+            there = select_valid_payloads(track.data, track.length, signal)
+            values = decode_physical(track.data, signal)
+            raw = None if signal.is_float else decode_codes(track.data, signal)
         except ValueError as fault:
             raise DamagedChannelError(
                 f"the database does not fit the frames: {fault}", "use the DBC of this bus", where
@@ -100,7 +118,7 @@ class BusRecording:
             if check.note:
                 notes.append(check.note)
             there[there] = check.valid
-        again = _again(track) & there
+        again = _find_repeats(track) & there
         if again.any():
             notes.append(f"{int(again.sum())} repeated frames, or with an earlier stamp, left out")
             there &= ~again
@@ -112,7 +130,9 @@ class BusRecording:
             signal.name, signal.unit, track.time[there], values[there], track.group, tuple(notes)
         )
 
-    def _torques(self, tracks: Sequence[Track], options: BusOptions) -> Iterator[_Entry]:
+    def _convert_percent_torques(
+        self, tracks: Sequence[Track], options: BusOptions
+    ) -> Iterator[_Entry]:
         """Percent torques in N·m, and the net torque of each engine."""
         percent = [
             (track, signal)
@@ -122,44 +142,50 @@ class BusRecording:
         ]
         if not percent:
             return
-        reference, note = self._reference(tracks, options)
+        reference, note = self._find_reference_torque(tracks, options)
         if reference is None:
             self.warnings = (*self.warnings, note)
             return
         for track, signal in percent:
-            column = track.column(torque.torque_name(signal.name), torque.UNIT)
-            yield _Entry(column, partial(self._torque, track, signal, (reference, note)))
+            column = track.make_column(torque.derive_torque_name(signal.name), torque.UNIT)
+            yield _Entry(
+                column, partial(self._convert_percent_torque, track, signal, (reference, note))
+            )
         for track, actual in percent:
             friction = [
                 pair for pair in percent
-                if pair[1].spn == torque.FRICTION and _source(pair[0]) == _source(track)
+                if pair[1].spn == torque.FRICTION and _describe_sender(pair[0]) == _describe_sender(track)
             ]  # fmt: skip
             if actual.spn == torque.ACTUAL and len(friction) == 1:
-                column = track.column(torque.NET_TORQUE, torque.UNIT)
+                column = track.make_column(torque.NET_TORQUE, torque.UNIT)
                 pairs = ((track, actual), friction[0])
-                yield _Entry(column, partial(self._net, pairs, (reference, note)))
+                yield _Entry(column, partial(self._compute_net_torque, pairs, (reference, note)))
 
-    def _torque(self, track: Track, signal: Signal, reference: tuple[float, str]) -> RawChannel:
-        percent = self._decode(track, signal)
+    def _convert_percent_torque(
+        self, track: Track, signal: Signal, reference: tuple[float, str]
+    ) -> RawChannel:
+        percent = self._decode_signal(track, signal)
         if signal.spn == torque.ACTUAL:
             for other in track.message.signals:
                 if other.spn == torque.FRACTION:
-                    percent = self._with_fraction(percent, track, other)
-        return torque.in_newton_metres(percent, *reference)
+                    percent = self._add_fraction(percent, track, other)
+        return torque.convert_to_torque(percent, *reference)
 
-    def _with_fraction(self, percent: RawChannel, track: Track, signal: Signal) -> RawChannel:
+    def _add_fraction(self, percent: RawChannel, track: Track, signal: Signal) -> RawChannel:
         try:
-            return torque.with_fraction(percent, self._decode(track, signal))
+            return torque.add_fraction(percent, self._decode_signal(track, signal))
         except DamagedChannelError:  # an engine that sends whole percents only
             return percent
 
-    def _net(
+    def _compute_net_torque(
         self, pairs: tuple[tuple[Track, Signal], tuple[Track, Signal]], reference: tuple[float, str]
     ) -> RawChannel:
-        actual, friction = (self._torque(*pair, reference) for pair in pairs)
-        return torque.net_torque(actual, friction)
+        actual, friction = (self._convert_percent_torque(*pair, reference) for pair in pairs)
+        return torque.compute_net_torque(actual, friction)
 
-    def _reference(self, tracks: Sequence[Track], options: BusOptions) -> tuple[float | None, str]:
+    def _find_reference_torque(
+        self, tracks: Sequence[Track], options: BusOptions
+    ) -> tuple[float | None, str]:
         """Return the reference torque [N·m] and its source; without one, a remedy."""
         if options.reference_torque is not None:
             return options.reference_torque, (
@@ -170,7 +196,7 @@ class BusRecording:
                 if signal.spn != torque.REFERENCE:
                     continue
                 try:
-                    told = self._decode(track, signal).values
+                    told = self._decode_signal(track, signal).values
                 except DamagedChannelError:
                     continue
                 if np.ptp(told) == 0.0 and told[0] > 0.0:
@@ -181,7 +207,7 @@ class BusRecording:
         )
 
 
-def _marked(entry: _Entry) -> Column:
+def _make_marked_column(entry: _Entry) -> Column:
     """Build the column; mark signals that are never available, and senders with few frames."""
     try:
         return replace(entry.column, empty=entry.decode().time.size < MIN_SAMPLES)
@@ -189,7 +215,7 @@ def _marked(entry: _Entry) -> Column:
         return replace(entry.column, empty=True, silent=True)
 
 
-def _again(track: Track) -> NDArray[np.bool_]:
+def _find_repeats(track: Track) -> NDArray[np.bool_]:
     """Frames (n,) that do not come after the one before, or of J1939 repeat it at once."""
     later = np.diff(track.time)
     again = later <= 0.0
@@ -198,11 +224,11 @@ def _again(track: Track) -> NDArray[np.bool_]:
     return np.concatenate(([False], again))
 
 
-def _source(track: Track) -> tuple[int | None, int]:
+def _describe_sender(track: Track) -> tuple[int | None, int]:
     return track.sender, track.bus
 
 
-def _with_aside(tracks: Sequence[Track]) -> list[Track]:
+def _mark_echoes(tracks: Sequence[Track]) -> list[Track]:
     """Mark messages of other senders if the engine or transmission also sends the message."""
     own = (ENGINE, TRANSMISSION)
     told = {(one.message.name, one.bus) for one in tracks if one.sender in own}
@@ -212,18 +238,18 @@ def _with_aside(tracks: Sequence[Track]) -> list[Track]:
     ]
 
 
-def _group(message: Message, sender: int | None, bus: str, many: bool) -> str:
+def _make_group_label(message: Message, sender: int | None, bus: str, many: bool) -> str:
     text = message.name if sender is None else f"{message.name} from 0x{sender:02X}"
     return f"{text} on {bus}" if many else text
 
 
-def _single(frames: Frames, messages: Sequence[Message]) -> Iterator[Track]:
+def _collect_single_frames(frames: Frames, messages: Sequence[Message]) -> Iterator[Track]:
     """Messages that fit one frame."""
-    groups, senders = group_of(frames.identifier), sender_of(frames.identifier)
+    groups, senders = decode_group(frames.identifier), decode_sender(frames.identifier)
     many = len(frames.buses) > 1
     for message in messages:
         if message.j1939:
-            wanted = group_of(np.array([message.identifier], np.uint32))[0]
+            wanted = decode_group(np.array([message.identifier], np.uint32))[0]
             mine = frames.extended & (groups == wanted)
             tags = np.where(mine, senders, 0)
         else:
@@ -232,7 +258,7 @@ def _single(frames: Frames, messages: Sequence[Message]) -> Iterator[Track]:
         for bus, name in enumerate(frames.buses):
             for tag in np.unique(tags[mine & (frames.bus == bus)]).tolist():
                 rows = mine & (frames.bus == bus) & (tags == tag)
-                group = _group(message, tag if message.j1939 else None, name, many)
+                group = _make_group_label(message, tag if message.j1939 else None, name, many)
                 yield Track(
                     message,
                     tag if message.j1939 else None,
@@ -244,7 +270,7 @@ def _single(frames: Frames, messages: Sequence[Message]) -> Iterator[Track]:
                 )
 
 
-def _multiple(
+def _collect_multi_packet(
     assembled: Sequence[Assembled], messages: Sequence[Message], frames: Frames
 ) -> Iterator[Track]:
     """Messages that the transport protocol brought."""
@@ -252,22 +278,22 @@ def _multiple(
     for message in messages:
         if not message.j1939:
             continue
-        wanted = int(group_of(np.array([message.identifier], np.uint32))[0])
+        wanted = int(decode_group(np.array([message.identifier], np.uint32))[0])
         mine = [one for one in assembled if one.group == wanted]
         for bus, sender in sorted({(one.bus, one.sender) for one in mine}):
             own = [one for one in mine if (one.bus, one.sender) == (bus, sender)]
-            width = max(max(len(one.payload) for one in own), _widest(message))
+            width = max(max(len(one.payload) for one in own), _get_longest_payload(message))
             padded = b"".join(one.payload.ljust(width, b"\xff") for one in own)
             yield Track(
                 message,
                 sender,
                 bus,
-                _group(message, sender, frames.buses[bus], many),
+                _make_group_label(message, sender, frames.buses[bus], many),
                 np.array([one.time for one in own]),
                 np.frombuffer(padded, np.uint8).reshape(-1, width),
                 np.array([len(one.payload) for one in own], np.intp),
             )
 
 
-def _widest(message: Message) -> int:
+def _get_longest_payload(message: Message) -> int:
     return max((signal.end for signal in message.signals), default=0)

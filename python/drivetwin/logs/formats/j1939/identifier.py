@@ -14,7 +14,7 @@ ENGINE, TRANSMISSION = 0x00, 0x03
 """Source addresses that SAE J1939 sets aside for the first engine and the first transmission."""
 
 
-def group_of(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
+def decode_group(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
     """Return the parameter group number (n,) of each identifier."""
     page = (identifier >> 24) & 0x3
     pdu_format = (identifier >> 16) & 0xFF
@@ -22,12 +22,12 @@ def group_of(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
     return ((page << 16) | (pdu_format << 8) | extension).astype(np.uint32)
 
 
-def sender_of(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
+def decode_sender(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
     """Return the source address (n,) of each identifier."""
     return identifier & np.uint32(0xFF)
 
 
-def receiver_of(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
+def decode_receiver(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
     """Return the destination address (n,); 255 for all, as for groups that name no receiver."""
     pdu_format = (identifier >> 16) & 0xFF
     return np.where(pdu_format < _PDU1_BELOW, (identifier >> 8) & 0xFF, 0xFF).astype(np.uint32)

@@ -23,15 +23,15 @@ NET_TORQUE = "EngNetTorque"
 UNIT = "Nm"
 
 
-def torque_name(name: str) -> str:
+def derive_torque_name(name: str) -> str:
     """Name of a percent torque's channel in N·m: `ActualEngPercentTorque` -> `ActualEngTorque`."""
     return name.replace("PercentTorque", "Torque") if "PercentTorque" in name else f"{name}_Nm"
 
 
-def in_newton_metres(percent: RawChannel, reference: float, note: str) -> RawChannel:
+def convert_to_torque(percent: RawChannel, reference: float, note: str) -> RawChannel:
     """Return a percent torque as torque; `note` names the source of the `reference` [N·m]."""
     return RawChannel(
-        torque_name(percent.name),
+        derive_torque_name(percent.name),
         UNIT,
         percent.time,
         percent.values * (reference / 100.0),
@@ -40,7 +40,7 @@ def in_newton_metres(percent: RawChannel, reference: float, note: str) -> RawCha
     )
 
 
-def with_fraction(actual: RawChannel, fraction: RawChannel) -> RawChannel:
+def add_fraction(actual: RawChannel, fraction: RawChannel) -> RawChannel:
     """Add the fraction of a percent from the same message, where the message contains it."""
     part = np.zeros(actual.time.size)
     index = np.clip(np.searchsorted(fraction.time, actual.time), 0, max(0, fraction.time.size - 1))
@@ -52,16 +52,16 @@ def with_fraction(actual: RawChannel, fraction: RawChannel) -> RawChannel:
     )
 
 
-def net_torque(actual: RawChannel, friction: RawChannel) -> RawChannel:
+def compute_net_torque(actual: RawChannel, friction: RawChannel) -> RawChannel:
     """Return actual minus friction torque [N·m] at the stamps of the actual torque.
 
     Friction is interpolated linearly; outside its span and in its gaps there is no net torque.
     """
-    values: FloatArray = actual.values - _channel(friction).at(actual.time)
+    values: FloatArray = actual.values - _make_channel(friction).interpolate(actual.time)
     known = np.isfinite(values)
     notes = tuple(dict.fromkeys((*actual.notes, *friction.notes)))
     return RawChannel(NET_TORQUE, UNIT, actual.time[known], values[known], actual.group, notes)
 
 
-def _channel(raw: RawChannel) -> Channel:
+def _make_channel(raw: RawChannel) -> Channel:
     return Channel(raw.name, Quantity.TORQUE, raw.time, raw.values, raw.name, UNIT)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivetwin.logs.formats.frames import Frames
-from drivetwin.logs.formats.j1939.identifier import group_of, receiver_of, sender_of
+from drivetwin.logs.formats.j1939.identifier import decode_group, decode_receiver, decode_sender
 
 _CONNECTION, _DATA = 0xEC00, 0xEB00
 _RTS, _BAM, _ABORT = 16, 32, 255
@@ -55,23 +55,23 @@ class _Transfer:
     parts: list[bytes] = field(default_factory=list)
 
 
-def reassemble(frames: Frames) -> Transport:
+def assemble_messages(frames: Frames) -> Transport:
     """Put multi-packet messages together from all frames of a log."""
-    groups = group_of(frames.identifier)
+    groups = decode_group(frames.identifier)
     chosen = np.flatnonzero(frames.extended & np.isin(groups, (_CONNECTION, _DATA)))
     assembly = _Assembly()
-    senders, receivers = sender_of(frames.identifier), receiver_of(frames.identifier)
+    senders, receivers = decode_sender(frames.identifier), decode_receiver(frames.identifier)
     for index in chosen.tolist():
         key = (int(frames.bus[index]), int(senders[index]), int(receivers[index]))
         payload = frames.data[index, : frames.length[index]].tobytes()
         time = float(frames.time[index])
-        if assembly.repeated((*key, int(groups[index])), payload, time):
+        if assembly.is_repeat((*key, int(groups[index])), payload, time):
             continue
         if groups[index] == _CONNECTION:
-            assembly.connect(key, payload, time)
+            assembly.open_transfer(key, payload, time)
         else:
-            assembly.packet(key, payload, time)
-    return assembly.finish()
+            assembly.append_packet(key, payload, time)
+    return assembly.close_transfers()
 
 
 class _Assembly:
@@ -83,7 +83,7 @@ class _Assembly:
         self._faults: Counter[str] = Counter()
         self._last: dict[tuple[int, int, int, int], tuple[bytes, float]] = {}
 
-    def repeated(self, place: tuple[int, int, int, int], payload: bytes, time: float) -> bool:
+    def is_repeat(self, place: tuple[int, int, int, int], payload: bytes, time: float) -> bool:
         """Return True if a frame repeats the last one of its `place` (gateway or logger echo).
 
         A `place` is (bus, sender, receiver, group).
@@ -92,38 +92,38 @@ class _Assembly:
         self._last[place] = (payload, time)
         return payload == before and time - since < REPEATED
 
-    def connect(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
+    def open_transfer(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
         if len(payload) < 8:
             self._faults["announcement cut short"] += 1
             return
         if payload[0] == _ABORT:
             for pair in (key, (key[0], key[2], key[1])):
-                self._drop(pair, "aborted")
+                self._drop_transfer(pair, "aborted")
             return
         if payload[0] not in (_RTS, _BAM):
             return  # clear to send, end of message: the receiver's part
         length = int.from_bytes(payload[1:3], "little")
         group = int.from_bytes(payload[5:8], "little")
-        self._drop(key, "replaced by the next before its end")
+        self._drop_transfer(key, "replaced by the next before its end")
         if not 8 < length <= _LONGEST or payload[3] != -(-length // _BYTES):
             self._faults["announced with an impossible length"] += 1
             return
         self._open[key] = _Transfer(group, length, payload[3], time)
 
-    def packet(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
+    def append_packet(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
         transfer = self._open.get(key)
         if transfer is None or len(payload) < 2:
             self._faults["packet without announcement"] += 1
             return
         if time - transfer.time > _TIMEOUT:
-            self._drop(key, "paused too long")
+            self._drop_transfer(key, "paused too long")
             return
         expected = len(transfer.parts) + 1
         number = payload[0]
         if number == expected - 1 and number > 0 and payload[1:] == transfer.parts[-1]:
             return  # sent once more
         if number != expected:
-            self._drop(key, "packet missing")
+            self._drop_transfer(key, "packet missing")
             return
         transfer.parts.append(payload[1:])
         transfer.time = time
@@ -137,11 +137,11 @@ class _Assembly:
                 Assembled(time, transfer.group, key[1], key[0], data[: transfer.length])
             )
 
-    def finish(self) -> Transport:
+    def close_transfers(self) -> Transport:
         for key in list(self._open):
-            self._drop(key, "cut by the end of the log")
+            self._drop_transfer(key, "cut by the end of the log")
         return Transport(tuple(self._messages), self._faults)
 
-    def _drop(self, key: tuple[int, int, int], reason: str) -> None:
+    def _drop_transfer(self, key: tuple[int, int, int], reason: str) -> None:
         if self._open.pop(key, None) is not None:
             self._faults[reason] += 1
