@@ -37,8 +37,7 @@ class MeasuredSignal:
 
     @property
     def unrecorded(self) -> tuple[Span, ...]:
-        """All spans [s] of which nothing is known: the gaps, before the first sample and after the
-        last."""
+        """Spans [s] without samples: the gaps, before the first sample and after the last."""
         if not self.time.size:
             return ((-np.inf, np.inf),)
         first, last = float(self.time[0]), float(self.time[-1])
@@ -59,7 +58,7 @@ class MeasuredSignal:
 
 @dataclass(frozen=True, eq=False)
 class TorqueOfSpeeds:
-    """How an engine torque that is a map of speeds hangs on the noise of the compared one.
+    """Sensitivity of an engine torque that is a map of speeds to the noise of the compared one.
 
     `slope` (n,) [N m s/rad] is its derivative by ω_e at `time` (n,) [s], `rest` (n,) [N m] the
     noise of its samples that is not from ω_e.
@@ -171,14 +170,13 @@ class ShiftSignals:
 
     @property
     def output_gaps(self) -> tuple[Span, ...]:
-        """Where something compared with the equations is unrecorded: output torque, a speed of the
-        gearbox."""
+        """Spans [s] without output torque or a speed of the gearbox, which the fit compares."""
         compared = (self.output_torque, self.engine_speed, self.output_speed)
         return tuple(gap for signal in compared for gap in signal.unrecorded)
 
     @property
     def scale_known(self) -> bool:
-        """Whether an output torque gives all torque-like quantities their common scale."""
+        """True if an output torque gives all torque-like quantities their common scale."""
         return self.output_torque.time.size > 0
 
 

@@ -40,7 +40,7 @@ class Contradiction:
 
     @property
     def text(self) -> str:
-        """The same in words."""
+        """Warning with both values and their difference."""
         unit = get_parameter_spec(self.id).unit
         card, log = (format_with_unit(one.value, unit, one.std) for one in (self.design, self.log))
         return (
@@ -109,7 +109,7 @@ def apply_contradictions(
 
 
 def check_design_ranges(estimates: Mapping[str, Estimate], design: DesignData) -> tuple[str, ...]:
-    """What is said of inertias whose whole interval lies outside the card's design range."""
+    """Return a warning for each inertia whose whole interval lies outside the design range."""
     ranges = {"J_prime": design.J_prime_range, "J_vehicle": design.J_vehicle_range}
     texts = []
     for name, one in estimates.items():
@@ -138,9 +138,9 @@ def check_efficiency_limit(
     if low <= 1.0:
         return dict(estimates), ()
     text = (
-        f"η = {format_with_unit(one.value, one.unit)}: more power would leave the gears than enters; the "
-        "engine torque, or the map of an open converter, gives too little, or the output torque "
-        "reads too much"
+        f"η = {format_with_unit(one.value, one.unit)}: more power would leave the gears than "
+        "enters; the engine torque, or the map of an open converter, gives too little, or the output "
+        "torque reads too much"
     )
     if law == "paper":
         text += '; of a shift in overrun loss_law = "dissipative" tells η'
@@ -148,7 +148,7 @@ def check_efficiency_limit(
 
 
 def describe_range_violation(symbol: str, value: float, design: tuple[float, float]) -> str:
-    """What is said of an inertia [kg m^2] outside its design range; empty where it lies within."""
+    """Describe an inertia [kg m^2] outside its design range; empty if it lies within."""
     if design[0] <= value <= design[1]:
         return ""
     return (
