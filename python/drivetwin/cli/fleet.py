@@ -258,7 +258,8 @@ def _describe_outlier(one: JointEstimate, unit: UnitValue) -> str:
 
     return (
         f"{one.parameter}: unit {format_unit(one, unit)} is "
-        f"{_format_deviation(one, unit.deviation, unit.std)} off, {abs(unit.score or 0.0):.1f} standard "
+        f"{_format_deviation(one, unit.deviation, unit.std)} off, "
+        f"{abs(unit.score or 0.0):.1f} standard "
         "deviations of the units; it counts in value and spread"
     )
 

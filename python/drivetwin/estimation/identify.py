@@ -252,7 +252,7 @@ def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet)
         texts.append("no sensor gain or offset tolerance is stated: intervals cover noise only")
     texts += [
         f"known beforehand: {name} = "
-        + format_with_unit(prior.value, get_parameter_spec(name).unit, prior.std)
+        f"{format_with_unit(prior.value, get_parameter_spec(name).unit, prior.std)}"
         + (" (1 sigma)" if prior.std > 0.0 else ", fixed")
         for name, prior in design.known.items()
         if method is not Method.PAPER

@@ -172,5 +172,6 @@ def build_time_grid(maneuver: Maneuver) -> FloatArray:
 
 
 def build_line(points: list[tuple[float, float]]) -> Signal:
+    """Return a signal linear between `points` of time [s] and value."""
     time, values = zip(*points, strict=True)
     return Signal(np.array(time), np.array(values))

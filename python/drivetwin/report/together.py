@@ -50,8 +50,11 @@ def render_joint_report(found: Identification, logs: Sequence[ShiftLog]) -> str:
     predicted = f" · {_format_shift_count(len(held))} predicted" if held else ""
     return render_page(
         title=f"Driveline model from {names}",
-        subtitle=f"{_format_shift_count(len(found.shifts))} fitted{predicted} · method {found.method.value} · "
-        f"loss law {found.loss_law}",
+        subtitle=(
+            f"{_format_shift_count(len(found.shifts))} fitted{predicted} · method "
+            f"{found.method.value} · "
+            f"loss law {found.loss_law}"
+        ),
         sections=[section for section in sections if section.blocks],
     )
 

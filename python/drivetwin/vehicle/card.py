@@ -16,6 +16,7 @@ from drivetwin.vehicle.spec import (
     Gear,
     PriorValue,
     SensorTolerance,
+    compute_brake_ratios,
 )
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -25,7 +26,7 @@ __all__ = [
     "PriorValue",
     "SensorTolerance",
     "VehicleCard",
-    "brake_ratios",
+    "compute_brake_ratios",
     "load_card",
 ]
 

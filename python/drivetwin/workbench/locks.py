@@ -60,7 +60,8 @@ def check_lock(parameter_id: str, lock: Lock) -> Lock:
         raise InputError("this follows from other parameters", "lock those", where)
     if lock.kind is not LockKind.FREE and not spec.lower <= lock.value <= spec.upper:
         raise InputError(
-            f"{format_with_unit(lock.value, spec.unit)} lies outside {format_with_unit(spec.lower, spec.unit)} to "
+            f"{format_with_unit(lock.value, spec.unit)} lies outside "
+            f"{format_with_unit(spec.lower, spec.unit)} to "
             f"{format_with_unit(spec.upper, spec.unit)}",
             "lock it at a possible value",
             where,

@@ -80,8 +80,9 @@ def select_shifts(
 def _describe_rejection(left: float, steady: bool) -> str:
     if steady:
         return (
-            f"not needed: {MAX_SHIFTS} shifts of the log are fitted, of every change of gears "
-            "those first whose load is the most constant; hold it out to see it predicted"
+            f"not needed: {MAX_SHIFTS} shifts of the log are fitted, of every change of "
+            f"gears those "
+            "first whose load is the most constant; hold it out to see it predicted"
         )
     if not np.isfinite(left):
         return "the gears held beside it tell nothing of its load; other shifts of the log do"

@@ -251,8 +251,9 @@ def _collect_warnings(
     texts = list(dict.fromkeys(notes.values()))
     texts += [text for s in signals for text in s.shift.warnings]
     texts += [
-        f"{_describe_shifts(found)}: the {name} leaves {_format_range(found.values(), '.1f')} "
-        "times the noise power; intervals are widened"
+        f"{_describe_shifts(found)}: the {name} leaves "
+        f"{_format_range(found.values(), '.1f')} times the noise "
+        "power; intervals are widened"
         for name, found in noisy.items()
     ]
     if trends:

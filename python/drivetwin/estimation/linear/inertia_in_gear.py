@@ -97,7 +97,7 @@ def estimate_gear_inertia(
             gear,
             span,
             f"{format_with_unit(value, 'kg*m^2', half)} (95 %) says nothing: the vehicle's "
-            "acceleration varies by "
+            f"acceleration varies by "
             f"{format_with_unit(float(rate.std()), 'rad/s^2', digits=2)} only",
         )
     verdict = Verdict.IDENTIFIED if half < IDENTIFIED * value else Verdict.WEAK

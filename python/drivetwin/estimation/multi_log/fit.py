@@ -195,9 +195,10 @@ def find_largest_differences(alone: Sequence[Identification]) -> list[str]:
                 continue
             spread = float(np.hypot(a.std_noise or 0.0, b.std_noise or 0.0))
             if spread > 0.0 and abs(a.value - b.value) > FAR * spread:
-                first = format_with_unit(a.value, a.unit)
-                second = format_with_unit(b.value, b.unit)
-                text = f"{name} {first} and {second}"
+                text = (
+                    f"{name} {format_with_unit(a.value, a.unit)} and "
+                    f"{format_with_unit(b.value, b.unit)}"
+                )
                 found.append((abs(a.value - b.value) / spread, text))
     return [text for _, text in sorted(found, reverse=True)[:NAMED]]
 

@@ -139,8 +139,9 @@ def check_efficiency_limit(
         return dict(estimates), ()
     text = (
         f"η = {format_with_unit(one.value, one.unit)}: more power would leave the gears than "
-        "enters; the engine torque, or the map of an open converter, gives too little, or the output "
-        "torque reads too much"
+        f"enters; the "
+        "engine torque, or the map of an open converter, gives too little, or the output torque "
+        "reads too much"
     )
     if law == "paper":
         text += '; of a shift in overrun loss_law = "dissipative" tells η'

@@ -33,7 +33,8 @@ def generate_twin_source(subject: Subject) -> str:
     return "\n".join(
         (
             "/* SPDX-License-Identifier: MIT */",
-            f"/* {_format_comment(subject.name)}: {_format_comment(subject.note or 'parameters')}; written by"
+            f"/* {_format_comment(subject.name)}: "
+            f"{_format_comment(subject.note or 'parameters')}; written by"
             " drivetwin. */",
             "",
             '#include "dt_twin.h"',

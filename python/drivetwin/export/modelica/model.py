@@ -164,7 +164,8 @@ def _format_shift(
             f"  driveline.{plain} = inputs.y[{place}];"
             for place, plain in enumerate(names.inputs.values(), 1)
         ),
-        f"  annotation(experiment(StartTime={format_number(first)}, StopTime={format_number(last)}, "
+        f"  annotation(experiment(StartTime={format_number(first)}, "
+        f"StopTime={format_number(last)}, "
         f"Interval={format_number(_INTERVAL)}, Tolerance={format_number(_TOLERANCE)}));",
         "end Shift;\n",
     ]

@@ -65,7 +65,8 @@ def build_initial_equations(
     ]
     angles = _Independent(rigid, len(nodes))
     lines += [
-        f"{twists[str(element['name'])]} = {format_number(-start.twists.get(str(element['name']), 0.0))};"
+        f"{twists[str(element['name'])]} = "
+        f"{format_number(-start.twists.get(str(element['name']), 0.0))};"
         for element in elements
         if element["type"] in _COMPLIANT
         and angles.add_independent(_build_row(_get_slip_row(element), index))

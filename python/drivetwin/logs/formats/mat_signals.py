@@ -68,8 +68,12 @@ class _Search:
             if stamps_of is None:
                 self._add_with_common_time(prefix + name, values, vectors, tree)
             else:
-                self._add_channel(prefix + name, _get_unit(name, tree), (vectors[stamps_of], values),
-                          self._get_seconds_factor(stamps_of, tree))  # fmt: skip
+                self._add_channel(
+                    prefix + name,
+                    _get_unit(name, tree),
+                    (vectors[stamps_of], values),
+                    self._get_seconds_factor(stamps_of, tree),
+                )
         for name, value in tree.items():
             if isinstance(value, Mapping):
                 self._search_struct_field(value, prefix + name, depth)

@@ -181,7 +181,8 @@ def _describe_limit(channel: Channel) -> list[str]:
         return []
     return [
         f"channel {channel.source_name!r}: at its largest number for {100 * share:.0f} % of the "
-        f"log, {_format_value(limit, channel.quantity)}; if it is saturated there, or none was received, "
+        f"log, {_format_value(limit, channel.quantity)}; if it is saturated there, or none "
+        f"was received, "
         "results that rest on it are wrong"
     ]
 
@@ -208,7 +209,8 @@ def _describe_rounding(channel: Channel) -> list[str]:
     if channel.quantity in AUXILIARY or step <= COARSE * largest or _is_binary(channel.values):
         return []
     return [
-        f"channel {channel.source_name!r}: recorded in steps of {_format_value(step, channel.quantity)}, "
+        f"channel {channel.source_name!r}: recorded in steps of "
+        f"{_format_value(step, channel.quantity)}, "
         f"{100 * step / largest:.0f} % of its largest number; what rests on it may be as coarse"
     ]
 
@@ -422,7 +424,8 @@ def _check_wraps(channel: Channel, where: Where) -> None:
         if min(-np.sign(jump) * came, -np.sign(jump) * went) > least:
             raise DamagedChannelError(
                 f"goes on at {_format_value(float(values[index + 1]), channel.quantity)} after "
-                f"{_format_value(float(values[index]), channel.quantity)}, as a number that overflows does",
+                f"{_format_value(float(values[index]), channel.quantity)}, as a number that "
+                f"overflows does",
                 "export the channel with more bits or another scale, or cut the log there",
                 Where(where.file, where.channel, float(channel.time[index])),
             )

@@ -160,7 +160,8 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
         return None
     return Damage(
         mask,
-        f"{len(find_true_runs(mask))} spikes left out, {_describe_runs(time, find_true_runs(mask))}",
+        f"{len(find_true_runs(mask))} spikes left out, "
+        f"{_describe_runs(time, find_true_runs(mask))}",
     )
 
 

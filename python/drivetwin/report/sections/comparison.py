@@ -46,7 +46,8 @@ def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
     blocks: list[Block] = [TilesBlock(_build_tiles(candidates, judged, differing))]
     if differing:
         texts = [
-            f"{get_parameter_label(one.id)}: {format_significant(one.apart or 0.0, 2)} standard deviations"
+            f"{get_parameter_label(one.id)}: {format_significant(one.apart or 0.0, 2)} "
+            f"standard deviations"
             for one in differing
         ]
         blocks.append(NotesBlock("Differ by more than their uncertainty", texts, Tone.DOUBTFUL))

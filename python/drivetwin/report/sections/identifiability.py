@@ -176,4 +176,7 @@ def _list_correlated_pairs(found: Identification) -> Iterator[str]:
             if abs(matrix[i, j]) >= _CLOSE:
                 way = "rise and fall together" if matrix[i, j] > 0 else "go against each other"
                 number = f"{matrix[i, j]:+.2f}".replace("-", "−")
-                yield f"{get_parameter_label(one)} and {get_parameter_label(ids[j])} {way} ({number})."
+                yield (
+                    f"{get_parameter_label(one)} and {get_parameter_label(ids[j])} {way} "
+                    f"({number})."
+                )

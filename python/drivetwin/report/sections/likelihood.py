@@ -108,7 +108,8 @@ def _build_test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> Ta
     ]
     return TableBlock(
         f"Tests of what is left. Slow part: power of means over {1e3 * BLOCK:.0f} ms against that "
-        f"of white noise, doubtful above {MAX_EXCESS_POWER:g}. Correlation with an input in standard "
+        f"of white noise, doubtful above {MAX_EXCESS_POWER:g}. Correlation with an input in "
+        f"standard "
         f"deviations of chance, doubtful beyond ±{SIGNIFICANT:g}.",
         head,
         rows,

@@ -138,7 +138,8 @@ def _format_law(curve: FrictionCurve) -> str:
     return (
         f"Stribeck law {curve.symbol} = μ_c + (μ_s − μ_c)·exp(−|s|/v_s) + μ_v·|s| with "
         f"μ_c = {format_significant(law.mu_c)}, μ_s = {format_significant(law.mu_s)}, "
-        f"v_s = {format_significant(law.v_s, 3)} rad/s, μ_v = {format_significant(law.mu_v, 3)} s/rad."
+        f"v_s = {format_significant(law.v_s, 3)} rad/s, μ_v = "
+        f"{format_significant(law.mu_v, 3)} s/rad."
     )
 
 

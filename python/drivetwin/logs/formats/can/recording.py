@@ -153,9 +153,11 @@ class BusRecording:
             )
         for track, actual in percent:
             friction = [
-                pair for pair in percent
-                if pair[1].spn == torque.FRICTION and _describe_sender(pair[0]) == _describe_sender(track)
-            ]  # fmt: skip
+                pair
+                for pair in percent
+                if pair[1].spn == torque.FRICTION
+                and _describe_sender(pair[0]) == _describe_sender(track)
+            ]
             if actual.spn == torque.ACTUAL and len(friction) == 1:
                 column = track.make_column(torque.NET_TORQUE, torque.UNIT)
                 pairs = ((track, actual), friction[0])
