@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Moving means near the ends of a record."""
+"""Moving means near the ends of a record, resolution, runs."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from drivetwin._util.signal_processing import compute_moving_mean
+from drivetwin._util.signal_processing import (
+    compute_moving_mean,
+    estimate_resolution,
+    estimate_rounding_step,
+    find_true_runs,
+)
 
 
 @pytest.mark.parametrize("width", [1, 2, 5, 9, 10, 30])
@@ -32,3 +37,29 @@ def test_the_mean_is_that_of_the_samples_around(width: int) -> None:
 
 def test_an_empty_record_has_an_empty_mean() -> None:
     assert compute_moving_mean(np.empty(0), 5).size == 0
+
+
+def test_the_resolution_is_that_of_all_numbers_not_of_successive_ones() -> None:
+    ramp = np.array([0.0, 3.0, 6.0, 4.0])
+    assert estimate_resolution(ramp) == 1.0
+    assert estimate_resolution(np.full(5, 2.0)) == 0.0
+    assert estimate_resolution(np.array([0.1 + 0.2, 0.3, 0.3 + 1e-3])) == pytest.approx(1e-3)
+
+
+def test_numbers_that_are_no_multiples_apart_have_a_resolution_but_no_rounding_step() -> None:
+    values = np.random.default_rng(2).normal(size=100)
+    assert estimate_resolution(values) > 0.0
+    assert estimate_rounding_step(values) == 0.0
+    assert estimate_rounding_step(0.5 * np.round(values / 0.5)) == pytest.approx(0.5)
+
+
+def test_few_changes_show_no_rounding_step() -> None:
+    values = np.repeat([0.0, 1.0, 0.0, 2.0], 20)
+    assert estimate_resolution(values) == 1.0
+    assert estimate_rounding_step(values) == 0.0
+
+
+def test_true_runs_are_half_open() -> None:
+    mask = np.array([True, True, False, True, False, False, True])
+    assert find_true_runs(mask) == [(0, 2), (3, 4), (6, 7)]
+    assert find_true_runs(np.zeros(3, np.bool_)) == []

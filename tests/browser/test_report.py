@@ -82,6 +82,7 @@ def zoom(page: Page, section: str, label: str) -> list[dict[str, Any]]:
     return changed(page, page.locator(f"#{section} .zooms button", has_text=label).first.click)
 
 
+@pytest.mark.short
 def test_a_zoom_goes_through_all_figures_of_the_shift(page: Page, report: Path) -> None:
     opened(page, report)
     shown = zoom(page, "shift", "inertia phase")

@@ -154,6 +154,7 @@ def _drag_inertia_start(page: Page) -> tuple[float, float]:
     return before, float(field.input_value())
 
 
+@pytest.mark.short
 def test_from_a_log_to_a_saved_and_reopened_model(
     shown: Page, bench: Bench, browser: Browser, pictures: Path, tmp_path: Path
 ) -> None:

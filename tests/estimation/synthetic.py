@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.noise import estimate_resolution, estimate_white_noise
+from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
     MeasuredSignal,
@@ -160,7 +161,7 @@ class Run:
         torque = step * np.round((torque + 4.0 * rng.standard_normal(fresh.size)) / step)
         sigma = max(estimate_white_noise(torque), step / np.sqrt(12.0))
         s["engine_torque"] = MeasuredSignal(fresh, torque, sigma)
-        return self._pack(s, estimate_resolution(torque))
+        return self._pack(s, estimate_rounding_step(torque))
 
     def _pack(self, s: dict[str, MeasuredSignal], step: float) -> ShiftSignals:
         m = self.manoeuvre

@@ -20,7 +20,7 @@ from drivetwin.errors import SchedulerError
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.cluster import DaskPool
 from drivetwin.fleet.task import Task, TaskSpec, WorkerSpec
-from tests.fleet.test_coordinator_faults import COUNT, takes_long, undisturbed
+from tests.fleet.test_coordinator_faults import COUNT, undisturbed
 from tests.fleet.toys import ROOT, contents, make_logs
 
 pytest.importorskip("distributed")
@@ -62,7 +62,7 @@ def worker(port: int) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-@takes_long
+@pytest.mark.faults
 def test_a_scheduler_lost_and_restarted_costs_nothing(tmp_path: Path) -> None:
     logs = make_logs(tmp_path / "logs", COUNT, word="slow", spoilt=["bad"])
     store, port = tmp_path / "store", free_port()
@@ -103,7 +103,7 @@ def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) 
     assert time.monotonic() - started < 20.0
 
 
-@takes_long
+@pytest.mark.faults
 def test_two_runs_over_the_same_logs_share_a_cluster_and_no_task(tmp_path: Path) -> None:
     logs, port = make_logs(tmp_path / "logs", COUNT, word="slow"), free_port()
     stores = tmp_path / "one", tmp_path / "other"

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Faults: after the same command is given again the store is that of a run without any.
 
-`FLEET_FAULT_LOGS` sets how many logs each fault meets; `make fleet-faults` does. Those that take
-long wait for it.
+`FLEET_FAULT_LOGS` sets how many logs each fault meets; `make test-faults` does.
 """
 
 from __future__ import annotations
@@ -29,9 +28,6 @@ from drivetwin.fleet.store import Store
 from tests.fleet.toys import ROOT, contents, make_logs, request, run_toys
 
 COUNT = int(os.environ.get("FLEET_FAULT_LOGS", "30"))
-takes_long = pytest.mark.skipif(
-    "FLEET_FAULT_LOGS" not in os.environ, reason="takes long: `make fleet-faults`"
-)
 
 
 def children(pid: int) -> list[int]:
@@ -53,7 +49,8 @@ def undisturbed(logs: Path, store: Path) -> dict[str, Any]:
     return contents(store)
 
 
-@takes_long
+@pytest.mark.short
+@pytest.mark.faults
 def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
     logs = make_logs(tmp_path / "logs", COUNT, word="slow", spoilt=["bad"])
     dice, killed = random.Random(1), []
@@ -70,7 +67,7 @@ def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
     assert contents(tmp_path / "store") == undisturbed(logs, tmp_path / "calm")
 
 
-@takes_long
+@pytest.mark.faults
 def test_a_coordinator_killed_three_times_goes_on_where_it_was(tmp_path: Path) -> None:
     logs = make_logs(tmp_path / "logs", COUNT, word="slow", spoilt=["bad"])
     store, computed = tmp_path / "store", []

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.estimation.data.noise import estimate_resolution
 from drivetwin.estimation.data.prepare import prepare_signal
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
@@ -101,5 +101,5 @@ def _sample_signals(made: DynoRun) -> ShiftSignals:
         channels["wheel_speed"],
         {n: channels[f"pressure.{n}"] for n in (scenario.offgoing, scenario.oncoming)},
         shift,
-        estimate_resolution(channels["engine_torque"].values),
+        estimate_rounding_step(channels["engine_torque"].values),
     )

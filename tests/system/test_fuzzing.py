@@ -11,7 +11,7 @@ from tests.fuzz.mutate import mutate
 from tests.fuzz.run import outcome
 from tests.fuzz.seeds import SEEDS
 
-COUNT = 60
+FEW, MANY = 60, 2000
 
 
 def test_the_same_seed_damages_the_same() -> None:
@@ -20,14 +20,15 @@ def test_the_same_seed_damages_the_same() -> None:
     assert len({mutate(data, seed) for seed in range(50)}) == 50
 
 
+@pytest.mark.parametrize("count", [FEW, pytest.param(MANY, marks=pytest.mark.exhaustive)])
 @pytest.mark.parametrize("name", SEEDS)
-def test_damaged_files_give_a_log_or_a_typed_error(name: str, tmp_path: Path) -> None:
+def test_damaged_files_give_a_log_or_a_typed_error(name: str, count: int, tmp_path: Path) -> None:
     whole = SEEDS[name](tmp_path)
     path = tmp_path / "damaged.log"
     path.write_bytes(whole)
     assert outcome(path, tmp_path).startswith("log")
     outcomes = set()
-    for seed in range(COUNT):
+    for seed in range(count):
         path.write_bytes(mutate(whole, seed))
         outcomes.add(outcome(path, tmp_path))
     assert outcomes - {"log"}, "no damage was noticed at all"

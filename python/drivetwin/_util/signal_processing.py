@@ -4,8 +4,16 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
+
+_ROUND_OFF = 1e-9
+"""Distance of two numbers, relative to the largest, below which they are one number."""
+_MIN_CHANGES = 10
+"""Least number of changes that show a rounding step."""
+_MULTIPLE_TOLERANCE = 1e-3
+"""Largest deviation of a distance from a multiple of the rounding step, in steps."""
 
 
 def compute_moving_mean(values: FloatArray, width: int) -> FloatArray:
@@ -26,3 +34,39 @@ def compute_moving_mean(values: FloatArray, width: int) -> FloatArray:
     for sample in index[~inner]:
         mean[sample] = values[sample - reach[sample] : sample + reach[sample] + 1].mean()
     return mean
+
+
+def find_true_runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first index and end (one past the last) of each run of True in `mask` (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def estimate_resolution(values: FloatArray) -> float:
+    """Return the least distance of two different numbers in `values` (n,); 0 if all are one.
+
+    Successive samples need not show it: along a ramp they may be many steps apart.
+    """
+    gaps = _find_gaps(values)
+    return float(gaps.min()) if gaps.size else 0.0
+
+
+def estimate_rounding_step(values: FloatArray) -> float:
+    """Return the resolution of `values` (n,) if all their numbers are multiples of it apart.
+
+    0 otherwise, and for fewer than 10 changes, which do not show a rounding step.
+    """
+    least = _ROUND_OFF * max(float(np.max(np.abs(values))), _ROUND_OFF)
+    gaps = _find_gaps(values)
+    if not gaps.size or np.count_nonzero(np.abs(np.diff(values)) > least) < _MIN_CHANGES:
+        return 0.0
+    multiples = gaps / gaps.min()
+    deviation = float(np.max(np.abs(multiples - np.round(multiples))))
+    return float(gaps.min()) if deviation < _MULTIPLE_TOLERANCE else 0.0
+
+
+def _find_gaps(values: FloatArray) -> FloatArray:
+    """Return the distances (m,) of neighbouring numbers in sorted order, without round-off."""
+    gaps = np.diff(np.unique(values))
+    least = _ROUND_OFF * max(float(np.abs(values).max(initial=0.0)), _ROUND_OFF)
+    return np.asarray(gaps[gaps > least])

@@ -46,8 +46,8 @@ def file_of(twin: Twin) -> TwinFile:
         | {
             "schema": TWIN_SCHEMA,
             "transmission": {
-                **_with_units({name: getattr(twin, name) for name in _GEARBOX_FIELDS}),
-                "elements": {name: _with_units(vars(one)) for name, one in twin.elements.items()},
+                **_add_units({name: getattr(twin, name) for name in _GEARBOX_FIELDS}),
+                "elements": {name: _add_units(vars(one)) for name, one in twin.elements.items()},
             },
             "load": twin.load_law,
             "covariance": None if twin.covariance is None else covariance,
@@ -56,7 +56,7 @@ def file_of(twin: Twin) -> TwinFile:
     )
 
 
-def _with_units(fields: dict[str, Any]) -> dict[str, Any]:
+def _add_units(fields: dict[str, Any]) -> dict[str, Any]:
     return {_KEYS.get(name, name): value for name, value in fields.items()}
 
 

@@ -7,14 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from drivetwin.channels.mapping import ChannelSpec, Mapped, infer_candidates, make_spec
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.roles import NEEDED, get_quantity
-from drivetwin.channels.shiftlog import Quantity
-from drivetwin.logs.raw import Recording
-from drivetwin.logs.summary import ColumnSummary, summarise_recording
+from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.errors import DamagedChannelError
+from drivetwin.logs.quality.update_raster import find_raster
+from drivetwin.logs.raw import RawChannel, Recording
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -79,8 +82,7 @@ def survey_recording(
     Raises the typed errors of the readers, but none for channels that are missing or ambiguous:
     these become notes.
     """
-    summary = summarise_recording(recording)
-    columns = [one.column for one in summary.columns]
+    columns = list(recording.columns)
     specs = {**({} if card is None else card.channels), **stated.channels}
     kinds = {} if card is None else {name: spec.kind for name, spec in card.elements.items()}
     free = [one for one in columns if not any(spec.matches(one) for spec in specs.values())]
@@ -93,27 +95,44 @@ def survey_recording(
         for role, found in candidates.items()
         if len(found) == 1
     }
-    faults = [f"{one.column}: {one.fault}" for one in summary.columns if one.fault]
+    looked: list[Column] = []
+    faults: list[str] = []
+    for index, column in enumerate(columns):
+        roles = tuple(role for role, found in candidates.items() if column in found)
+        try:
+            looked.append(_make_column(column, recording.load(index), roles))
+        except DamagedChannelError as fault:
+            faults.append(f"{column}: {fault.what}")
     return Survey(
         source=source,
-        columns=tuple(_make_column(one, candidates) for one in summary.columns if not one.fault),
+        columns=tuple(looked),
         mapping=mapping,
         options=stated.options,
-        notes=(*summary.warnings, *faults, *_describe_open_roles(candidates, card)),
+        notes=(*recording.warnings, *faults, *_describe_open_roles(candidates, card)),
     )
 
 
-def _make_column(summary: ColumnSummary, candidates: Mapping[str, Sequence[LogColumn]]) -> Column:
-    column = summary.column
+def _make_column(column: LogColumn, channel: RawChannel, roles: tuple[str, ...]) -> Column:
     return Column(
         name=column.name,
         group=column.group,
         unit=column.unit,
-        rate=summary.rate,
-        range=summary.range,
-        gaps=summary.gaps,
-        roles=tuple(role for role, found in candidates.items() if column in found),
+        rate=_estimate_update_rate(channel),
+        range=channel.range,
+        gaps=int(np.count_nonzero(~np.isfinite(channel.values))) + channel.pauses,
+        roles=roles,
     )
+
+
+def _estimate_update_rate(channel: RawChannel) -> float | None:
+    """Return the updates per second; for a held signal the rate of the sender."""
+    step = channel.step
+    if step is None or step <= 0.0:
+        return None
+    is_ordered = np.isfinite(channel.time).all() and np.all(np.diff(channel.time) > 0.0)
+    sent = Channel("", Quantity.FRACTION, channel.time, channel.values, channel.name, "")
+    raster = find_raster(sent) if is_ordered else None
+    return 1.0 / (step if raster is None else raster.period)
 
 
 def _describe_open_roles(

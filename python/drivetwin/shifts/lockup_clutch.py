@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.signal_processing import compute_moving_mean
+from drivetwin._util.signal_processing import compute_moving_mean, find_true_runs
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError, Where
-from drivetwin.logs.quality.outliers import find_true_runs
 from drivetwin.shifts.kinematics import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.tcu_flags import find_flag_spans

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
-from drivetwin.logs.quality.outliers import find_true_runs
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 Span = tuple[float, float]

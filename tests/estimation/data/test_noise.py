@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from drivetwin.estimation.data.noise import estimate_resolution, estimate_white_noise
+from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin.estimation.data.noise import estimate_white_noise
 
 
 def test_noise_is_found_under_a_driveline_oscillation_and_a_step() -> None:
@@ -22,8 +23,8 @@ def test_noise_is_found_under_a_driveline_oscillation_and_a_step() -> None:
 def test_rounding_step_is_found_and_none_where_values_are_continuous() -> None:
     rng = np.random.default_rng(2)
     values = 1000.0 + 20.0 * rng.standard_normal(400)
-    assert estimate_resolution(11.0 * np.round(values / 11.0)) == pytest.approx(11.0)
-    assert estimate_resolution(values) == 0.0
+    assert estimate_rounding_step(11.0 * np.round(values / 11.0)) == pytest.approx(11.0)
+    assert estimate_rounding_step(values) == 0.0
 
 
 def test_a_rounding_step_is_found_where_ramps_alone_move_the_signal() -> None:
@@ -35,4 +36,4 @@ def test_a_rounding_step_is_found_where_ramps_alone_move_the_signal() -> None:
     rounded = 11.0 * np.round(values / 11.0)
     jumps = np.abs(np.diff(rounded))
     assert jumps[jumps > 0.0].min() > 11.0
-    assert estimate_resolution(rounded) == pytest.approx(11.0)
+    assert estimate_rounding_step(rounded) == pytest.approx(11.0)

@@ -117,6 +117,7 @@ def test_a_curve_that_lost_a_point_is_refused(kind: ParameterFormat) -> None:
 
 @EVERY_FORMAT
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.text(max_size=5))
+@example(0.0, 0.0, '"')
 @settings(max_examples=60)
 def test_a_damaged_file_is_read_or_refused_never_a_crash(
     kind: ParameterFormat, start: float, length: float, inserted: str

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.shiftlog import FloatArray, Quantity
 from drivetwin.logs.quality.outliers import (
     detect_quantization,
@@ -20,7 +21,6 @@ from drivetwin.logs.quality.outliers import (
     find_spikes,
     find_stale,
     find_stuck,
-    find_true_runs,
 )
 
 TIME = np.arange(0.0, 4.0, 0.002)

@@ -43,19 +43,3 @@ def _compute_clipped_rms(squares: FloatArray) -> float:
         inner = squares[squares <= _CLIP**2 * level]
         level = float(np.mean(inner)) / _INNER_POWER
     return float(np.sqrt(level))
-
-
-def estimate_resolution(values: FloatArray) -> float:
-    """Rounding step of a channel: the least distance of two of its numbers, of which all distances
-    are multiples; 0 where there is none, or the channel moves too seldom to show it.
-
-    Samples in a row need not show it: along a ramp all of them may be many steps apart.
-    """
-    least = 1e-9 * max(float(np.max(np.abs(values))), 1e-9)
-    gaps = np.diff(np.unique(values))
-    gaps = gaps[gaps > least]
-    if not gaps.size or np.count_nonzero(np.abs(np.diff(values)) > least) < 10:
-        return 0.0
-    step = float(np.min(gaps))
-    multiples = gaps / step
-    return step if float(np.max(np.abs(multiples - np.round(multiples)))) < 1e-3 else 0.0

@@ -14,9 +14,10 @@ from typing import Protocol
 import numpy as np
 
 from drivetwin._util.progress import scale_progress
+from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError, NoShiftError, Where
-from drivetwin.estimation.data.noise import estimate_resolution, estimate_white_noise
+from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.select_shifts import BESIDE, select_shifts
 from drivetwin.estimation.data.shift_data import (
     DesignData,
@@ -189,7 +190,7 @@ def prepare_signal(channel: Channel, factor: float = 1.0) -> MeasuredSignal:
     updates = channel.updates
     finite = np.isfinite(updates.values)
     values = factor * updates.values[finite]
-    floor = estimate_resolution(values) / np.sqrt(12.0)
+    floor = estimate_rounding_step(values) / np.sqrt(12.0)
     return MeasuredSignal(
         updates.time[finite], values, max(estimate_white_noise(values), float(floor))
     )
@@ -262,7 +263,7 @@ def _sample_shift(
         wheel_speed=sample(log["wheel_speed"]) if "wheel_speed" in log else None,
         pressures=_sample_pressures(log, shift, sampler),
         shift=shift,
-        torque_resolution=estimate_resolution(engine_torque.values),
+        torque_resolution=estimate_rounding_step(engine_torque.values),
     )
 
 

@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""The structures of `dt_model.h` and `dt_observer.h` as ctypes sees them."""
+"""Structures of `dt_model.h` and `dt_observer.h` as ctypes classes, read from the headers."""
 
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+import re
 from enum import Enum
+from types import SimpleNamespace
 from typing import Any
 
-CLUTCHES, ROWS, GUARDS, STATES, POINTS, OBSERVED = 2, 3, 4, 4, 64, 7
+from drivetwin.export.c.write import read_model_sources
+
+_CONSTANT = re.compile(r"#define DT_(\w+) (\d+)\b")
+_STRUCTURE = re.compile(r"typedef struct \{(.*?)\} dt_(\w+);", re.DOTALL)
+_FIELD = re.compile(r"(\w+) (\w+)((?:\[\w+\])*);")
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 
 
 class Precision(Enum):
@@ -18,103 +24,19 @@ class Precision(Enum):
     FLOAT = ctypes.c_float
 
 
-@dataclass(frozen=True)
-class Layout:
-    """The structures for one number type, each a ctypes class."""
-
-    inputs: Any
-    state: Any
-    outputs: Any
-    start: Any
-    params: Any
-    tuning: Any
-    observer: Any
-    measured: Any
-    estimates: Any
-
-
-def build_layout(precision: Precision) -> Layout:
-    """All structures, fields in the order of the headers."""
-    real, integer = precision.value, ctypes.c_int
-    both = real * CLUTCHES
-    speeds = _make_alike(real, "engine_speed", "output_speed", "wheel_speed", "twist")
-    inputs = _build_structure("Inputs", engine_torque=real, pressure=both)
-    return Layout(
-        inputs=inputs,
-        state=_build_structure(
-            "State",
-            x=real * STATES,
-            carry=real * STATES,
-            mode=integer * ROWS,
-            released=integer * GUARDS,
-            cell=integer * CLUTCHES,
-            power_backward=integer,
-            wheel_backward=integer,
-            inputs=inputs,
-            params=ctypes.c_uint64,
-        ),
-        outputs=_build_structure(
-            "Outputs",
-            **speeds,
-            output_torque=real,
-            clutch_torque=both,
-            slip=both,
-            mode=integer * CLUTCHES,
-            pieces=integer,
-        ),
-        start=_build_structure("Start", **speeds, locked=integer),
-        params=_build_params(real),
-        tuning=_build_structure(
-            "Tuning",
-            **_make_alike(real, "engine_speed", "output_speed", "engine_torque"),
-            **_make_alike(real, "scale", "load", "locked_slip"),
-        ),
-        observer=_build_structure(
-            "Observer",
-            x=real * OBSERVED,
-            P=real * OBSERVED * OBSERVED,
-            locked=integer,
-            learning=integer,
-        ),
-        measured=_build_structure(
-            "Measured", inputs=inputs, **_make_alike(real, "engine_speed", "output_speed")
-        ),
-        estimates=_build_structure(
-            "Estimates",
-            **_make_alike(real, "output_torque", "output_torque_std"),
-            **_make_alike(both, "clutch_torque", "scale", "scale_std"),
-            **_make_alike(real, "load", "load_std"),
-            slip=both,
-            locked=integer,
-        ),
-    )
-
-
-def _build_params(real: Any) -> Any:
-    friction = _build_structure(
-        "Friction",
-        **_make_alike(real, "mu_c", "mu_s", "v_s", "mu_v"),
-        points=ctypes.c_int,
-        slip=real * POINTS,
-        mu=real * POINTS,
-    )
-    clutch = _build_structure(
-        "Clutch",
-        **_make_alike(real, "i_c", "i_out", "gain", "P0", "peak", "drum_inertia"),
-        friction=friction,
-    )
-    return _build_structure(
-        "Params",
-        **_make_alike(real, "J1", "J2e", "eta", "i_in", "J_out", "i_f", "J_v", "k_o", "c_o"),
-        **_make_alike(real, "load_constant", "load_rolling", "load_aero"),
-        loss_law=ctypes.c_int,
-        clutch=clutch * CLUTCHES,
-    )
-
-
-def _build_structure(name: str, **fields: Any) -> Any:
-    return type(name, (ctypes.Structure,), {"_fields_": list(fields.items())})
-
-
-def _make_alike(kind: Any, *names: str) -> dict[str, Any]:
-    return dict.fromkeys(names, kind)
+def read_layout(precision: Precision) -> SimpleNamespace:
+    """Return the ctypes class of every structure by its name without `dt_`."""
+    sources = read_model_sources()
+    text = _COMMENT.sub("", "".join(sources[f"dt_{n}.h"].decode() for n in ("model", "observer")))
+    sizes = {f"DT_{name}": int(value) for name, value in _CONSTANT.findall(text)}
+    types: dict[str, Any] = {"dt_real": precision.value, "uint64_t": ctypes.c_uint64}
+    types |= dict.fromkeys(("int", "dt_mode", "dt_loss_law"), ctypes.c_int)
+    for body, name in _STRUCTURE.findall(text):
+        fields = []
+        for kind, field, dimensions in _FIELD.findall(body):
+            shaped = types[kind]
+            for size in reversed(re.findall(r"\w+", dimensions)):
+                shaped = shaped * sizes[size]
+            fields.append((field, shaped))
+        types[f"dt_{name}"] = type(name, (ctypes.Structure,), {"_fields_": fields})
+    return SimpleNamespace(**{name.removeprefix("dt_"): kind for name, kind in types.items()})

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin.errors import InputError
-from drivetwin.export.c.layout import Precision, build_layout
+from drivetwin.export.c.layout import Precision, read_layout
 from drivetwin.export.c.write import write_c
 from drivetwin.export.compiler import compile_library
 from drivetwin.export.subject import Subject
@@ -51,7 +51,7 @@ class CModel:
     """
 
     def __init__(self, subject: Subject, precision: Precision = Precision.DOUBLE) -> None:
-        self.layout = build_layout(precision)
+        self.layout = read_layout(precision)
         defines = ["DT_FLOAT"] if precision is Precision.FLOAT else []
         # The folder of a library that is still loaded cannot be removed on Windows.
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:

@@ -17,7 +17,7 @@ from drivetwin.export.parameters.xml_text import format_document
 
 @dataclass(frozen=True)
 class Header:
-    """Attributes of the whole FMU in its description; times in s."""
+    """Attributes of the whole FMU in its build_description; times in s."""
 
     name: str
     identifier: str
@@ -96,14 +96,7 @@ def _build_fmi2(header: Header, variables: Sequence[Variable]) -> ET.Element:
 
 
 def _add_scalar_variable(parent: ET.Element, variable: Variable) -> None:
-    about = {
-        "name": variable.name,
-        "valueReference": str(variable.reference),
-        "description": variable.meaning,
-        "causality": variable.role.causality,
-        "variability": variable.role.get_variability(variable.kind),
-    }
-    item = ET.SubElement(parent, "ScalarVariable", {**about, **_get_initial(variable)})
+    item = ET.SubElement(parent, "ScalarVariable", _build_attributes(variable))
     if variable.kind in ENUMERATIONS:
         typed = {"declaredType": variable.kind.value, **_start(variable)}
         ET.SubElement(item, "Enumeration", typed)
@@ -136,22 +129,23 @@ def _build_fmi3(header: Header, variables: Sequence[Variable]) -> ET.Element:
 
 def _add_variable3(parent: ET.Element, variable: Variable) -> None:
     tag = {Kind.REAL: "Float64", Kind.INTEGER: "Int32"}.get(variable.kind, "Enumeration")
-    about = {
+    typed = (
+        {"declaredType": variable.kind.value} if tag == "Enumeration" else _get_quantity(variable)
+    )
+    ET.SubElement(parent, tag, {**_build_attributes(variable), **typed, **_start(variable)})
+
+
+def _build_attributes(variable: Variable) -> dict[str, str]:
+    """Attributes that a variable has in both versions."""
+    attributes = {
         "name": variable.name,
         "valueReference": str(variable.reference),
         "description": variable.meaning,
         "causality": variable.role.causality,
         "variability": variable.role.get_variability(variable.kind),
     }
-    typed = (
-        {"declaredType": variable.kind.value} if tag == "Enumeration" else _get_quantity(variable)
-    )
-    ET.SubElement(parent, tag, {**about, **_get_initial(variable), **typed, **_start(variable)})
-
-
-def _get_initial(variable: Variable) -> dict[str, str]:
     initial = {"parameter": "exact", "output": "calculated"}.get(variable.role.causality)
-    return {} if initial is None else {"initial": initial}
+    return attributes if initial is None else {**attributes, "initial": initial}
 
 
 def _get_quantity(variable: Variable) -> dict[str, str]:

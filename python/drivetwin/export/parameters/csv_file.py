@@ -59,12 +59,6 @@ def parse_csv(text: str, source: str) -> ParameterSet:
     head = list(takewhile(lambda line: line.startswith("#"), lines))
     named = next((line for line in head if line.startswith(_TITLE)), "")
     rows = csv.DictReader(lines[len(head) :], strict=True)
-    if tuple(rows.fieldnames or ()) != _COLUMNS:
-        raise FileFormatError(
-            f"the columns are not {','.join(_COLUMNS)}",
-            "hand in a file as `drivetwin export` writes it",
-            Where(file=source),
-        )
     scalars, curves = [], []
     for name, group in groupby(_read_rows(rows, source), key=lambda row: row["name"]):
         members = list(group)
@@ -81,6 +75,12 @@ def _read_rows(reader: csv.DictReader[str], source: str) -> list[_Row]:
         rows = list(reader)
     except csv.Error as fault:
         raise FileFormatError(f"no CSV: {fault}", "correct it", Where(file=source)) from None
+    if tuple(reader.fieldnames or ()) != _COLUMNS:
+        raise FileFormatError(
+            f"the columns are not {','.join(_COLUMNS)}",
+            "hand in a file as `drivetwin export` writes it",
+            Where(file=source),
+        )
     for row in rows:
         if None in row or None in row.values():
             raise FileFormatError(

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
@@ -16,7 +17,6 @@ from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, 
 from drivetwin.logs.quality.outliers import (
     BEYOND,
     Damage,
-    estimate_resolution,
     find_clipping,
     find_dropouts,
     find_glitches,
@@ -26,7 +26,6 @@ from drivetwin.logs.quality.outliers import (
     find_spikes,
     find_stale,
     find_stuck,
-    find_true_runs,
 )
 from drivetwin.logs.quality.update_raster import find_raster
 

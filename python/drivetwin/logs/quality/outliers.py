@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.special import erf
 
+from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.shiftlog import FloatArray, Quantity
 
 Mask = NDArray[np.bool_]
@@ -117,12 +118,6 @@ class Damage:
 
     mask: Mask
     text: str
-
-
-def find_true_runs(mask: Mask) -> list[tuple[int, int]]:
-    """Return first index and end (one past the last) of each stretch of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def find_missing(time: FloatArray, values: FloatArray) -> Damage | None:
@@ -259,7 +254,7 @@ def find_stale(time: FloatArray, values: FloatArray) -> Damage | None:
     if values.size < 4 * _SURROUNDINGS:
         return None
     noise = float(np.median(np.abs(np.diff(values, 3)))) / _THIRD_DIFFERENCE
-    size, least = np.abs(steps), _MOVES * max(estimate_resolution(np.unique(values)), noise)
+    size, least = np.abs(steps), _MOVES * max(estimate_resolution(values), noise)
     for start, end in find_true_runs(steps == 0.0):
         if start == 0 or end == steps.size or end - start > _LOST:
             continue
@@ -303,12 +298,6 @@ def find_longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, floa
     noise = _estimate_noise(elsewhere / estimate_resolution(elsewhere))
     unlikely = (end - start) * np.log(erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
     return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
-
-
-def estimate_resolution(values: FloatArray) -> float:
-    """Smallest step between two samples in a row; 0 where there is none."""
-    steps = np.abs(np.diff(values))
-    return float(steps[steps > 0.0].min()) if steps.any() else 0.0
 
 
 def detect_quantization(values: FloatArray) -> float:

@@ -68,11 +68,9 @@ def build_stage_sections(found: Identification) -> list[Section]:
             [
                 *_build_momentum_blocks(integral),
                 *(
-                    block
+                    b
                     for one in paper
-                    for block in _build_grid_blocks(
-                        one.by, one.stages.inertia, one.stages.doubts.get("eta"), INERTIA_LABELS
-                    )
+                    for b in _build_grid_blocks(one, "inertia", "eta", INERTIA_LABELS)
                 ),
             ],
         ),
@@ -83,11 +81,9 @@ def build_stage_sections(found: Identification) -> list[Section]:
             [
                 *_build_load_blocks(found, integral),
                 *(
-                    block
+                    b
                     for one in paper
-                    for block in _build_grid_blocks(
-                        one.by, one.stages.load, one.stages.doubts.get("J_vehicle"), LOAD_LABELS
-                    )
+                    for b in _build_grid_blocks(one, "load", "J_vehicle", LOAD_LABELS)
                 ),
             ],
         ),
@@ -145,12 +141,16 @@ def _build_load_blocks(
     ]
 
 
-def _build_grid_blocks(by: str, fit: GridFit, doubt: str | None, labels: WlseLabels) -> list[Block]:
+def _build_grid_blocks(
+    one: _Stages[PaperShift], stage: str, parameter: str, labels: WlseLabels
+) -> list[Block]:
     """Build figure and table of a grid search, with any doubt about it between the two."""
+    fit: GridFit = getattr(one.stages, stage)
+    doubt = one.stages.doubts.get(parameter)
     text = (
-        f"{by}, weighted least squares (Fig. 6): samples whose own quotient lies in the plausible "
-        "range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise in the "
-        "differenced speed biases it."
+        f"{one.by}, weighted least squares (Fig. 6): samples whose own quotient lies in the "
+        "plausible range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise "
+        "in the differenced speed biases it."
     )
     blocks: list[Block] = [FigureBlock(plot_wlse(fit, labels), text)]
     if doubt:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import estimate_resolution
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals, TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.input_smoothing import (
     compute_bend,
@@ -357,7 +357,7 @@ def _collect_quantization(signals: ShiftSignals) -> dict[str, Quantization]:
     """Compute the quantization errors of the inputs by name; those of the torque as extended by
     `_held`."""
     found = {
-        n: estimate_quantization(p, estimate_resolution(p.values))
+        n: estimate_quantization(p, estimate_rounding_step(p.values))
         for n, p in signals.pressures.items()
     }
     torque = estimate_quantization(signals.engine_torque, signals.torque_resolution)
