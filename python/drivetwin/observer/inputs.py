@@ -156,7 +156,7 @@ def build_course(model: DualClutch, seen: Recorded, delay: float, driving: BoolA
 def _find_unknown_pressure(
     shift: Shift, name: str, middle: FloatArray
 ) -> tuple[BoolArray, BoolArray]:
-    """When (n,) an element of unknown pressure may carry torque, and when that changes in haste."""
+    """Mark samples (n,) with possible torque of an element of unknown pressure, and its changes."""
     start, end = shift.inertia_phase
     by_oncoming = shift.kind.has_torque_phase_first
     if name == shift.oncoming:

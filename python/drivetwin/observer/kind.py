@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class Observer(StrEnum):
-    """How torques are told: by simulation alone, or by a smoother that follows the speeds."""
+    """Estimator of torques: simulation alone, or a smoother that follows the speeds."""
 
     SIMULATION = "simulation"
     SMOOTHER = "smoother"

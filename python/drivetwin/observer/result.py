@@ -56,6 +56,6 @@ class Observation:
 
     @property
     def bands(self) -> dict[str, Band]:
-        """All torques by the name of their channel: `output_torque`, `torque.<element>`."""
+        """Torques by the name of their channel: `output_torque`, `torque.<element>`."""
         clutches = {f"torque.{name}": band for name, band in self.clutch_torque.items()}
         return {"output_torque": self.output_torque, **clutches}

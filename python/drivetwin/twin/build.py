@@ -24,7 +24,7 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
     parameters = dict(found.estimates)
     assumptions = list(found.assumptions)
     if "J_out" not in parameters and card.J_out is not None:
-        parameters["J_out"] = from_prior("J_out", card.J_out.value, card.J_out.std, KNOWN)
+        parameters["J_out"] = from_prior("J_out", card.J_out, KNOWN)
         assumptions.append("Jo′ is the vehicle card's value")
     assumptions += list_borrowed_friction(found)
     friction, load = _scale_absolute(found)

@@ -76,7 +76,7 @@ def test_an_estimate_that_is_off_the_card_although_it_is_as_wide_is_told() -> No
     assert remove_prior(values, covariance, 0, design) is None
     (found,) = find_contradictions(("J_out",), values, covariance, {"J_out": design}, {})
     assert found.apart == pytest.approx((29.9 - 1.35) / 0.135)
-    estimates = {"J_out": from_prior("J_out", 29.9, 0.2, ADDS_LITTLE)}
+    estimates = {"J_out": from_prior("J_out", PriorValue(29.9, 0.2), ADDS_LITTLE)}
     told = apply_contradictions(estimates, [found], "integral")["J_out"]
     assert (told.verdict, told.value, told.method) == (Verdict.WEAK, 29.9, "integral")
     assert "contradicts" in told.reason

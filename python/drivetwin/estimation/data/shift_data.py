@@ -11,10 +11,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.channels.shiftlog import find_pauses
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
+PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
+"""Efficiency of a gearbox if no output torque shows it."""
 NO_DRUM = PriorValue(0.0)
 """Inertia of the drum of an element that has none."""
 
@@ -34,8 +37,7 @@ class MeasuredSignal:
 
     @property
     def unrecorded(self) -> tuple[Span, ...]:
-        """All spans [s] of which nothing is known: the gaps, before the first sample and after the
-        last."""
+        """Spans [s] without samples: the gaps, before the first sample and after the last."""
         if not self.time.size:
             return ((-np.inf, np.inf),)
         first, last = float(self.time[0]), float(self.time[-1])
@@ -56,7 +58,7 @@ class MeasuredSignal:
 
 @dataclass(frozen=True, eq=False)
 class TorqueOfSpeeds:
-    """How an engine torque that is a map of speeds hangs on the noise of the compared one.
+    """Sensitivity of an engine torque that is a map of speeds to the noise of the compared one.
 
     `slope` (n,) [N m s/rad] is its derivative by ω_e at `time` (n,) [s], `rest` (n,) [N m] the
     noise of its samples that is not from ω_e.
@@ -115,6 +117,28 @@ class KnownDriveline:
         """Overall ratio of the gear that is entered."""
         return self.oncoming.ratio
 
+    def find_prior(self, name: str) -> PriorValue | None:
+        """Return the prior of a reported parameter by id; None if the card has none."""
+        spec = get_parameter_spec(name)
+        ending = OVER_ETA if name.endswith(OVER_ETA) else ""
+        known = self.known.get(spec.stem + ending if spec.suffix == "log" else name)
+        if known is not None:
+            return known
+        stem, _, element = name.removesuffix(OVER_ETA).partition(".")
+        coupling = self.couplings.get(element)
+        if stem == "J_out":
+            known = self.J_out
+        elif coupling is not None:
+            known = {"P0": coupling.P0, "drum": coupling.drum}.get(stem)
+        return self.divide_by_eta(known) if known is not None and ending else known
+
+    def divide_by_eta(self, quantity: PriorValue) -> PriorValue:
+        """Divide a torque-like design value by the efficiency, known from design or typical."""
+        eta = self.known.get("eta", PLAUSIBLE_ETA)
+        value = quantity.value / eta.value
+        spread = value * eta.std / eta.value
+        return PriorValue(value, float(np.hypot(quantity.std / eta.value, spread)))
+
     @property
     def drums(self) -> tuple[ShiftElementKinematics, ...]:
         """Elements whose drum inertia is not zero."""
@@ -146,14 +170,13 @@ class ShiftSignals:
 
     @property
     def output_gaps(self) -> tuple[Span, ...]:
-        """Where something compared with the equations is unrecorded: output torque, a speed of the
-        gearbox."""
+        """Spans [s] without output torque or a speed of the gearbox, which the fit compares."""
         compared = (self.output_torque, self.engine_speed, self.output_speed)
         return tuple(gap for signal in compared for gap in signal.unrecorded)
 
     @property
     def scale_known(self) -> bool:
-        """Whether an output torque gives all torque-like quantities their common scale."""
+        """True if an output torque gives all torque-like quantities their common scale."""
         return self.output_torque.time.size > 0
 
 

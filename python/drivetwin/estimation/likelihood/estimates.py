@@ -21,7 +21,6 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     run_residual_tests,
 )
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.priors import divide_by_eta
 from drivetwin.estimation.likelihood.selection.loss_law import describe_other_law
 from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
@@ -33,16 +32,12 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, build_friction_curves
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensor_shifts
 from drivetwin.estimation.linear.load_balance import AERO, describe_different_loads
+from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
     collect_low_gear_notes,
     collect_shift_labels,
-)
-from drivetwin.estimation.result.prior_conflict import (
-    apply_contradictions,
-    find_contradictions,
-    get_design_value,
 )
 from drivetwin.estimation.result.verdict import (
     KNOWN,
@@ -53,7 +48,7 @@ from drivetwin.estimation.result.verdict import (
     refuse_parameter,
     reject_identified,
 )
-from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
 NO_SCALE = (
@@ -88,20 +83,18 @@ def build_estimates(
         if shifts
         else {}
     )
-    notes = collect_low_gear_notes(signals)
-    designs = {n: known for n in values if (known := _find_prior(n, drivelines)) is not None}
-    estimates = {
-        name: _assess(
-            (name, value, float(np.sqrt(max(variance, 0.0)))),
-            designs.get(name),
-            spread.get(name),
-            notes.get(name, ""),
-        )
-        for name, value, variance in zip(values, values.values(), np.diag(covariance), strict=True)
-    }
-    ids, every = tuple(values), np.array([*values.values()])
-    contradicted = find_contradictions(ids, every, covariance, designs, spread)
-    estimates = apply_contradictions(estimates, contradicted, WITH_PRIOR)
+    fitted = FittedParameters(
+        ids=tuple(values),
+        values=np.array([*values.values()]),
+        covariance=covariance,
+        std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
+        driveline=drivelines[0],
+        systematic=spread,
+        notes=collect_low_gear_notes(signals),
+        method=METHOD,
+        prior_method=WITH_PRIOR,
+    )
+    ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
     limits = {
         name: text
         for name, text in find_at_bounds(fit, ids, matrix).items()
@@ -126,8 +119,8 @@ def build_estimates(
         ids,
         compute_correlation(covariance),
         (
-            *dict.fromkeys(notes.values()),
-            *(one.text for one in contradicted),
+            *dict.fromkeys(fitted.notes.values()),
+            *(one.text for one in fitted.conflicts),
             *(f"{name}: {text}" for name, text in limits.items()),
             *_collect_warnings(fit, signals),
             *(one.text for one in effects),
@@ -151,7 +144,7 @@ def _estimate_fixed(
         eta = drivelines[0].known.get("eta")
         for name in list_absolute_ids(signals):
             ratio = estimates.get(name + OVER_ETA)
-            found[name] = _estimate_without_scale(name, eta, ratio, _find_prior(name, drivelines))
+            found[name] = _estimate_without_scale(name, eta, ratio, drivelines[0].find_prior(name))
     for one in (part.structure for part in fit.problem.parts):
         if one.get_unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
             name = make_log_id(AGE, one.log)
@@ -169,16 +162,6 @@ def _build_load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | Non
     return LoadLaw(fit.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
 
 
-def _assess(
-    told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
-) -> Estimate:
-    """Assess (id, value, standard deviation from noise)."""
-    if design is not None:
-        return assess_with_prior(told, design, WITH_PRIOR, systematic, note)
-    name, value, std = told
-    return assess(name, value, std, METHOD, systematic, note)
-
-
 def _estimate_without_scale(
     name: str, eta: PriorValue | None, ratio: Estimate | None, design: PriorValue | None
 ) -> Estimate:
@@ -190,7 +173,7 @@ def _estimate_without_scale(
     if eta is None:
         return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
     if ratio is None:
-        return from_prior(name, eta.value, eta.std, KNOWN)
+        return from_prior(name, eta, KNOWN)
     if ratio.value is None or ratio.std_noise is None:
         return replace(ratio, id=name)
     spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
@@ -202,17 +185,6 @@ def _estimate_without_scale(
     else:
         one = assess(name, value, noise, WITH_ETA, spread, ratio.reason)
     return one if ratio.verdict is Verdict.IDENTIFIED else reject_identified(one, "")
-
-
-def _find_prior(name: str, drivelines: Sequence[KnownDriveline]) -> PriorValue | None:
-    """Return the prior of a reported parameter; None if it has none."""
-    spec = get_parameter_spec(name)
-    ending = OVER_ETA if name.endswith(OVER_ETA) else ""
-    known = drivelines[0].known.get(spec.stem + ending if spec.suffix == "log" else name)
-    if known is not None:
-        return known
-    design = get_design_value(name.removesuffix(OVER_ETA), drivelines[0])
-    return divide_by_eta(design, drivelines[0]) if design is not None and ending else design
 
 
 def _compute_systematic_std(matrix: FloatArray, systematic: FloatArray) -> list[float]:

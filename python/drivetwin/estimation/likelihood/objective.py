@@ -228,7 +228,7 @@ class ShiftTerm:
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodObjective:
-    """All parts with the prior and bounds of their unknowns; `lower`, `upper` (p,)."""
+    """Likelihood of all parts, with prior and bounds `lower`, `upper` (p,) of their unknowns."""
 
     parts: tuple[ShiftTerm, ...]
     prior: Prior

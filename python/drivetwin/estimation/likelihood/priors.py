@@ -55,8 +55,6 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
     "drum": (0.0, SPECS["J_out"].upper),
 }
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
-PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
-"""Efficiency of a gearbox where no output torque shows it."""
 _GEAR_INERTIA = "J_prime_"
 DESIGN_FACTOR = 10.0
 """Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
@@ -155,14 +153,6 @@ def _build_load_factors(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, 
     return found
 
 
-def divide_by_eta(quantity: PriorValue, driveline: KnownDriveline) -> PriorValue:
-    """Divide a torque-like design value by the efficiency, known from design or typical."""
-    eta = driveline.known.get("eta", PLAUSIBLE_ETA)
-    value = quantity.value / eta.value
-    spread = value * eta.std / eta.value
-    return PriorValue(value, float(np.hypot(quantity.std / eta.value, spread)))
-
-
 def is_delay_identifiable(torque: MeasuredSignal) -> bool:
     """Return whether the engine torque varies enough, relative to its noise, to identify its
     delay."""
@@ -236,7 +226,7 @@ def _collect_priors(
     found = {"te_delay": MomentumSettings().delay_prior}
     if drivelines[0].J_out is not None:
         known = drivelines[0].J_out
-        found["J_out"] = known if signals[0].scale_known else divide_by_eta(known, drivelines[0])
+        found["J_out"] = known if signals[0].scale_known else drivelines[0].divide_by_eta(known)
     found |= collect_direct_priors(drivelines[0], signals[0].scale_known)
     for s in signals:
         own = map_log_names(s.log)
@@ -254,7 +244,7 @@ def _collect_priors(
         for e in (d.offgoing, d.oncoming):
             found[f"{e.name}.P0"] = e.P0
         for e in d.couplings.values():
-            drum = e.drum if signals[0].scale_known else divide_by_eta(e.drum, d)
+            drum = e.drum if signals[0].scale_known else d.divide_by_eta(e.drum)
             found[f"{e.name}.drum"] = drum
         if d.offgoing.name not in shown:
             names = {f"{d.offgoing.name}.{key}": std for key, std in OFFGOING_STD.items()}

@@ -13,6 +13,7 @@ from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.linear.combine_shifts import collect_different_loads, merge_shifts
 from drivetwin.estimation.linear.load_balance import AERO, LoadFit, describe_different_loads
 from drivetwin.estimation.linear.pipeline import IntegralShift
+from drivetwin.estimation.result.assessment import FittedParameters, collect_fill_pressures
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
@@ -20,24 +21,16 @@ from drivetwin.estimation.result.estimate_set import (
     collect_shift_labels,
     describe_growth,
 )
-from drivetwin.estimation.result.prior_conflict import (
-    apply_contradictions,
-    find_contradictions,
-    get_design_value,
-)
 from drivetwin.estimation.result.prior_update import add_priors
 from drivetwin.estimation.result.verdict import (
     KNOWN,
     SENSORS_TELL_LESS,
-    assess,
-    assess_with_prior,
     compute_correlation,
     from_prior,
     refuse_parameter,
     reject_identified,
 )
 from drivetwin.parameters import get_parameter_spec
-from drivetwin.vehicle.spec import PriorValue
 
 METHOD = "integral"
 CHI2_WARN = 1.6
@@ -78,21 +71,22 @@ def assess_shifts(
         values[kept],
         covariance[np.ix_(kept, kept)],
     )
-    std = np.sqrt(np.diag(covariance))
-    notes = collect_low_gear_notes(signals)
-    designs = {
-        name: one for name in ids if (one := _get_design_prior(name, drivelines)) is not None
-    }
-    estimates = {
-        told[0]: _assess_parameter(
-            told, designs.get(told[0]), systematic.get(told[0]), notes.get(told[0], "")
-        )
-        for told in zip(ids, values.tolist(), std.tolist(), strict=True)
-    }
-    against = find_contradictions(ids, values, covariance, designs, systematic)
+    fit = FittedParameters(
+        ids=ids,
+        values=values,
+        covariance=covariance,
+        std=np.sqrt(np.diag(covariance)),
+        driveline=drivelines[0],
+        systematic=systematic,
+        notes=collect_low_gear_notes(signals),
+        method=METHOD,
+        prior_method=METHOD,
+    )
+    estimates = fit.assess()
+    estimates |= _replace_impossible(fit)
+    estimates |= _select_design_values(estimates, fit)
+    estimates = fit.downgrade_conflicts(estimates)
     loads = collect_different_loads(shifts)
-    estimates |= _select_design_values(estimates, designs, {one.id for one in against})
-    estimates = apply_contradictions(estimates, against, METHOD)
     for name, why in _find_misfits(shifts, signals, ids).items():
         estimates[name] = reject_identified(estimates[name], why)
     estimates |= _collect_card_values(estimates, drivelines)
@@ -104,8 +98,8 @@ def assess_shifts(
         compute_correlation(covariance),
         (
             *doubts,
-            *(one.text for one in against),
-            *_collect_warnings(shifts, signals, notes),
+            *(one.text for one in fit.conflicts),
+            *_collect_warnings(shifts, signals, fit.notes),
             *(() if law is None else (describe_growth(law.aero, law.std, law.mean_speed),)),
             *describe_different_loads(loads),
         ),
@@ -121,7 +115,7 @@ def _estimate_load_law(
     covariance: FloatArray,
     systematic: Mapping[str, float],
 ) -> LoadLaw | None:
-    """How the load grows with speed; None where it does not."""
+    """Return the growth of the load with speed; None for a constant load."""
     if AERO not in ids:
         return None
     k, mean_speed = ids.index(AERO), shifts[0].load.holds_at
@@ -130,72 +124,48 @@ def _estimate_load_law(
     return LoadLaw(float(values[k]), std, mean_speed)
 
 
-def _assess_parameter(
-    told: tuple[str, float, float], design: PriorValue | None, systematic: float | None, note: str
-) -> Estimate:
-    """Verdict on (id, value, standard deviation from noise)."""
-    name, value, std = told
-    if (instead := _replace_impossible(name, value, design)) is not None:
-        return instead
-    if design is not None:
-        return assess_with_prior(told, design, METHOD, systematic, note)
-    return assess(name, value, std, METHOD, systematic, note)
-
-
 def _select_design_values(
-    estimates: Mapping[str, Estimate],
-    designs: Mapping[str, PriorValue],
-    contradicted: Collection[str],
+    estimates: Mapping[str, Estimate], fit: FittedParameters
 ) -> dict[str, Estimate]:
-    """The card's own values where the log, as wrong as its sensors may be, knows them less well.
+    """Return the card's own values where they are more certain than the log with its sensors.
 
-    The fit weighs log and card by noise alone. What the log contradicts is not the card's.
+    The fit weighs log and card by noise alone. Values that the log contradicts are left out.
     """
+    contradicted = {one.id for one in fit.conflicts}
     return {
-        name: from_prior(name, prior.value, prior.std, SENSORS_TELL_LESS)
-        for name, prior in designs.items()
+        name: from_prior(name, prior, SENSORS_TELL_LESS)
+        for name, prior in fit.priors.items()
         if name not in contradicted and (estimates[name].std_total or 0.0) > prior.std > 0.0
     }
 
 
-def _replace_impossible(name: str, value: float, prior: PriorValue | None) -> Estimate | None:
-    """Replace a value that physics excludes by the card's value or by none; None for other values.
+def _replace_impossible(fit: FittedParameters) -> dict[str, Estimate]:
+    """Replace values that physics excludes by the card's value or by none.
 
-    Unbounded least squares may return such a value where the model does not hold.
+    Unbounded least squares may return such values where the model does not hold.
     """
-    spec = get_parameter_spec(name)
-    if spec.lower <= value <= spec.upper:
-        return None
-    text = (
-        f"the linear fit gives {format_with_unit(value, spec.unit, digits=3)}, which is impossible"
-    )
-    if prior is None:
-        return refuse_parameter(name, METHOD, text)
-    return from_prior(name, prior.value, prior.std, f"design value of the card: {text}")
-
-
-def _get_design_prior(name: str, drivelines: Sequence[KnownDriveline]) -> PriorValue | None:
-    """Prior of the parameter itself; None if the card has none."""
-    known = drivelines[0].known.get(name)
-    return get_design_value(name, drivelines[0]) if known is None else known
+    found: dict[str, Estimate] = {}
+    for name, value in zip(fit.ids, fit.values.tolist(), strict=True):
+        spec, prior = get_parameter_spec(name), fit.priors.get(name)
+        if spec.lower <= value <= spec.upper:
+            continue
+        shown = format_with_unit(value, spec.unit, digits=3)
+        text = f"the linear fit gives {shown}, which is impossible"
+        if prior is None:
+            found[name] = refuse_parameter(name, METHOD, text)
+        else:
+            found[name] = from_prior(name, prior, f"design value of the card: {text}")
+    return found
 
 
 def _collect_card_values(
-    known: dict[str, Estimate], drivelines: Sequence[KnownDriveline]
+    known: Mapping[str, Estimate], drivelines: Sequence[KnownDriveline]
 ) -> dict[str, Estimate]:
-    """Design values of what no shift could tell: P0 of elements that never came on."""
-    found = {
-        name: from_prior(name, prior.value, prior.std, KNOWN)
-        for name, prior in drivelines[0].known.items()
-        if name not in known
-    }
-    for driveline in drivelines:
-        for element in (driveline.offgoing, driveline.oncoming):
-            name = f"P0.{element.name}"
-            if name not in known:
-                note = "design value of the card; the log does not show this element filling"
-                found[name] = from_prior(name, element.P0.value, element.P0.std, note)
-    return found
+    """Return design values of parameters that no shift shows: P0 of elements that never engage."""
+    note = "design value of the card; the log does not show this element filling"
+    found = {name: from_prior(name, one, KNOWN) for name, one in drivelines[0].known.items()}
+    found |= collect_fill_pressures(drivelines, note)
+    return {name: one for name, one in found.items() if name not in known}
 
 
 def _collect_refusals(
@@ -262,7 +232,7 @@ def _width(curve: FrictionCurve) -> float:
 
 
 def _collect_warnings(
-    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: dict[str, str]
+    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: Mapping[str, str]
 ) -> tuple[str, ...]:
     """Collect the warnings: general ones first, then those of each shift, then shared ones."""
     labels = collect_shift_labels(signals)

@@ -43,7 +43,9 @@ BLOCKS = 8
 
 @dataclass(frozen=True)
 class HeldGear:
-    """What one gear held over `span` [s] tells; `value` [kg m^2] ± `half` (95 %), or None and why.
+    """Total inertia from one gear engaged over `span` [s]: `value` ± `half` [kg m^2] (95 %).
+
+    `value` is None if it is not identifiable, for `reason`.
 
     `load` [N m] is T_load/η at the output shaft at the mean speed; `explained` the share of the
     torque's variance that the balance explains.

@@ -118,7 +118,7 @@ FIRST_DRUM = 5
 
 
 class _Equations:
-    """All rows of the momentum balance: one window each, with per-row coefficients.
+    """Rows of the momentum balance: one window each, with per-row coefficients.
 
     `u[p]`, `v[p]` (m,) are the coefficients of inertia parameter p on ω_e' and ω_out'. Where the
     gear is locked both sensors show the same motion: they share it by inverse variance.
@@ -190,7 +190,7 @@ class _Equations:
         return Term(np.ones(1), 0.0, area, factor, slopes)
 
     def terms(self, theta: FloatArray) -> list[Term]:
-        """All parts of the equations at θ, the engine torque first."""
+        """Build the terms of the equations at θ, the engine torque first."""
         return [self.engine_torque(theta), *self.others(theta), self.rounding(theta)]
 
 

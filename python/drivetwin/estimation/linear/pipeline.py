@@ -41,7 +41,7 @@ NUISANCES = ("te_rounding", "drum")
 
 @dataclass(frozen=True, eq=False)
 class IntegralShift:
-    """All stages for one shift; a stage the data could not carry is None, and `refusals` says why.
+    """Stages of one shift; a stage without enough data is None, with the reason in `refusals`.
 
     `ids`, `values` (q,), `covariance` (q, q): the parameters that follow, in SI, and those of the
     `NUISANCES` that are uncertain, AERO where the load grows. `priors` by id: what was known

@@ -16,6 +16,7 @@ from drivetwin.estimation.paper.inertia import PaperInertiaSettings, estimate_pa
 from drivetwin.estimation.paper.load import PaperLoadSettings, estimate_paper_load
 from drivetwin.estimation.paper.ringdown import estimate_paper_ringdown
 from drivetwin.estimation.paper.wlse import GridFit, Weighting
+from drivetwin.estimation.result.assessment import collect_fill_pressures
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.estimation.result.prior_conflict import describe_range_violation
@@ -161,11 +162,8 @@ def assess_paper_shifts(
                 estimates[name] = refuse_parameter(name, METHOD, shift.refusals["shaft"])
     for driveline in drivelines:
         if driveline.J_out is not None:
-            prior = driveline.J_out
-            estimates["J_out"] = from_prior("J_out", prior.value, prior.std, _TAKEN)
-        for element in (driveline.offgoing, driveline.oncoming):
-            name = f"P0.{element.name}"
-            estimates[name] = from_prior(name, element.P0.value, element.P0.std, _TAKEN)
+            estimates["J_out"] = from_prior("J_out", driveline.J_out, _TAKEN)
+    estimates |= collect_fill_pressures(drivelines, _TAKEN)
     friction = {s.friction.element: s.friction.curve for s in shifts if s.friction is not None}
     doubts = dict.fromkeys(text for shift in shifts for text in shift.doubts.values())
     warnings = (

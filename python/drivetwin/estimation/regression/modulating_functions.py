@@ -47,7 +47,7 @@ def build_windows(span: Span, width: float, step: float) -> Windows:
 
 
 def join_windows(parts: list[Windows]) -> Windows:
-    """All windows of `parts`, one after the other."""
+    """Join the windows of `parts` in their order."""
     nothing = np.empty(0)
     return Windows(
         np.concatenate([nothing, *(p.start for p in parts)]),

@@ -133,7 +133,7 @@ class FrictionCurve:
 
 @dataclass(frozen=True)
 class LoadLaw:
-    """How the load torque at the wheel grows with the wheel's speed ω:
+    """Load torque at the wheel as a function of the wheel's speed ω:
 
         T_v(ω) = i_f·(T_v/i_f) + aero·(ω·|ω| - mean_speed²)
 

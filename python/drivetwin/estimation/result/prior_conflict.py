@@ -15,22 +15,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline
+from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.prior_update import CONTRADICTS, remove_prior
 from drivetwin.estimation.result.verdict import reject_identified
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
-
-
-def get_design_value(name: str, driveline: KnownDriveline) -> PriorValue | None:
-    """The card's Jo′, or P0 or drum of an element in the shift, by id; None for others."""
-    if name == "J_out":
-        return driveline.J_out
-    stem, _, element = name.partition(".")
-    coupling = driveline.couplings.get(element)
-    return None if coupling is None else {"P0": coupling.P0, "drum": coupling.drum}.get(stem)
 
 
 @dataclass(frozen=True)
@@ -49,7 +40,7 @@ class Contradiction:
 
     @property
     def text(self) -> str:
-        """The same in words."""
+        """Warning with both values and their difference."""
         unit = get_parameter_spec(self.id).unit
         card, log = (format_with_unit(one.value, unit, one.std) for one in (self.design, self.log))
         return (
@@ -118,7 +109,7 @@ def apply_contradictions(
 
 
 def check_design_ranges(estimates: Mapping[str, Estimate], design: DesignData) -> tuple[str, ...]:
-    """What is said of inertias whose whole interval lies outside the card's design range."""
+    """Return a warning for each inertia whose whole interval lies outside the design range."""
     ranges = {"J_prime": design.J_prime_range, "J_vehicle": design.J_vehicle_range}
     texts = []
     for name, one in estimates.items():
@@ -158,7 +149,7 @@ def check_efficiency_limit(
 
 
 def describe_range_violation(symbol: str, value: float, design: tuple[float, float]) -> str:
-    """What is said of an inertia [kg m^2] outside its design range; empty where it lies within."""
+    """Describe an inertia [kg m^2] outside its design range; empty if it lies within."""
     if design[0] <= value <= design[1]:
         return ""
     return (

@@ -120,9 +120,9 @@ def assess_with_prior(
     """
     name, value, std = told
     if design.std == 0.0:
-        return from_prior(name, value, 0.0, KNOWN)
+        return from_prior(name, PriorValue(value), KNOWN)
     if std >= PRIOR_SHARE * design.std:
-        return from_prior(name, value, std, ADDS_LITTLE, std_systematic)
+        return from_prior(name, PriorValue(value, std), ADDS_LITTLE, std_systematic)
     one, spec = assess(name, value, std, method, std_systematic, note), get_parameter_spec(name)
     if one.value is not None or not spec.lower <= value <= spec.upper:
         return one
@@ -134,13 +134,14 @@ def assess_with_prior(
 
 
 def from_prior(
-    parameter_id: str, value: float, std: float, note: str, std_systematic: float | None = None
+    parameter_id: str, prior: PriorValue, note: str, std_systematic: float | None = None
 ) -> Estimate:
-    """A value that the vehicle card states and the log adds little to; `std` 0: known.
+    """Return the estimate of a value that the card states and the log adds little to.
 
-    What the log adds is as wrong as its sensors: `std_systematic`, where their tolerances are
+    The part that the log adds is as wrong as its sensors: `std_systematic` if their tolerances are
     stated.
     """
+    value, std = prior.value, prior.std
     return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", std_systematic, note)
 
 

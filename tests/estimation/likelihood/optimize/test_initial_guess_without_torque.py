@@ -11,11 +11,10 @@ import pytest
 
 from drivetwin.dyno.files import format_card
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.data.shift_data import DesignData, MeasuredSignal
+from drivetwin.estimation.data.shift_data import PLAUSIBLE_ETA, DesignData, MeasuredSignal
 from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque import (
     estimate_without_torque,
 )
-from drivetwin.estimation.likelihood.priors import PLAUSIBLE_ETA
 from drivetwin.vehicle.card import load_card
 from tests.support.bench import Knowledge, record_bench
 

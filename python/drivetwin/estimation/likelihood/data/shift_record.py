@@ -153,7 +153,7 @@ class ShiftRecord:
 
     @property
     def measured(self) -> FloatArray:
-        """All compared samples, stacked (size,)."""
+        """Compared samples, stacked (size,)."""
         return np.concatenate([out.values for out in self.outputs])
 
     def sample_run(self, run: Trajectory) -> FloatArray:

@@ -134,7 +134,7 @@ class Misspecification:
 
 
 def run_score_tests(fit: LikelihoodFit) -> Iterator[Misspecification]:
-    """All that the log shows of effects the fit leaves out: an output torque or a pressure that is
+    """Test for effects that the fit leaves out: an output torque or a pressure that is
     late, friction of another shape than Stribeck's."""
     yield from _torque_told(check_torque_delay(fit))
     ending = f".{LAW[-1]}"

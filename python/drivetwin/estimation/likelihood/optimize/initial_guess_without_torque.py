@@ -17,9 +17,13 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.segments import MomentumSettings
-from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
+from drivetwin.estimation.data.shift_data import (
+    PLAUSIBLE_ETA,
+    DesignData,
+    KnownDriveline,
+    ShiftSignals,
+)
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW, TYPICAL_MODE
-from drivetwin.estimation.likelihood.priors import PLAUSIBLE_ETA
 from drivetwin.estimation.linear.ringdown import estimate_pencil_start
 from drivetwin.estimation.paper.wlse import drop_nan_rows
 from drivetwin.simulation.dual_clutch import compute_series_inertia

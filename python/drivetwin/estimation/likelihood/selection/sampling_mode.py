@@ -334,7 +334,7 @@ class _Choices:
 def _choices(
     problem: LikelihoodObjective, point: ParameterVector, normal: NormalEquations
 ) -> _Choices:
-    """All choices by the expansion `normal` at `point`: with the weighting there, so by Q alone."""
+    """Expand Q at `point` over all choices by `normal`, with the weighting there."""
     score = compute_score(problem, normal, [_changes(part, point) for part in problem.parts])
     shown = {*_shown(problem), TORQUE}
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
