@@ -40,7 +40,7 @@ METHODS = ("paper", "integral", "likelihood")
 SEEDS = (0, 1)
 RTOL = 1e-6
 
-Numbers = dict[str, float | str]
+Numbers = dict[str, float | str | None]
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def compare(stored: Numbers, today: Numbers, keys: dict[str, str]) -> list[str]:
     differences = [f"{key}: only on one side" for key in sorted(stored.keys() ^ today.keys())]
     for key in sorted(stored.keys() & today.keys()):
         old, new = stored[key], today[key]
-        if isinstance(old, str) or isinstance(new, str):
+        if not isinstance(old, float) or not isinstance(new, float):
             close = old == new
         else:
             spread = stored.get(key.removesuffix(".value") + ".std_total", 0.0)
