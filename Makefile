@@ -82,11 +82,15 @@ test-browser: $(venv)/.dev native ## report and workbench in Chromium; pictures 
 	tools/browser.sh
 	$(bin)/pytest -q -m browser
 
+.PHONY: golden
+golden: $(venv)/.dev native ## compare 72 identifications with stored results (five minutes)
+	$(bin)/python -m tests.golden
+
 .PHONY: nightly
 nightly: ## what takes hours: all suites, a fleet of 300, the wheel, short fuzzing of `identify`
 	$(MAKE) $(suites:%=test-%) fault_logs=1000
 	$(MAKE) fleet fleet_logs=300
-	$(MAKE) test-browser test-wheel docs
+	$(MAKE) golden test-browser test-wheel docs
 
 .PHONY: wheel
 wheel: $(venv)/.base ## the abi3 wheel, into dist/

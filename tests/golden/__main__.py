@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compare identifications of synthetic logs with stored results: `python -m tests.golden`.
+"""Compare identifications of synthetic logs with stored results: `make golden`.
 
 Twelve scenarios of the virtual dynamometer, three methods and two seeds go through the command
 line, so that moves and renames inside the package leave the comparison as it is. A number may
