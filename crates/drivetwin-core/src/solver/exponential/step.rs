@@ -23,12 +23,13 @@ struct StepWork<L: Lane, const N: usize, const A: usize> {
     rate: [L; A],
     /// The part of these rates that comes from the inputs.
     direct: [L; A],
-    /// How the arguments turn at the start, without channels and state, and by the state.
+    /// Half the second derivatives of the arguments at the start: part without channels and state, and part
+    /// by the state.
     half_second_derivative: [L; A],
     state_half_second_derivative: [L; A],
     /// Normal loads at the start and what they rise by.
     normal: [[L; 2]; A],
-    /// The torques by what is known at the start.
+    /// Torques by the values available at the start.
     cubics: [[L; N_START]; A],
     /// Size of the torques at the start.
     size: L::Values,

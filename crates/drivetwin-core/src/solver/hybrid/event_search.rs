@@ -180,7 +180,7 @@ fn balanced<T: Number>(state: &HybridState<'_, T>) -> T {
     T::promote(held.fold(T::Values::zero_(), |sum, torque| sum + torque.magnitude()))
 }
 
-/// Torque [N·m] through a rolling gear of which the direction is round-off.
+/// Torque [N·m] through a rolling gear below which its direction is round-off.
 fn without_direction<T: Number>(state: &HybridState<'_, T>, i: usize) -> T {
     let mut basis = Vec::new();
     state.expansion.basis_at(state.network, T::zero_(), &mut basis);
@@ -219,8 +219,8 @@ fn combined<T: Number>(a: &Series<T>, b: &Series<T>, sign: f64) -> Series<T> {
     out
 }
 
-/// Whether a guard falls so flatly that its parabola dips below zero by next to nothing: the event, and
-/// with it everything after, then hangs on round-off and has no usable derivative.
+/// True if a guard grazes zero: its parabola dips below zero by less than [`GRAZING_RTOL`] of its size. The
+/// event and the motion after it then depend on round-off and have no usable derivative.
 fn grazes<T: Real>(guard: &Series<T>, order: usize, t: f64, h: f64) -> bool {
     let g: Series<f64> = guard.map(|c| c.re());
     let (fall, mut bend, mut size, mut power) = (slope(&g, order, t), 0.0, 0.0, 1.0);

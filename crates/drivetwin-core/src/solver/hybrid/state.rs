@@ -40,7 +40,7 @@ pub struct HybridState<'a, T> {
     pub(crate) pressed: Vec<bool>,
     /// Gears at their torque bound whose speed other elements hold at zero.
     pub(crate) blocked: Vec<bool>,
-    /// Inputs and state as decisions see them.
+    /// Inputs and state that decisions are based on.
     pub(crate) inputs_plus: Vec<Series<T>>,
     pub(crate) x_plus: Vec<T>,
     pub(crate) channel_plus: ChannelSeries<T>,

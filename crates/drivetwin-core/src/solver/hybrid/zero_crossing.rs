@@ -43,9 +43,9 @@ pub fn first_zero_crossing<T: Number>(
     (fallen | at_once, time.with(at_once, none))
 }
 
-/// What the guards of the runs `at_zero`, as bits, do that start at zero, to what is negligible within `h` [s].
-/// Returns those that fall below, and those that rise: as a power of time times a polynomial, which they
-/// become. The others rest.
+/// Classify the guards of the runs `at_zero`, as bits, which start at zero. Terms `negligible` within `h`
+/// [s] are ignored. Returns the runs that fall and the runs that rise. The polynomial of a rising guard is
+/// divided by its leading power of time in place. The other guards rest.
 #[inline(always)]
 fn lift_off<V: Values>(
     c: &mut Series<V>,
@@ -87,8 +87,9 @@ fn search<V: Values>(c: &Series<V>, order: usize, runs: u32, h: V) -> (u32, V) {
     (fallen | late, time.with(late, at))
 }
 
-/// The runs of `runs` that fall once within their spans, with their times, and those of which the bounds of the
-/// polynomial do not tell. The others do not fall there, or are `negligible` throughout.
+/// Runs of `runs` whose guards fall once within their spans, with their times, and runs for which the
+/// bounds of the polynomial are inconclusive. Guards of the other runs do not fall there, or are
+/// `negligible` throughout.
 #[inline(always)]
 fn within<V: Values>(
     c: &Series<V>,
@@ -246,7 +247,7 @@ mod tests {
 
     #[test]
     fn roots_of_several_fold_end_the_search() {
-        // (0.3 - t)^n: round-off about 0.3 tells neither touches from falls nor one root from several
+        // (0.3 - t)^n: round-off near 0.3 makes touches look like falls, and one root like several
         for (fold, c) in [
             (2, [0.09, -0.6, 1.0, 0.0, 0.0, 0.0]),
             (3, [0.027, -0.27, 0.9, -1.0, 0.0, 0.0]),

@@ -303,7 +303,7 @@ impl LockstepBatch<'_> {
     }
 }
 
-/// What more runs have in common, a number of bits.
+/// The candidate with more runs in its mask, `one` if equal.
 fn most<S>(one: (u32, S), other: (u32, S)) -> (u32, S) {
     if other.0.count_ones() > one.0.count_ones() { other } else { one }
 }
