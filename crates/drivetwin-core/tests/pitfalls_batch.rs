@@ -76,10 +76,10 @@ proptest! {
         prop_assert_eq!(size_of::<Pack<LANES>>(), LANES * size_of::<f64>());
         let (x, y) = (Pack::<LANES>(a), Pack::<LANES>(b));
         let lanes = (x.fma::<true>(y, x) - y).exponential::<true>().grown::<true>(y);
-        let lanes = lanes.with(0b0110, x);
+        let lanes = lanes.replace_where(0b0110, x);
         for i in 0..LANES {
             let alone = (a[i].fma::<true>(b[i], a[i]) - b[i]).exponential::<true>();
-            let alone = alone.grown::<true>(b[i]).with(0b0110 >> i, a[i]);
+            let alone = alone.grown::<true>(b[i]).replace_where(0b0110 >> i, a[i]);
             prop_assert_eq!(lanes.0[i].to_bits(), alone.to_bits());
         }
     }

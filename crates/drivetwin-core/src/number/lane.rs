@@ -43,7 +43,7 @@ pub trait Lane:
     fn grown<const F: bool>(self, x: Self) -> Self;
 
     /// Replace the values of the runs given as bits by those of `other`.
-    fn with(self, runs: u32, other: Self) -> Self;
+    fn replace_where(self, runs: u32, other: Self) -> Self;
 
     /// The values without derivatives.
     fn values(self) -> Self::Values;
@@ -97,7 +97,7 @@ pub trait Values: Number + Lane<Values = Self> {
     fn leading(self) -> f64;
 
     /// The value of a run by its number.
-    fn of_run(self, run: usize) -> f64;
+    fn run_value(self, run: usize) -> f64;
 
     /// Magnitude.
     fn magnitude(self) -> Self;
@@ -218,7 +218,7 @@ impl Lane for f64 {
         self * growth::<F>(x)
     }
     #[inline(always)]
-    fn with(self, runs: u32, other: Self) -> Self {
+    fn replace_where(self, runs: u32, other: Self) -> Self {
         if runs & 1 == 1 { other } else { self }
     }
     #[inline(always)]
@@ -269,7 +269,7 @@ impl Values for f64 {
         self
     }
     #[inline(always)]
-    fn of_run(self, _: usize) -> f64 {
+    fn run_value(self, _: usize) -> f64 {
         self
     }
 }
@@ -321,7 +321,7 @@ impl<const P: usize> Lane for Dual<P> {
         self * x.chain(factor, factor)
     }
     #[inline(always)]
-    fn with(self, runs: u32, other: Self) -> Self {
+    fn replace_where(self, runs: u32, other: Self) -> Self {
         if runs & 1 == 1 { other } else { self }
     }
     #[inline(always)]

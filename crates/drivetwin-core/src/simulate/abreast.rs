@@ -138,7 +138,7 @@ fn other_entry(
     match entry {
         Entry::State(_) | Entry::Torque(_) => None,
         Entry::Input(i) => {
-            let at = |knot| Lanes::gathered(|run| inputs[run].at_knot(knot, i));
+            let at = |knot| Lanes::gathered(|run| inputs[run].knot_value(knot, i));
             let mut values: Vec<Lanes> = (first..first + count).map(at).collect();
             values.resize(fours, Lanes::zero_());
             Some(values)

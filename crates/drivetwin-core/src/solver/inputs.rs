@@ -191,7 +191,7 @@ impl<T: Real> Inputs<T> {
 
     /// Value of an input at a knot.
     #[inline(always)]
-    pub fn at_knot(&self, i: usize, input: usize) -> T {
+    pub fn knot_value(&self, i: usize, input: usize) -> T {
         if i < self.segments() {
             return self.line(i, input)[0];
         }

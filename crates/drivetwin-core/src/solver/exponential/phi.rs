@@ -35,7 +35,8 @@ fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], h: f64, reach:
         if ended == T::RUNS {
             return i;
         }
-        all[i] = (all[i - 1] * h / (i + FORCING_DEGREE) as f64).with(ended, T::Values::zero_());
+        all[i] =
+            (all[i - 1] * h / (i + FORCING_DEGREE) as f64).replace_where(ended, T::Values::zero_());
     }
     MAX_SERIES
 }

@@ -93,7 +93,7 @@ impl<'a, T: Number> HybridState<'a, T> {
     pub(crate) fn advance_state(&mut self, runs: u32, h: T) {
         let Self { expansion, x, .. } = self;
         for (x, series) in x.iter_mut().zip(&expansion.states) {
-            *x = x.with(runs, evaluate(series, expansion.order, h));
+            *x = x.replace_where(runs, evaluate(series, expansion.order, h));
         }
     }
 

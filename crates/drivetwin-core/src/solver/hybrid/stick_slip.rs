@@ -293,7 +293,7 @@ impl<T: Number> HybridState<'_, T> {
         mode: &Mode<T>,
         basis: &[T],
     ) -> Option<Violation> {
-        self.overload(mode, basis)
+        self.find_overload(mode, basis)
             .or_else(|| {
                 self.returning(trial, candidates, mode, basis).map(Violation::SlipDirection)
             })
@@ -327,7 +327,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// The row at rest that exceeds its bounds most, relative to their size.
-    fn overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Violation> {
+    fn find_overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Violation> {
         let capacities = self.capacities();
         let rows = || (0..mode.stuck.len()).map(|i| mode.stuck_torque.row(i));
         let sizes = rows().map(|row| sum_and_scale(row, basis).1);
@@ -440,14 +440,14 @@ impl<T: Number> HybridState<'_, T> {
             if let Row::Friction(j) = row
                 && let Slipping { sign } | Saturated { sign } = trial.rows[j]
             {
-                let held = self.held_by_others(trial, row);
+                let held = self.is_held_by_others(trial, row);
                 trial.rows[j] = if held { Saturated { sign } } else { Slipping { sign } };
             }
         }
     }
 
     /// Return true if the elements at rest hold the speed of a row that is not at rest.
-    fn held_by_others(&self, trial: &ActiveSet, row: Row) -> bool {
+    fn is_held_by_others(&self, trial: &ActiveSet, row: Row) -> bool {
         let mut stuck = self.key_of(trial).rows();
         let alone = self.rank(&stuck);
         stuck.push(row);
@@ -473,7 +473,7 @@ impl<T: Number> HybridState<'_, T> {
         for i in 0..trial.gears.len() {
             let rolling = matches!(trial.gears[i], GearState::Meshing { .. });
             let watched = rolling && self.network.losses[i].loss.is_directional();
-            self.blocked[i] = watched && self.held_by_others(&trial, Row::Gear(i));
+            self.blocked[i] = watched && self.is_held_by_others(&trial, Row::Gear(i));
         }
         self.record_changes(&trial);
         self.rows = trial.rows;
