@@ -224,7 +224,7 @@ fn repeated_couplings_are_named() {
     }
 }
 
-/// A sine of amplitude zero moves nothing, but what its amplitude would change is known:
+/// A sine of amplitude zero moves nothing, but the derivative by its amplitude is not zero:
 /// `ω_A = (1 - cos 2πft) / (2πf J)`.
 #[test]
 fn a_sine_without_amplitude_is_differentiated_by_it() {

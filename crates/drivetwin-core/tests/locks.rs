@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Who stays locked (THEORY section 1): redundant locks, tie-up, grazing, pass-through.
+//! Locks that hold (THEORY section 1): redundant locks, tie-up, grazing, pass-through.
 
 mod common;
 

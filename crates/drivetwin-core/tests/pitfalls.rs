@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-//! What goes wrong in fast clutch simulators (guards at sample ends, a frozen neighbour, drifting locks,
-//! creeping lock-up), each as a case of its own: default accuracy against round-off accuracy.
+//! Known failure modes of fast clutch simulators (guards at sample ends, a frozen neighbour, drifting
+//! locks, creeping lock-up). Each case compares default accuracy with round-off accuracy.
 
 mod common;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-//! What goes wrong where many runs are simulated side by side: lanes that are no vectors, single
-//! precision, groups of lanes that see each other, events that hold up the neighbours.
+//! Known failure modes of simulating many runs side by side: lanes that are not vectors, single precision,
+//! groups of lanes that affect each other, events that delay the neighbours.
 
 mod common;
 
@@ -57,7 +57,7 @@ fn shifts_of(names: &[&str], sets: &[f64], settings: Settings) -> Kept {
     columns_of(&model, plan, names, sets, grid.len())
 }
 
-/// The same under several efficiencies.
+/// Shaft torque of the paper's shift under several efficiencies, one thread.
 fn shifts(eta: &[f64], settings: Settings) -> Kept {
     shifts_of(&["eta"], eta, settings)
 }
@@ -76,10 +76,10 @@ proptest! {
         prop_assert_eq!(size_of::<Pack<LANES>>(), LANES * size_of::<f64>());
         let (x, y) = (Pack::<LANES>(a), Pack::<LANES>(b));
         let lanes = (x.fma::<true>(y, x) - y).exponential::<true>().grown::<true>(y);
-        let lanes = lanes.with(0b0110, x);
+        let lanes = lanes.replace_where(0b0110, x);
         for i in 0..LANES {
             let alone = (a[i].fma::<true>(b[i], a[i]) - b[i]).exponential::<true>();
-            let alone = alone.grown::<true>(b[i]).with(0b0110 >> i, a[i]);
+            let alone = alone.grown::<true>(b[i]).replace_where(0b0110 >> i, a[i]);
             prop_assert_eq!(lanes.0[i].to_bits(), alone.to_bits());
         }
     }
@@ -131,8 +131,8 @@ fn events_of_all_lanes_within_few_samples_are_located_one_by_one() {
     }
 }
 
-/// 9: neighbours decide together; whoever decides otherwise, has other events, or is no driveline at all is
-/// as it would be alone, wherever it stands.
+/// 9: neighbours decide together. A run that decides otherwise, has other events or has an invalid
+/// driveline gives the same result as alone, in any lane.
 #[test]
 fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
     let names = ["eta", "k_o", "B2.gain", "B3.gain", "B3.P0", "B3.mu_s", "start.twist"];

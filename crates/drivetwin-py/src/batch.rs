@@ -62,7 +62,7 @@ pub fn simulate_batch<'py>(
     Ok(ends(py, batch))
 }
 
-/// The same with derivatives by the named parameters, at least one.
+/// Simulate as `simulate_batch`, with derivatives by the named parameters, at least one.
 #[pyfunction]
 pub fn batch_sensitivities<'py>(
     py: Python<'py>,

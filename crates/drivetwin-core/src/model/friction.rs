@@ -50,7 +50,7 @@ pub enum FrictionLaw<T> {
 pub struct Decay<T> {
     /// -1/v_s, s/rad.
     rate: T,
-    /// Those of the exponent, times their order.
+    /// Coefficients of the exponent, times their order.
     slopes: Series<T>,
     values: Series<T>,
 }

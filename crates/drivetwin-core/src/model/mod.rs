@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! 1 The physical description: what the user states, in SI, as plain data.
 //!
-//! Each element is one file that states its law in the vocabulary of [`mechanism`]. Elements know
-//! no integrator.
+//! Each element is one file that states its law in the vocabulary of [`mechanism`]. Elements do not depend
+//! on an integrator.
 
 pub mod converter_map;
 pub mod dual_clutch;

@@ -62,7 +62,7 @@ pub struct ChannelSeries<T> {
     slip: Series<T>,
     /// Normal load of a friction law, and the number of the last coefficient that is not zero.
     normal: (Series<T>, usize),
-    /// What stiction has decayed to, of a Stribeck law.
+    /// Decay of the stiction of a Stribeck law.
     decay: Decay<T>,
     /// μ of a friction law.
     mu: Series<T>,
@@ -105,7 +105,7 @@ impl<T: Number> Normal<T> {
         }
     }
 
-    /// What is left of the load [N·m] by round-off where the pressure is the fill pressure; above zero.
+    /// Round-off of the load [N·m] at the fill pressure; above zero.
     pub fn load_tolerance(&self) -> T {
         let size = match self {
             Self::Pressure { gain, p0, .. } => (*gain * *p0).re().magnitude(),
@@ -130,8 +130,8 @@ impl<T: Number> Normal<T> {
 }
 
 impl<T: Number> Channel<T> {
-    /// Whether the torque is a product of arguments: it may then start with a power of time twice as
-    /// high as theirs, after terms that are all zero.
+    /// True if the torque is a product of arguments. Its first non-zero term may then have twice the power
+    /// of time of theirs.
     pub fn is_product(&self) -> bool {
         matches!(self.law, Law::Quadratic(_) | Law::Map { .. } | Law::Converter { .. })
     }
@@ -146,7 +146,7 @@ impl<T: Number> Channel<T> {
         }
     }
 
-    /// Whether the active cell depends on an input and may change when that jumps.
+    /// True if the active cell depends on an input and may change when the input jumps.
     pub fn follows_inputs(&self) -> bool {
         matches!(self.law, Law::Map { .. })
     }

@@ -18,7 +18,7 @@ pub const MAX_ROWS: usize = 32;
 /// follows whichever element is stronger, within nanoseconds.
 const MASSLESS: f64 = 1e-12;
 
-/// A friction element as the solver sees it.
+/// Compiled friction element.
 #[derive(Clone, Debug)]
 pub struct FrictionRow<T> {
     /// Name for messages and events.
@@ -37,7 +37,7 @@ pub struct FrictionRow<T> {
     pub one_way: bool,
 }
 
-/// A lossy gear as the solver sees it.
+/// Compiled lossy gear.
 #[derive(Clone, Debug)]
 pub struct LossyGear<T> {
     /// Name for messages and events.
@@ -57,7 +57,7 @@ pub struct Drive<T> {
     pub basis: usize,
     /// Nodes it acts on.
     pub nodes: Row<T>,
-    /// Where its work is booked; none for compliances.
+    /// Energy account of its work; none for compliances.
     pub account: Option<Account>,
 }
 
@@ -191,7 +191,7 @@ impl<T: Number> Network<T> {
         self.first_channel() + self.channels.len()
     }
 
-    /// Whether an input is itself a torque or the target of one that lags, not only a pressure.
+    /// True if an input is itself a torque or the target of a lagging torque, not only a pressure.
     pub fn is_driven_by(&self, input: usize) -> bool {
         let position = self.first_input() + input;
         self.lags.iter().any(|lag| lag.target == position)

@@ -8,7 +8,7 @@ use crate::model::mechanism::{Mechanism, Row};
 use crate::number::Real;
 use thiserror::Error;
 
-/// Why members have no definite speeds over the named ones.
+/// Reason why the speeds of members do not follow from those of the named ones.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum EngagedError {
     /// A friction element that the mechanism does not have.

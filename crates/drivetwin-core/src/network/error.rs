@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Why a mechanism cannot be compiled.
+//! Reason why a mechanism cannot be compiled.
 
 use crate::model::ModelFaults;
 use thiserror::Error;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-//! What holds speeds (THEORY section 1): torques of friction elements at rest, of gears held by their loss and
-//! of prescribed speeds, with the accelerations under them.
+//! Holding torques (THEORY section 1) of friction elements at rest, of gears held by their loss and of
+//! prescribed speeds, with the resulting accelerations.
 
 use super::constraints::{Coordinates, force_map};
 use super::linalg::{Matrix, independent_rows, least_norm, solve};
@@ -25,13 +25,14 @@ pub struct Hold<'a, T> {
 pub struct Held<T> {
     pub acceleration: Matrix<T>,
     pub torque: Matrix<T>,
-    /// Whether more is held than there are speeds.
+    /// True if more rows are held than there are speeds.
     pub redundant: bool,
 }
 
 impl<T: Number> Hold<'_, T> {
-    /// Where rows contradict each other those prescribed win. Torques of redundant rows are those of least
-    /// `Σ (τ_j / weight_j)²`. `None` if the efficiencies leave the accelerations undetermined.
+    /// Solve for the accelerations and the holding torques. Prescribed rows take precedence over rows that
+    /// contradict them. Torques of redundant rows minimise `Σ (τ_j / weight_j)²`. `None` if the
+    /// efficiencies leave the accelerations undetermined.
     pub fn solve(
         &self,
         (f, g): (&Matrix<T>, Option<&Matrix<T>>),
@@ -52,7 +53,8 @@ impl<T: Number> Hold<'_, T> {
         Some(Held { acceleration, torque, redundant })
     }
 
-    /// Change of the speeds by impulses that take `excess` (rows × 1, rad/s) off what is held. `None` as above.
+    /// Change of the speeds by impulses that reduce the held speeds by `excess` (rows × 1, rad/s). `None` as
+    /// in [`Self::solve`].
     pub fn stop(&self, excess: &Matrix<T>) -> Option<Matrix<T>> {
         let mut taken = Matrix::zeros(excess.rows, 1);
         taken.subtract(excess);
@@ -74,7 +76,7 @@ impl<T: Number> Hold<'_, T> {
         found.into_iter().map(|i| order[i]).collect()
     }
 
-    /// What the rows `kept` leave to move, and the accelerations.
+    /// Coordinates left free by the rows `kept`, and the accelerations.
     fn motion(
         &self,
         kept: &[usize],

@@ -357,13 +357,13 @@ fn subtract_row<T: Number>(
     target[from..].iter_mut().zip(&source[from..]).for_each(|(t, &s)| *t -= s * factor);
 }
 
-/// Whether a number is zero in every run and with all its derivatives, so that its products may be left
-/// out.
+/// True if a number is zero in every run and with all its derivatives. Its products may then be left out.
 pub fn is_zero<T: Number>(value: T) -> bool {
     value.re().mask_where(|v| v != 0.0) == 0 && value.is_constant()
 }
 
-/// Whether the value is zero, which is decided.
+/// True if the value is zero in the run that decides, see
+/// [`Values::decide`](crate::number::Values::decide).
 pub fn is_nothing<T: Number>(value: T) -> bool {
     value.re().decide(|v| v == 0.0)
 }

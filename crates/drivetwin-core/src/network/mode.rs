@@ -85,7 +85,7 @@ pub struct Mode<T> {
     pub stuck_torque: Matrix<T>,
     /// See [`Mode::gear_torque`].
     gear_torque: OnceLock<Matrix<T>>,
-    /// Whether more is stuck than there are speeds to hold; the torque split then depends on the
+    /// True if more rows stick than there are speeds to hold. The torque split then depends on the
     /// capacities.
     pub redundant: bool,
 }
@@ -114,7 +114,7 @@ pub struct GearBounds<T> {
 }
 
 impl<T: Number> Loss<T> {
-    /// Whether the loss depends on the direction of power.
+    /// True if the loss depends on the direction of power.
     pub fn is_directional(&self) -> bool {
         self.law == LossLaw::Dissipative
     }
@@ -289,8 +289,8 @@ impl<T: Number> Network<T> {
         (speeds, nodes)
     }
 
-    /// What each held speed's torque can be, for the split of redundant locks; prescribed speeds,
-    /// which come last, and one-way clutches carry what the others cannot.
+    /// Torque capacities of the held speeds, as weights of the split among redundant locks. One-way
+    /// clutches and the prescribed speeds, which come last, get a large weight: they carry the remainder.
     fn weights(&self, stuck: &[Row], capacity: &[T]) -> Vec<T> {
         let one = T::Values::of(1.0);
         let largest = capacity.iter().fold(one, |largest, c| c.re().larger(largest));
@@ -309,7 +309,8 @@ impl<T: Number> Network<T> {
         stuck.iter().map(weight).chain(prescribed).collect()
     }
 
-    /// What enters each lossy gear at its driving side, by what is left of the balance of the nodes.
+    /// Torque that enters each lossy gear at its driving side, computed from the residual of the node
+    /// balance.
     fn entering(&self, key: ModeKey, residual: &Matrix<T>) -> Matrix<T> {
         let dependent = &self.coordinates.dependent;
         let balance = self.force_rows(key).select_columns(dependent).transposed();
@@ -319,9 +320,10 @@ impl<T: Number> Network<T> {
         multipliers.select_rows(&lossy)
     }
 
-    /// What impulses that take `excess` (rows and prescribed speeds × 1, rad/s) off the speeds of rows add to
-    /// the independent speeds, speeds × 1, and what of them enters each lossy gear, losses × 1. They act
-    /// through the gears as torques do: `KᵀIN Δv = -Kᵀ g λ`. `None` as of [`Network::mode`].
+    /// Response to the impulses that reduce the speeds of rows by `excess` (rows and prescribed speeds × 1,
+    /// rad/s): change of the independent speeds, speeds × 1, and impulse that enters each lossy gear,
+    /// losses × 1. Impulses act through the gears as torques do: `KᵀIN Δv = -Kᵀ g λ`. `None` as of
+    /// [`Network::mode`].
     pub fn impulse(
         &self,
         key: ModeKey,

@@ -6,7 +6,7 @@ use crate::model::Mechanism;
 use crate::number::Real;
 use thiserror::Error;
 
-/// Why a shift has no dual-clutch form.
+/// Reason why a shift has no dual-clutch form.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ReductionError {
     /// Members or elements without definite speeds.
@@ -36,7 +36,8 @@ fn listed(names: &[String]) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// What changes in a shift: one friction element off, one on, the others stay engaged.
+/// Elements exchanged in a shift: one friction element is released, one is applied, the others stay
+/// engaged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exchange {
     /// Element of the old gear that is released.

@@ -32,7 +32,7 @@ pub struct Line<L> {
 pub struct Law<L> {
     /// Direction of motion.
     pub sign: L,
-    /// What the argument counts per rad/s, s/rad.
+    /// Argument per slip, s/rad.
     pub unit: L,
     /// N over its input.
     pub normal: Line<L>,
@@ -123,7 +123,7 @@ pub fn line_of<T: Number>(normal: &Normal<T>) -> Line<T> {
 }
 
 impl<L: Lane> Law<L> {
-    /// What stiction adds to μ.
+    /// Contribution of stiction to μ.
     #[inline(always)]
     pub fn stiction<const F: bool>(&self, m: L) -> L {
         self.excess * (-m).exponential::<F>()
@@ -212,7 +212,7 @@ impl<L: Lane> Line<L> {
 }
 
 impl<L: Copy> Line<L> {
-    /// The same line over another number.
+    /// Convert the coefficients to another number type.
     #[inline(always)]
     pub fn map<M>(&self, f: impl Fn(L) -> M) -> Line<M> {
         Line { input: self.input, gain: f(self.gain), offset: f(self.offset) }

@@ -42,8 +42,8 @@ pub trait Lane:
     /// `self · e^x` for |x| up to [`SMALL`].
     fn grown<const F: bool>(self, x: Self) -> Self;
 
-    /// The values of another in the runs named by bits.
-    fn with(self, runs: u32, other: Self) -> Self;
+    /// Replace the values of the runs given as bits by those of `other`.
+    fn replace_where(self, runs: u32, other: Self) -> Self;
 
     /// The values without derivatives.
     fn values(self) -> Self::Values;
@@ -81,13 +81,13 @@ impl<const P: usize> Factor<Self> for Dual<P> {
     }
 }
 
-/// Values of one or several runs, as guards look at them: a guard falls where its sign bit is set.
+/// Values of one or several runs, as used in guards: a guard falls where its sign bit is set.
 pub trait Values: Number + Lane<Values = Self> {
-    /// What `say` answers for the value of a run. Of several runs the first decides for all; those for
-    /// which another answer holds part with it, see [`together`](super::together).
+    /// Value of `say` for the run that decides. Of several runs the first decides for all. Runs with
+    /// another value of `say` part with it, see [`together`](super::together).
     fn decide<R: PartialEq>(self, say: impl Fn(f64) -> R) -> R;
 
-    /// The same over two values.
+    /// Value of `say` over two values, see [`Self::decide`].
     fn decide_with<R: PartialEq>(self, other: Self, say: impl Fn(f64, f64) -> R) -> R;
 
     /// Runs for whose value `say` holds, as bits.
@@ -97,7 +97,7 @@ pub trait Values: Number + Lane<Values = Self> {
     fn leading(self) -> f64;
 
     /// The value of a run by its number.
-    fn of_run(self, run: usize) -> f64;
+    fn run_value(self, run: usize) -> f64;
 
     /// Magnitude.
     fn magnitude(self) -> Self;
@@ -108,13 +108,13 @@ pub trait Values: Number + Lane<Values = Self> {
     /// The smaller of two numbers, run by run.
     fn smaller(self, other: Self) -> Self;
 
-    /// Something that is negative where either is; its magnitude means nothing.
+    /// Number that is negative where either operand is; its magnitude has no meaning.
     fn negative_with(self, other: Self) -> Self;
 
     /// Runs whose value is negative, as bits.
     fn negative(self) -> u32;
 
-    /// Whether there is one.
+    /// True if the value of any run is negative.
     fn any_negative(self) -> bool;
 
     /// Runs whose value is infinite or no number, as bits.
@@ -218,7 +218,7 @@ impl Lane for f64 {
         self * growth::<F>(x)
     }
     #[inline(always)]
-    fn with(self, runs: u32, other: Self) -> Self {
+    fn replace_where(self, runs: u32, other: Self) -> Self {
         if runs & 1 == 1 { other } else { self }
     }
     #[inline(always)]
@@ -269,7 +269,7 @@ impl Values for f64 {
         self
     }
     #[inline(always)]
-    fn of_run(self, _: usize) -> f64 {
+    fn run_value(self, _: usize) -> f64 {
         self
     }
 }
@@ -321,7 +321,7 @@ impl<const P: usize> Lane for Dual<P> {
         self * x.chain(factor, factor)
     }
     #[inline(always)]
-    fn with(self, runs: u32, other: Self) -> Self {
+    fn replace_where(self, runs: u32, other: Self) -> Self {
         if runs & 1 == 1 { other } else { self }
     }
     #[inline(always)]

@@ -219,7 +219,7 @@ impl<const K: usize> Lane for Pack<K> {
         self.zip(x, |value, x| value * growth::<F>(x))
     }
     #[inline(always)]
-    fn with(self, runs: u32, other: Self) -> Self {
+    fn replace_where(self, runs: u32, other: Self) -> Self {
         let mut out = self.0;
         for i in 0..K {
             out[i] = if runs >> i & 1 == 1 { other.0[i] } else { out[i] };
@@ -288,7 +288,7 @@ impl<const K: usize> Values for Pack<K> {
         self.0[leader() % K]
     }
     #[inline(always)]
-    fn of_run(self, run: usize) -> f64 {
+    fn run_value(self, run: usize) -> f64 {
         self.0[run % K]
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! What packs hold, run by run.
+//! Transposition of packs: one column per run.
 
 use super::Pack;
 #[cfg(target_arch = "x86_64")]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-//! How several runs side by side decide: the first of those that take part decides for all, and those for
-//! which another answer holds are found out. What was done then does not hold for them.
+//! Common decisions of several runs side by side. The first run that takes part decides for all. Runs for
+//! which another answer holds are recorded: the result of the common action is invalid for them.
 
 use std::cell::Cell;
 
@@ -24,7 +24,7 @@ pub(super) fn leader() -> usize {
     VOTE.get().0.trailing_zeros() as usize
 }
 
-/// What `say` answers for the run that decides.
+/// Value of `say` for the run that decides. Runs with another value are recorded as parting.
 #[inline]
 pub(super) fn vote<R: PartialEq>(say: impl Fn(usize) -> R) -> R {
     let (runs, mut parting) = VOTE.get();

@@ -125,7 +125,7 @@ impl Kernel for Passed<'_, '_, '_, '_> {
 /// One output over a block of samples, of every run.
 type Block = [[f64; BLOCK + FOUR]; LANES];
 
-/// What an output is a sum of: entries of the basis over samples, in whole fours, and factors.
+/// Terms of an output: entries of the basis over samples, in whole fours, and their factors.
 type Terms<'s> = SmallVec<[(&'s [Lanes], Lanes); 8]>;
 
 /// An entry of the basis over a stretch, in whole fours, unless it is a state or a torque.
@@ -138,7 +138,7 @@ fn other_entry(
     match entry {
         Entry::State(_) | Entry::Torque(_) => None,
         Entry::Input(i) => {
-            let at = |knot| Lanes::gathered(|run| inputs[run].at_knot(knot, i));
+            let at = |knot| Lanes::gathered(|run| inputs[run].knot_value(knot, i));
             let mut values: Vec<Lanes> = (first..first + count).map(at).collect();
             values.resize(fours, Lanes::zero_());
             Some(values)

@@ -130,7 +130,7 @@ impl Auditor {
     }
 }
 
-/// How far a stop is pressed, rad.
+/// Compression of a stop, rad.
 fn depth<T: Real>(stop: &Stop<T>, twist: T) -> T {
     let depth = (twist - stop.at) * stop.side;
     if depth.re() > 0.0 { depth } else { T::zero_() }

@@ -51,8 +51,8 @@ pub struct Batch {
 /// scenario or in one for every run: `scenarios` are plans and starts, run i takes that of its number or
 /// the only one. Names are those of [`DualClutch::parameter_mut`] and, after `start.`, of the start.
 ///
-/// What is kept of each run ([`Keep::size`] numbers) goes into `values`, the memory of the caller, whatever
-/// stands there; NaN for runs that failed.
+/// The kept numbers of each run ([`Keep::size`]) overwrite `values`, which the caller allocates. Failed
+/// runs give NaN.
 ///
 /// # Panics
 ///
@@ -105,7 +105,7 @@ fn place<'m, T>(
     }
 }
 
-/// What the runs of a batch are: parameter sets of a driveline, in one scenario or in one each.
+/// Definition of the runs of a batch: parameter sets of a driveline, in one scenario or in one each.
 pub(super) struct Sets<'s> {
     pub model: &'s DualClutch<f64>,
     pub starts: Vec<&'s DualClutchStart<f64>>,
@@ -291,7 +291,7 @@ impl Keep<'_> {
         }
     }
 
-    /// What is kept of the columns of a run, outputs × points.
+    /// Reduce the columns of a run, outputs × points, to the kept numbers.
     pub(super) fn reduce(self, columns: &[f64], points: usize, out: &mut [f64]) {
         for (output, column) in columns.chunks_exact(points).enumerate() {
             match self {

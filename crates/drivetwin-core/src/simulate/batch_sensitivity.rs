@@ -21,11 +21,11 @@ pub type Stated<'a> = (Vec<Sampled<'a>>, DualClutchStart<f64>);
 /// Output of a batch with its derivatives; NaN for failed runs.
 #[derive(Clone, Debug)]
 pub struct BatchDerivatives {
-    /// What was kept: runs × kept.
+    /// Kept numbers, runs × kept.
     pub values: Vec<f64>,
-    /// Derivatives of it: runs × parameters × kept.
+    /// Derivatives of the kept numbers, runs × parameters × kept.
     pub kept: Vec<f64>,
-    /// Of the time of the last lock: runs × parameters.
+    /// Derivatives of the time of the last lock, runs × parameters.
     pub last_lock: Vec<f64>,
     /// Runs of which an event only grazed its guard, its time [s] and element: no derivatives there.
     pub grazing: Vec<(usize, f64, String)>,

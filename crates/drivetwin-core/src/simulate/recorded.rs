@@ -12,7 +12,7 @@ pub(super) struct Recorded<T: Real> {
     points: usize,
     /// A column per output, as long as the run has come.
     values: Vec<Vec<f64>>,
-    /// The same of derivatives.
+    /// A column of derivatives per output, as long as that of its values.
     slopes: Vec<Vec<T::Slopes>>,
 }
 
@@ -127,7 +127,7 @@ impl Picked {
         (u64::BITS - self.0.leading_zeros()) as usize
     }
 
-    /// Whether none before the last is left out.
+    /// True if no sample before the last picked one is left out.
     fn are_all(self) -> bool {
         self.count() == self.span()
     }
@@ -163,8 +163,8 @@ impl<T: Real> Block<T> {
             return;
         }
         let mut at = 0;
-        // Its length not known beforehand, the compiler does not take several samples at once, and
-        // gather what is a vector already.
+        // The number of samples is not fixed beforehand, so the compiler does not combine several samples
+        // by gathering data that are a vector already.
         while let Some(sample) = picked.gap().and_then(|gap| samples.nth(gap)) {
             let (sample, slopes) = (sample.borrow(), &mut self.slopes[at]);
             let (value, sum) = (&mut values[at], T::sloped(*slopes));

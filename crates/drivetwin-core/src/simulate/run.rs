@@ -12,7 +12,7 @@ use crate::solver::{
 };
 use thiserror::Error;
 
-/// Why a scenario cannot be run at all.
+/// Reason why a scenario cannot be run at all.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SimulateError {
     /// The driveline.
@@ -64,7 +64,7 @@ impl<T: Real> Plan<T> {
         check_grid(grid)?;
         let find = |output: &Output| output.find(network);
         let targets = outputs.iter().map(find).collect::<Result<Vec<_>, _>>()?;
-        // Between samples only the expansion knows the motion.
+        // Between samples, the motion is available from the expansion only.
         let motion = |target: &Target| matches!(target, Target::Angle(_));
         let sprint = settings.exponential_steps && !audit && !targets.iter().any(motion);
         let sampled = |(_, signal): &(_, _)| matches!(signal, Signal::Samples { .. });

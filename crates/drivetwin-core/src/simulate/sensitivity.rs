@@ -11,10 +11,10 @@ use thiserror::Error;
 
 /// Most parameters that one pass differentiates for.
 pub const LANES: usize = 16;
-/// The same of a pass for few.
+/// Most parameters of the narrow pass.
 const FEW: usize = 8;
 
-/// Why sensitivities cannot be computed.
+/// Reason why sensitivities cannot be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SensitivityError {
     /// A name that is no parameter.

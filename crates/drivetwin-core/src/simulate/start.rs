@@ -28,7 +28,7 @@ pub struct State<T> {
     pub locked: Vec<usize>,
 }
 
-/// Why a start does not define a state.
+/// Reason why a start does not define a state.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum StartError {
     /// A name that the network does not have.

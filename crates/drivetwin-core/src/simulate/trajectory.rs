@@ -171,7 +171,7 @@ impl<'g, T: Real> Recorder<'g, T> {
         self.run_to_end_with(run, |_, _| {})
     }
 
-    /// The same; `also` gets every step of the expansion.
+    /// Run to the end, record, and call `also` after every step of the expansion.
     pub fn run_to_end_with(
         &mut self,
         run: &mut Integrator<'_, T>,
@@ -295,7 +295,7 @@ impl Entry {
     }
 }
 
-/// What a column is a sum of while the mode lasts: positions in the basis and coefficients.
+/// Terms of a column while the mode lasts: positions in the basis and coefficients.
 pub(super) fn passing_terms<'c, T: Number>(
     column: &'c Column<T>,
     state: &HybridState<'_, T>,

@@ -58,7 +58,7 @@ pub struct Inputs<T> {
 /// Fewest segments of equal length that make operators worth while.
 const WORTH_WHILE: usize = 8;
 
-/// Segments of which the extremes are known together.
+/// Number of segments that share one pair of extremes.
 const STRETCH: usize = 64;
 
 /// Point number of a knot outside the grid.
@@ -191,7 +191,7 @@ impl<T: Real> Inputs<T> {
 
     /// Value of an input at a knot.
     #[inline(always)]
-    pub fn at_knot(&self, i: usize, input: usize) -> T {
+    pub fn knot_value(&self, i: usize, input: usize) -> T {
         if i < self.segments() {
             return self.line(i, input)[0];
         }
@@ -230,8 +230,8 @@ impl<T: Real> Inputs<T> {
         self.sines.len().max(1)
     }
 
-    /// Whether derivatives jump at knots: a signal that comes later by a parameter is shifted along another
-    /// slope there.
+    /// True if derivatives jump at knots. The derivative of a delayed signal by its delay follows the
+    /// slope, which changes at a knot.
     pub fn jumps(&self) -> bool {
         self.shifts.iter().any(|shift| !shift.is_constant())
     }
@@ -274,11 +274,12 @@ impl<T: Real> Inputs<T> {
     }
 }
 
-/// Lengths of segments that are told apart.
+/// Most lengths of segments that are distinguished.
 const LENGTHS: usize = 8;
 
 /// For every segment the length that its operators are made for [s]: that of the first of those as long as
-/// it, of which there are enough; else zero. The first [`LENGTHS`] lengths are known again later on.
+/// it, of which there are enough; else zero. Only the first [`LENGTHS`] lengths are recognised in later
+/// segments.
 fn usual_lengths(knots: &[f64], equal: &[u32]) -> Vec<f64> {
     let mut known: Vec<(f64, usize)> = Vec::with_capacity(LENGTHS);
     let mut class = Vec::with_capacity(equal.len());
@@ -357,7 +358,7 @@ fn sine_series<T: Real>(&(offset, amplitude, omega, phase): &Sine<T>, t: T) -> S
     })
 }
 
-/// Whether a raster, times [s] and delay [s], is the known one.
+/// True if a raster, times [s] and delay [s], equals the `known` raster.
 fn is_raster(known: Option<(&[f64], f64)>, times: &[f64], delay: f64) -> bool {
     known.is_some_and(|(others, d)| d == delay && (std::ptr::eq(others, times) || others == times))
 }

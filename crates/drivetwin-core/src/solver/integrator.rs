@@ -131,7 +131,7 @@ impl<'a, T: Real> Integrator<'a, T> {
         if let Some(next) = self.inputs.just_before(self.segment, time) {
             self.state.t += self.inputs.knot(next) - time;
             self.segment = next;
-            cause = cause.at_knot();
+            cause = cause.move_to_knot();
         }
         self.load_inputs();
         self.state.change(cause)
@@ -206,7 +206,7 @@ impl<'a, T: Real> Integrator<'a, T> {
     /// Value of an input at a knot.
     #[inline(always)]
     pub fn input_at(&self, i: usize, input: usize) -> T {
-        self.inputs.at_knot(i, input)
+        self.inputs.knot_value(i, input)
     }
 
     /// Return true at the end of the inputs.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! 3 The hybrid solver. It sees friction elements, capacities and modes, and no components.
+//! 3 The hybrid solver. It operates on friction elements, capacities and modes, not on components.
 //!
 //! Per mode the motion is analytic between input samples, so a step is a Taylor expansion in time
 //! of the whole state; guards are polynomials of the same expansion and their first roots are the

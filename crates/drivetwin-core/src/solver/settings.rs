@@ -48,7 +48,7 @@ impl Default for Settings {
 pub struct Accuracy {
     /// Truncation error allowed per step, relative to `scale` of each state.
     pub tolerance: f64,
-    /// Fixed order; `None` lets the order follow the tolerance.
+    /// Fixed order; with `None` the order follows from the tolerance.
     pub order: Option<usize>,
 }
 

@@ -11,33 +11,33 @@ pub enum Status {
     Completed,
     /// One element changed its friction mode again and again at one instant.
     Chattering {
-        /// When.
+        /// Time, s.
         time: f64,
-        /// Which.
+        /// Name of the element.
         element: String,
     },
     /// No assignment of sticking and slipping satisfies the friction laws.
     Undecidable {
-        /// When.
+        /// Time, s.
         time: f64,
         /// A member of the conflict.
         element: String,
     },
     /// A lossy gear leaves the accelerations undetermined.
     SelfLocking {
-        /// When.
+        /// Time, s.
         time: f64,
-        /// Which.
+        /// Name of the element.
         element: String,
     },
     /// The step became too small for the arithmetic.
     StepTooSmall {
-        /// When.
+        /// Time, s.
         time: f64,
     },
     /// A state is no longer finite.
     NotFinite {
-        /// When.
+        /// Time, s.
         time: f64,
     },
 }

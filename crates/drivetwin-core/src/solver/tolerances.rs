@@ -103,8 +103,8 @@ pub(crate) fn negligible(scale: f64) -> f64 {
     SUM_RTOL * scale + ACCELERATION_ATOL
 }
 
-/// Real part of the scalar product and of the sum of the magnitudes of its terms, which tells
-/// zero from round-off.
+/// Real part of the scalar product, and sum of the magnitudes of its terms. The sum is the scale of the
+/// round-off.
 pub(crate) fn sum_and_scale<T: Number>(row: &[T], basis: &[T]) -> (T::Values, T::Values) {
     let none = T::Values::zero_();
     row.iter().zip(basis).fold((none, none), |(sum, scale), (a, b)| {

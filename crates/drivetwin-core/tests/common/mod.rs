@@ -84,7 +84,7 @@ pub fn simulate(
     simulate_by((Settings::default(), true), network, signals, start, grid, outputs)
 }
 
-/// The same by other settings, audited or not; only without the audit samples are passed by operators.
+/// Simulate with given settings, audited or not. Operators pass samples only without the audit.
 pub fn simulate_by(
     options: (Settings, bool),
     network: &Network<f64>,

@@ -21,8 +21,9 @@ use crate::solver::exponential::step::step;
 /// many were passed and, as bits, the runs of which a guard could have fallen within the next one. Only the
 /// runs `live`, as bits, count.
 ///
-/// Guards are looked at over `W` samples together, which run ahead of them: with `W = 1` state and carry
-/// are those after the sample that was not passed, else the trail alone knows where that began.
+/// Guards are evaluated over `W` samples together, after these samples were computed. With `W = 1`, state
+/// and carry are those after the sample that was not passed. With larger `W`, only the trail contains the
+/// start of that sample.
 #[inline(always)]
 pub fn step_samples<
     S: InputSource<L>,
@@ -76,7 +77,7 @@ pub fn step_samples<
         }
     }
     (*state, *carried) = (x, carry);
-    // What has grown beyond all bounds is left to the expansion, which says so.
+    // Unbounded states are left to the expansion, which returns the error.
     let sum = x.iter().fold(L::Values::all(0.0), |sum, x| x.values().magnitude() + sum);
     match (outcome.1, sum.unbounded() & live) {
         (0, unbounded) if unbounded != 0 => (count.saturating_sub(1), unbounded),

@@ -57,7 +57,8 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
         left[0]
     }
 
-    /// The same of `some` samples together, by what the trail has of them and by the inputs at their ends.
+    /// Evaluate [`Self::crossed`] for `some` samples together, from the trail and the inputs at the sample
+    /// ends.
     #[inline(always)]
     pub fn crossed_in_block<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
@@ -191,11 +192,11 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     /// Make negative where a watched form may leave its limits within a sample, by these before and after
     /// each.
     ///
-    /// A torque that swings within limits in both signs is no smaller than its swing where it comes near one;
-    /// one that is bounded in one sign only (a freewheel's, power through a gear) is taken to be like that,
-    /// which it need not be: its release at the crest of a swing within one sample can be passed by.
-    /// Of a speed near zero its size says nothing: it stays above the least corner of the cubic through its
-    /// values and rates (Bernstein's form), to fourth order.
+    /// A torque that swings within limits in both signs is no smaller than its swing where it comes near
+    /// one; one that is bounded in one sign only (a freewheel's, power through a gear) is taken to be like
+    /// that, which it need not be: its release at the crest of a swing within one sample can be passed by.
+    /// The magnitude of a speed near zero is not a usable scale. Its bound, to fourth order, is the
+    /// smallest Bernstein coefficient of the cubic through its values and rates.
     #[inline(always)]
     fn may_cross<const F: bool, const W: usize>(
         &self,

@@ -14,8 +14,8 @@ type Square<T, const N: usize> = [[T; N]; N];
 /// [`phi_functions`], S_0 first.
 pub type PhiFunctions<T, const N: usize> = [Square<T, N>; FORCING_DEGREE + 1];
 
-/// What a channel's cubic over a sample is a sum of, with `t` from 0 to 1 over it: 1, t, t², and Hermite's
-/// `3t² - 2t³` and `t³ - t²`, which raise the value and the slope at its end and nothing else.
+/// Number of basis functions of a channel's cubic over a sample, with `t` from 0 to 1: 1, t, t², and
+/// Hermite's `3t² - 2t³` and `t³ - t²`. The last two change only the value and only the slope at the end.
 pub const N_BASIS: usize = 5;
 /// Powers of time that a force is integrated with.
 pub const FORCING_DEGREE: usize = 4;
@@ -35,7 +35,8 @@ fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], h: f64, reach:
         if ended == T::RUNS {
             return i;
         }
-        all[i] = (all[i - 1] * h / (i + FORCING_DEGREE) as f64).with(ended, T::Values::zero_());
+        all[i] =
+            (all[i - 1] * h / (i + FORCING_DEGREE) as f64).replace_where(ended, T::Values::zero_());
     }
     MAX_SERIES
 }

@@ -30,8 +30,8 @@ pub const MAX_GUARDS: usize = 12;
 pub struct Propagator<L, const N: usize> {
     /// Number of states.
     pub states: usize,
-    /// What a watched torque may deviate from its chord within a sample, relative to its rise and to its
-    /// size.
+    /// Largest deviation of a watched torque from its chord within a sample, relative to its rise and to
+    /// its size.
     pub chord_deviation: [L; 2],
     /// Signs of the carried channels.
     pub signs: [L; MAX_ACTIVE],
@@ -89,7 +89,8 @@ pub struct Form<L, const N: usize> {
     pub channels: [L; MAX_ACTIVE],
 }
 
-/// A channel and what its argument does. Rates are those over a sample: what it rises by if they last.
+/// Coefficients of a channel and its argument. Rates are per sample: the rise over a sample at constant
+/// rate.
 #[derive(Clone, Copy, Debug)]
 pub struct ChannelCoefficients<L, const N: usize> {
     /// Response of the state at the end to the coefficients of the cubic.
@@ -98,7 +99,7 @@ pub struct ChannelCoefficients<L, const N: usize> {
     pub argument: [L; N],
     /// Argument at the end.
     pub argument_end: StepForm<L, N>,
-    /// What the cubics of the carried channels add to its rate at the end by way of the state.
+    /// Contribution of the cubics of the carried channels, through the state, to its rate at the end.
     pub rate_end: [[L; N_BASIS]; MAX_ACTIVE],
     /// Rate of the argument at any instant.
     pub rate: Form<L, N>,

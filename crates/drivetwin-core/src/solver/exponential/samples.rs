@@ -109,20 +109,22 @@ impl<L: Lane> ChannelState<L> {
 
     /// Replace the values of the lanes in a mask by those of `other`.
     #[inline(always)]
-    pub fn with(&self, runs: u32, other: &Self) -> Self {
+    pub fn replace_where(&self, runs: u32, other: &Self) -> Self {
         let (own, value) = (&self.value, &other.value);
         Self {
-            argument: self.argument.with(runs, other.argument),
-            rate: self.rate.with(runs, other.rate),
+            argument: self.argument.replace_where(runs, other.argument),
+            rate: self.rate.replace_where(runs, other.rate),
             value: Value {
-                value: own.value.with(runs, value.value),
-                by_argument: own.by_argument.with(runs, value.by_argument),
-                bend: own.bend.with(runs, value.bend),
-                by_normal: own.by_normal.with(runs, value.by_normal),
-                mixed: own.mixed.with(runs, value.mixed),
+                value: own.value.replace_where(runs, value.value),
+                by_argument: own.by_argument.replace_where(runs, value.by_argument),
+                bend: own.bend.replace_where(runs, value.bend),
+                by_normal: own.by_normal.replace_where(runs, value.by_normal),
+                mixed: own.mixed.replace_where(runs, value.mixed),
             },
-            predicted_argument: self.predicted_argument.with(runs, other.predicted_argument),
-            stiction: self.stiction.with(runs, other.stiction),
+            predicted_argument: self
+                .predicted_argument
+                .replace_where(runs, other.predicted_argument),
+            stiction: self.stiction.replace_where(runs, other.stiction),
         }
     }
 
@@ -146,7 +148,7 @@ impl<L: Lane> ChannelState<L> {
         }
         for a in 0..A {
             let form = &channels[a].rate;
-            let mut rate = over_channels::<L, F, N, A>(form, &out, form.constant);
+            let mut rate = add_channels::<L, F, N, A>(form, &out, form.constant);
             for i in 0..op.columns() {
                 rate = form.state[i].fma::<F>(x[i], rate);
             }
@@ -169,8 +171,9 @@ impl<L: Lane, const N: usize> ChannelCoefficients<L, N> {
     }
 }
 
+/// Add the contributions of the carried channels to `sum`.
 #[inline(always)]
-pub fn over_channels<L: Lane, const F: bool, const N: usize, const A: usize>(
+pub fn add_channels<L: Lane, const F: bool, const N: usize, const A: usize>(
     form: &Form<L, N>,
     carry: &[ChannelState<L>; A],
     sum: L,

@@ -5,7 +5,7 @@ use crate::network::smooth::Sample;
 use crate::number::{Factor, Lane, SMALL, Values};
 use crate::solver::exponential::phi::N_BASIS;
 use crate::solver::exponential::propagator::{ChannelCoefficients, MAX_ACTIVE, Propagator};
-use crate::solver::exponential::samples::{ChannelState, over_channels};
+use crate::solver::exponential::samples::{ChannelState, add_channels};
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::tolerances::{CORRECTION_RTOL, CUBIC_RTOL, MAX_LINEARIZED_DISTANCE};
 
@@ -23,12 +23,13 @@ struct StepWork<L: Lane, const N: usize, const A: usize> {
     rate: [L; A],
     /// The part of these rates that comes from the inputs.
     direct: [L; A],
-    /// How the arguments turn at the start, without channels and state, and by the state.
+    /// Half the second derivatives of the arguments at the start: part without channels and state, and part
+    /// by the state.
     half_second_derivative: [L; A],
     state_half_second_derivative: [L; A],
     /// Normal loads at the start and what they rise by.
     normal: [[L; 2]; A],
-    /// The torques by what is known at the start.
+    /// Torques by the values available at the start.
     cubics: [[L; N_START]; A],
     /// Size of the torques at the start.
     size: L::Values,
@@ -224,7 +225,7 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
         for a in 0..A {
             let (v, [a0, a1, a2]) = (&carry[a].value, self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
-            let rate = over_channels::<L, F, N, A>(&channels[a].rate, carry, known);
+            let rate = add_channels::<L, F, N, A>(&channels[a].rate, carry, known);
             let drift = v.by_normal * self.normal[a][1];
             raised[a] = a0 + a1 + a2;
             missing[a] =
@@ -263,7 +264,7 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
         for a in 0..A {
             let ChannelCoefficients { rate, law, .. } = &channels[a];
             let known = self.rate[a] + self.direct[a];
-            carry[a].rate = over_channels::<L, F, N, A>(rate, carry, known);
+            carry[a].rate = add_channels::<L, F, N, A>(rate, carry, known);
             // Between its ends the argument stays within these (Bernstein's form of the cubic).
             let (early, end) = (early[a], carry[a].argument.values());
             let late = end - carry[a].rate.values().times(1.0 / 3.0);
@@ -302,7 +303,7 @@ impl<L: Lane, const N: usize, const A: usize> Kernel for StictionKernel<'_, L, N
     fn run<const F: bool>(mut self) -> [L; A] {
         for a in 0..A {
             let stiction = self.channels[a].law.stiction::<F>(self.predicted_argument[a]);
-            self.faded[a] = self.faded[a].with(self.far, stiction);
+            self.faded[a] = self.faded[a].replace_where(self.far, stiction);
         }
         self.faded
     }

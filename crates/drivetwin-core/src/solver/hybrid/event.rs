@@ -25,7 +25,7 @@ pub enum EventCause {
 
 impl EventCause {
     /// Return the cause for an event at a knot of the inputs.
-    pub fn at_knot(self) -> Self {
+    pub fn move_to_knot(self) -> Self {
         match self {
             Self::TorqueLimit(row, _) => Self::TorqueLimitAtKnot(row),
             other => other,
@@ -87,7 +87,7 @@ pub struct Event<T> {
 
 impl<const K: usize> Event<Pack<K>> {
     /// Return the event of one lane.
-    pub(crate) fn of_run(&self, run: usize) -> Event<f64> {
+    pub(crate) fn extract_run(&self, run: usize) -> Event<f64> {
         Event { time: self.time.0[run], element: self.element, kind: self.kind }
     }
 }

@@ -42,7 +42,7 @@ pub fn earliest_per_lane<const K: usize>(
         let (falls, t) = dispatch_simd(ZeroCrossingKernel { guard, span: (runs, earliest) });
         let earlier = falls & (!fallen | (earliest - t).mask_where(|left| left > 0.0));
         lanes_in(earlier).for_each(|run| causes[run] = Some(cause));
-        earliest = earliest.with(earlier, t);
+        earliest = earliest.replace_where(earlier, t);
         fallen |= earlier;
     });
     std::array::from_fn(|run| causes[run].map(|cause| (earliest.0[run], cause)))
@@ -133,7 +133,7 @@ fn gear_guards<T: Number>(
             let mut power = scaled(&torque, T::of(sign));
             power[0] -= gear.loss.threshold();
             let mut power = if power_reversed { scaled(&power, T::of(-1.0)) } else { power };
-            power[0] += balanced(state) * SUM_RTOL + without_direction(state, i);
+            power[0] += balanced(state) * SUM_RTOL + direction_tolerance(state, i);
             consider(power, EventCause::PowerReversal(i));
             if state.blocked[i] {
                 return;
@@ -180,8 +180,8 @@ fn balanced<T: Number>(state: &HybridState<'_, T>) -> T {
     T::promote(held.fold(T::Values::zero_(), |sum, torque| sum + torque.magnitude()))
 }
 
-/// Torque [N·m] through a rolling gear of which the direction is round-off.
-fn without_direction<T: Number>(state: &HybridState<'_, T>, i: usize) -> T {
+/// Torque [N·m] through a rolling gear below which its direction is round-off.
+fn direction_tolerance<T: Number>(state: &HybridState<'_, T>, i: usize) -> T {
     let mut basis = Vec::new();
     state.expansion.basis_at(state.network, T::zero_(), &mut basis);
     let row = state.mode.gear_torque(state.network).row(i);
@@ -198,7 +198,7 @@ fn departing<T: Number>(slip: &Series<T>, sign: f64, released: bool) -> Series<T
         let (rate, bend) = (guard[1].re(), guard[2].re().magnitude());
         let small = (rate.magnitude() - bend * RELEASE_RATE_RTOL).mask_where(|left| left <= 0.0);
         let against = rate.mask_where(|rate| (-ACCELERATION_ATOL..0.0).contains(&rate));
-        guard[1] = guard[1].with(small | against, T::zero_());
+        guard[1] = guard[1].replace_where(small | against, T::zero_());
     }
     guard
 }
@@ -219,8 +219,8 @@ fn combined<T: Number>(a: &Series<T>, b: &Series<T>, sign: f64) -> Series<T> {
     out
 }
 
-/// Whether a guard falls so flatly that its parabola dips below zero by next to nothing: the event, and
-/// with it everything after, then hangs on round-off and has no usable derivative.
+/// True if a guard grazes zero: its parabola dips below zero by less than [`GRAZING_RTOL`] of its size. The
+/// event and the motion after it then depend on round-off and have no usable derivative.
 fn grazes<T: Real>(guard: &Series<T>, order: usize, t: f64, h: f64) -> bool {
     let g: Series<f64> = guard.map(|c| c.re());
     let (fall, mut bend, mut size, mut power) = (slope(&g, order, t), 0.0, 0.0, 1.0);

@@ -40,7 +40,7 @@ pub struct HybridState<'a, T> {
     pub(crate) pressed: Vec<bool>,
     /// Gears at their torque bound whose speed other elements hold at zero.
     pub(crate) blocked: Vec<bool>,
-    /// Inputs and state as decisions see them.
+    /// Inputs and state that decisions are based on.
     pub(crate) inputs_plus: Vec<Series<T>>,
     pub(crate) x_plus: Vec<T>,
     pub(crate) channel_plus: ChannelSeries<T>,
@@ -93,7 +93,7 @@ impl<'a, T: Number> HybridState<'a, T> {
     pub(crate) fn advance_state(&mut self, runs: u32, h: T) {
         let Self { expansion, x, .. } = self;
         for (x, series) in x.iter_mut().zip(&expansion.states) {
-            *x = x.with(runs, evaluate(series, expansion.order, h));
+            *x = x.replace_where(runs, evaluate(series, expansion.order, h));
         }
     }
 

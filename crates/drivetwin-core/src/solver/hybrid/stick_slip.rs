@@ -39,7 +39,7 @@ impl<T: Number> HybridState<'_, T> {
         let candidates = self.at_zero_speed();
         let mut trial = self.assignment();
         match overloaded {
-            // An overload asks for more: what has just moved off, or is at its capacity, stays so.
+            // After an overload, rows that have just moved off or are at their capacity keep that state.
             Some((row, sign)) => self.release(&mut trial, row, sign, &candidates),
             None => candidates.iter().for_each(|&row| trial.rest(row)),
         }
@@ -87,8 +87,8 @@ impl<T: Number> HybridState<'_, T> {
     /// move off: what can hold holds. Adopts the first without fault, if there is one.
     ///
     /// Torques that have been taken to their bounds one by one need not be those with which everything
-    /// holds: with `moving`, only assignments count that let fewer than so many go, that last, and in which
-    /// all that go have overcome their static capacities.
+    /// holds: with `moving`, only lasting assignments count in which fewer than so many friction elements
+    /// move off, and in which all that move off have overcome their static capacities.
     fn enumerate_active_sets(&mut self, candidates: &[Row], moving: Option<usize>) -> bool {
         let gears = self.gears.len();
         let choices = 3usize.pow(candidates.len().min(MAX_EXHAUSTIVE) as u32) << gears.min(4);
@@ -116,9 +116,9 @@ impl<T: Number> HybridState<'_, T> {
         false
     }
 
-    /// Let friction elements rest that move off without acceleration, where that is right too: at exactly its
-    /// capacity an element holds. After an overload only those that rested before it, and with something else
-    /// that moves off in their place.
+    /// Return friction elements that move off without acceleration to rest, where that is feasible too: at
+    /// exactly its capacity an element holds. After an overload only those that rested before it, and with
+    /// something else that moves off in their place.
     fn restick_if_feasible(
         &mut self,
         mut trial: ActiveSet,
@@ -293,7 +293,7 @@ impl<T: Number> HybridState<'_, T> {
         mode: &Mode<T>,
         basis: &[T],
     ) -> Option<Violation> {
-        self.overload(mode, basis)
+        self.find_overload(mode, basis)
             .or_else(|| {
                 self.returning(trial, candidates, mode, basis).map(Violation::SlipDirection)
             })
@@ -327,7 +327,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// The row at rest that exceeds its bounds most, relative to their size.
-    fn overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Violation> {
+    fn find_overload(&self, mode: &Mode<T>, basis: &[T]) -> Option<Violation> {
         let capacities = self.capacities();
         let rows = || (0..mode.stuck.len()).map(|i| mode.stuck_torque.row(i));
         let sizes = rows().map(|row| sum_and_scale(row, basis).1);
@@ -440,14 +440,14 @@ impl<T: Number> HybridState<'_, T> {
             if let Row::Friction(j) = row
                 && let Slipping { sign } | Saturated { sign } = trial.rows[j]
             {
-                let held = self.held_by_others(trial, row);
+                let held = self.is_held_by_others(trial, row);
                 trial.rows[j] = if held { Saturated { sign } } else { Slipping { sign } };
             }
         }
     }
 
     /// Return true if the elements at rest hold the speed of a row that is not at rest.
-    fn held_by_others(&self, trial: &ActiveSet, row: Row) -> bool {
+    fn is_held_by_others(&self, trial: &ActiveSet, row: Row) -> bool {
         let mut stuck = self.key_of(trial).rows();
         let alone = self.rank(&stuck);
         stuck.push(row);
@@ -473,7 +473,7 @@ impl<T: Number> HybridState<'_, T> {
         for i in 0..trial.gears.len() {
             let rolling = matches!(trial.gears[i], GearState::Meshing { .. });
             let watched = rolling && self.network.losses[i].loss.is_directional();
-            self.blocked[i] = watched && self.held_by_others(&trial, Row::Gear(i));
+            self.blocked[i] = watched && self.is_held_by_others(&trial, Row::Gear(i));
         }
         self.record_changes(&trial);
         self.rows = trial.rows;

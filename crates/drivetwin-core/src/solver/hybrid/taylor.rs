@@ -104,8 +104,8 @@ impl<T: Number> TaylorExpansion<T> {
             return h;
         }
         let excess = largest(&sizes[TERMS - window..]) / accuracy.tolerance;
-        let shorter = |run| (0.8 * excess.of_run(run).powf(-1.0 / last as f64)).min(1.0);
-        let h = h.with(growing, h * T::Values::gathered(shorter));
+        let shorter = |run| (0.8 * excess.run_value(run).powf(-1.0 / last as f64)).min(1.0);
+        let h = h.replace_where(growing, h * T::Values::gathered(shorter));
         self.within_decay(network, cells, h)
     }
 
@@ -129,7 +129,7 @@ impl<T: Number> TaylorExpansion<T> {
             let room = room.larger(speed.re() * MAX_STICTION_EXPONENT_CHANGE);
             let shorter = within.smaller(h * (room / swing.larger(room)));
             let none = stiction.re().mask_where(|v| v == 0.0 && stiction.is_constant());
-            within = shorter.with(none, within);
+            within = shorter.replace_where(none, within);
         }
         within
     }
@@ -193,7 +193,7 @@ impl<T: Number> TaylorExpansion<T> {
         let channels = self.channels.iter_mut();
         let channels = channels.flat_map(|c| c.arguments.iter_mut().chain([&mut c.torque]));
         for series in self.states.iter_mut().chain(channels) {
-            series[k] = series[k].with(runs, T::zero_());
+            series[k] = series[k].replace_where(runs, T::zero_());
         }
     }
 

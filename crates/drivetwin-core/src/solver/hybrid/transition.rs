@@ -69,8 +69,8 @@ impl<T: Number> HybridState<'_, T> {
         rows.filter(|&row| self.slip(row).re().decide(|slip| slip.abs() < STALLED_SLIP)).collect()
     }
 
-    /// Whether the normal load is gone within round-off of the time: what is left of the capacity is
-    /// then no larger than what is left of the torque.
+    /// True if the normal load vanishes within round-off of the time. The remaining capacity is then no
+    /// larger than the round-off of the torque.
     fn is_about_to_vent(&self, j: usize) -> bool {
         let normal = &self.network.frictions[j].normal;
         let [now, rate] = [0, 1].map(|k| normal.term(&self.expansion.inputs, k).re());
@@ -123,8 +123,8 @@ impl<T: Number> HybridState<'_, T> {
         self.decide(None)
     }
 
-    /// Whether one of the locks carries its full capacity, or their split follows the capacities: they are
-    /// then decided anew at every sample; accelerations do not depend on the split.
+    /// True if one of the locks carries its full capacity, or their torque split follows the capacities.
+    /// The locks are then decided anew at every sample; accelerations do not depend on the split.
     pub(crate) fn is_split(&self) -> bool {
         let saturated = self.rows.iter().any(FrictionState::is_saturated);
         self.mode.redundant || saturated || self.blocked.contains(&true)

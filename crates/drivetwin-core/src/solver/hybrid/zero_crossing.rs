@@ -40,12 +40,12 @@ pub fn first_zero_crossing<T: Number>(
         (at_once, runs) = (falling, runs & !at_zero | rising);
     }
     let (fallen, time) = search(&c, order, runs, h);
-    (fallen | at_once, time.with(at_once, none))
+    (fallen | at_once, time.replace_where(at_once, none))
 }
 
-/// What the guards of the runs `at_zero`, as bits, do that start at zero, to what is negligible within `h` [s].
-/// Returns those that fall below, and those that rise: as a power of time times a polynomial, which they
-/// become. The others rest.
+/// Classify the guards of the runs `at_zero`, as bits, which start at zero. Terms `negligible` within `h`
+/// [s] are ignored. Returns the runs that fall and the runs that rise. The polynomial of a rising guard is
+/// divided by its leading power of time in place. The other guards rest.
 #[inline(always)]
 fn lift_off<V: Values>(
     c: &mut Series<V>,
@@ -64,7 +64,7 @@ fn lift_off<V: Values>(
         if above != 0 {
             for i in 0..=order {
                 let later = if i + k <= order { c[i + k] } else { V::zero_() };
-                c[i] = c[i].with(above, later);
+                c[i] = c[i].replace_where(above, later);
             }
         }
         falling |= below;
@@ -84,11 +84,12 @@ fn search<V: Values>(c: &Series<V>, order: usize, runs: u32, h: V) -> (u32, V) {
         return (fallen, time);
     }
     let (late, at) = in_halves(c, order, unclear, h);
-    (fallen | late, time.with(late, at))
+    (fallen | late, time.replace_where(late, at))
 }
 
-/// The runs of `runs` that fall once within their spans, with their times, and those of which the bounds of the
-/// polynomial do not tell. The others do not fall there, or are `negligible` throughout.
+/// Runs of `runs` whose guards fall once within their spans, with their times, and runs for which the
+/// bounds of the polynomial are inconclusive. Guards of the other runs do not fall there, or are
+/// `negligible` throughout.
 #[inline(always)]
 fn within<V: Values>(
     c: &Series<V>,
@@ -140,13 +141,13 @@ fn in_halves<V: Values>(c: &Series<V>, order: usize, runs: u32, h: V) -> (u32, V
             (part, depth) = (2 * part, depth + 1);
         } else {
             let at_last = still & below_zero(c, order, to);
-            (falls, at) = (falls | at_last, at.with(at_last, from));
+            (falls, at) = (falls | at_last, at.replace_where(at_last, from));
             while part % 2 == 1 {
                 (part, depth) = (part / 2, depth - 1);
             }
             part += 1;
         }
-        (fallen, time) = (fallen | falls, time.with(falls, at));
+        (fallen, time) = (fallen | falls, time.replace_where(falls, at));
     }
     (fallen, time)
 }
@@ -165,15 +166,15 @@ fn root<V: Values>(c: &Series<V>, order: usize, mut runs: u32, mut from: V, mut 
         let value = evaluate(c, order, t);
         runs &= !value.mask_where(|value| value == 0.0);
         let above = value.mask_where(|value| value > 0.0);
-        from = from.with(runs & above, t);
-        to = to.with(runs & !above, t);
+        from = from.replace_where(runs & above, t);
+        to = to.replace_where(runs & !above, t);
         let newton = t - value / slope(c, order, t);
         let inside =
             (newton - from).mask_where(|left| left > 0.0) & (to - newton).mask_where(|l| l > 0.0);
-        let next = ((from + to) * 0.5).with(inside, newton);
+        let next = ((from + to) * 0.5).replace_where(inside, newton);
         let narrow = (to - from - to.magnitude() * f64::EPSILON).mask_where(|left| left <= 0.0);
         let done = (next - t).mask_where(|step| step == 0.0) | narrow;
-        t = t.with(runs, next);
+        t = t.replace_where(runs, next);
         runs &= !done;
         if runs == 0 {
             break;
@@ -246,7 +247,7 @@ mod tests {
 
     #[test]
     fn roots_of_several_fold_end_the_search() {
-        // (0.3 - t)^n: round-off about 0.3 tells neither touches from falls nor one root from several
+        // (0.3 - t)^n: round-off near 0.3 makes touches look like falls, and one root like several
         for (fold, c) in [
             (2, [0.09, -0.6, 1.0, 0.0, 0.0, 0.0]),
             (3, [0.027, -0.27, 0.9, -1.0, 0.0, 0.0]),
@@ -258,7 +259,7 @@ mod tests {
             let (fallen, time) = first_zero_crossing(&guard, 5, 255, Pack::of(1.0));
             assert_eq!(fallen, 255 * falls, "{fold}");
             let width = 2.0 * GUARD_RTOL.powf(1.0 / f64::from(fold));
-            assert!(falls == 0 || (time.of_run(7) - 0.3).abs() < width, "{fold}: {time:?}");
+            assert!(falls == 0 || (time.run_value(7) - 0.3).abs() < width, "{fold}: {time:?}");
         }
     }
 
@@ -279,15 +280,15 @@ mod tests {
             let (fallen, time) = first_zero_crossing(&guards, 5, runs, Pack::of(h));
             prop_assert_eq!(fallen & !runs, 0);
             for run in (0..8).filter(|run| runs >> run & 1 == 1) {
-                let (falls, at) = first_zero_crossing(&guards.map(|c| c.of_run(run)), 5, 1, h);
+                let (falls, at) = first_zero_crossing(&guards.map(|c| c.run_value(run)), 5, 1, h);
                 prop_assert_eq!(falls, fallen >> run & 1);
-                prop_assert!(falls == 0 || at.to_bits() == time.of_run(run).to_bits());
+                prop_assert!(falls == 0 || at.to_bits() == time.run_value(run).to_bits());
             }
         }
 
         #[test]
         fn no_guard_is_negative_before_it_falls(guards in guards(), h in 0.1..4.0) {
-            let guard = guards.map(|c| c.of_run(0));
+            let guard = guards.map(|c| c.run_value(0));
             prop_assume!(guard[0] >= 0.0);
             let value = |t: f64| evaluate(&guard, 5, t);
             let (falls, at) = first_zero_crossing(&guard, 5, 1, h);

@@ -130,7 +130,7 @@ impl LockstepBatch<'_> {
             && let Some(next) = lane.inputs.just_before(lane.segment, *t)
         {
             (lane.segment, *t) = (next, lane.inputs.knot(next));
-            lane.status = LaneStatus::Event(cause.at_knot());
+            lane.status = LaneStatus::Event(cause.move_to_knot());
         }
     }
 
@@ -175,7 +175,7 @@ impl LockstepBatch<'_> {
         }
         if lane.segment == segments {
             lane.status = LaneStatus::Finished;
-            self.events[run] = Some(self.state.events.iter().map(|e| e.of_run(run)).collect());
+            self.events[run] = Some(self.state.events.iter().map(|e| e.extract_run(run)).collect());
             return;
         }
         let (from, to) = lane.inputs.span(lane.segment);
@@ -238,7 +238,7 @@ impl LockstepBatch<'_> {
     fn expand(&mut self, runs: u32, record: &mut impl LaneSink) {
         self.load_inputs(runs);
         let none = Lanes::zero_();
-        let remaining = none.with(runs, self.state.remaining);
+        let remaining = none.replace_where(runs, self.state.remaining);
         let wish = remaining.smaller(Lanes::of(self.settings.max_step));
         let accuracy = self.settings.accuracy(true);
         let ((h, events), diverged_mask) = together(runs, || {
@@ -303,7 +303,7 @@ impl LockstepBatch<'_> {
     }
 }
 
-/// What more runs have in common, a number of bits.
+/// The candidate with more runs in its mask, `one` if equal.
 fn most<S>(one: (u32, S), other: (u32, S)) -> (u32, S) {
     if other.0.count_ones() > one.0.count_ones() { other } else { one }
 }

@@ -156,15 +156,15 @@ impl<const N: usize, const A: usize> LaneState<N, A> {
         sample: &Sample<U>,
     ) {
         for (to, &from) in self.x.iter_mut().zip(x) {
-            *to = to.with(runs, from);
+            *to = to.replace_where(runs, from);
         }
         let fresh: [_; A] = ChannelState::start::<F, N, A, _>(operators, sample, &self.x);
         let first = operators.guards::<_, F, A>(sample, (&self.x, &fresh));
         for a in 0..A {
-            self.carry[a] = self.carry[a].with(runs, &fresh[a]);
+            self.carry[a] = self.carry[a].replace_where(runs, &fresh[a]);
         }
         for (to, &from) in self.guards.as_flattened_mut().iter_mut().zip(first.as_flattened()) {
-            *to = to.with(runs, from);
+            *to = to.replace_where(runs, from);
         }
     }
 }
