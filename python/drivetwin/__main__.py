@@ -9,9 +9,9 @@ import sys
 from drivetwin.errors import INTERRUPTED
 
 LINEAR_ALGEBRA = ("OPENBLAS", "OMP", "MKL", "VECLIB")
-"""Libraries below NumPy that would start threads. With one each, unless the environment says
-otherwise, results do not depend on the number of processors. The matrices are narrow: more threads
-gain nothing, and where other programs run they wait for each other many times as long."""
+"""Linear-algebra libraries below NumPy that start threads. Each is limited to one thread unless the
+environment sets another number, so results do not depend on the number of processors. More threads
+give no speed-up on the narrow matrices and slow the run down when other programs are active."""
 
 
 def main() -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One tree of exceptions. Each says what is wrong, where, and what to do about it."""
+"""Exception classes of the package; each error has a cause, a place and a remedy."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class IdentificationError(DrivetwinError):
 
 
 class MissingParameterError(IdentificationError):
-    """A model needs parameters that the log could not tell; the text names each and why."""
+    """Parameters of a model are not identified; the text lists each with the reason."""
 
 
 class SimulationError(DrivetwinError):

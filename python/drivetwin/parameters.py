@@ -62,8 +62,8 @@ SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}
 
 
 OVER_ETA = "_over_eta"
-"""Suffix of the id of a torque-like quantity divided by η: all that a log without an output
-torque tells of it."""
+"""Suffix of the id of a torque-like quantity divided by η. Without an output torque only this ratio
+is identifiable."""
 
 
 def get_parameter_spec(parameter_id: str) -> ParameterSpec:

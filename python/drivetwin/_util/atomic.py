@@ -71,11 +71,11 @@ def open_atomic(path: Path | str) -> Iterator[BinaryIO]:
 
 
 def write_text(path: Path | str, text: str) -> None:
-    """Write `text` (UTF-8) in place of `path`, whole or not at all; raises as `replacing` does."""
+    """Write `text` (UTF-8) to `path` atomically; raises the errors of `open_atomic`."""
     write_bytes(path, text.encode("utf-8"))
 
 
 def write_bytes(path: Path | str, data: bytes) -> None:
-    """Write `data` in place of `path`, whole or not at all; raises as `replacing` does."""
+    """Write `data` to `path` atomically; raises the errors of `open_atomic`."""
     with open_atomic(path) as file:
         file.write(data)

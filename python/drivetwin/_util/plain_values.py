@@ -16,7 +16,7 @@ def convert_nonfinite(value: object) -> object:
 
 
 def to_plain_values(value: Any) -> Any:
-    """Reduce settings to what JSON and TOML know: enums to values, arrays to lists, NaN to None."""
+    """Reduce settings to JSON and TOML types: enums to values, arrays to lists, NaN to None."""
     if isinstance(value, Enum):
         return to_plain_values(value.value)
     if isinstance(value, np.ndarray | np.generic):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Progress of long computations, reported to a listener.
 
-A computation reports its completed share by `tell(0.4)`; `with part(...)` maps the share of a step
-to the share of the whole. Without a listener both do nothing. A listener cancels the computation by
-raising an exception.
+A computation reports its completed share by `notify_progress(0.4)`. `with scale_progress(...)` maps
+the share of a step to the share of the whole. Without a listener both have no effect. A listener
+cancels the computation by raising an exception.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from drivetwin.errors import MappingError, MissingChannelError, Where
 class ChannelSpec:
     """Conversion of a column to a role: sign·(scale·column + offset) in `unit`, then in SI.
 
-    `unit` asserts the unit against the file (None: as the file says). `time_shift` [s] is added to
+    `unit` overrides the unit of the file (None: unit of the file). `time_shift` [s] is added to
     the time stamps. `group` chooses among columns of one name (None: the name is unique).
     """
 

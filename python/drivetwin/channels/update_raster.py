@@ -4,9 +4,10 @@
 An example is a CAN torque in a 1 kHz table.
 
 Only the instants of update carry information: a value is fresh there and stale until the next.
-Rounding can make an update repeat the old value, so the updates are not the changes; they lie on a
-regular raster of which the changes show a part. A logger whose step does not divide the period, as
-2 ms for 5 ms, shows each update up to a step late; the raster tells when it came.
+An update may repeat the old value because of rounding, so not every update is a change of value.
+The updates lie on a regular raster, and the changes are a subset of its points. A logger whose
+step does not divide the period, e.g. 2 ms for 5 ms, records each update up to one step late; the
+time of the update is then taken from the raster.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ MAX_PERIOD = 0.25
 """Longest update period looked for [s]; CAN messages of interest come every 5 to 100 ms."""
 
 _JITTER = 0.2
-"""How far a change may lie from the raster, as part of the period ..."""
+"""Largest distance of a change from the raster, as a share of the period ..."""
 
 _JITTER_SAMPLES = 1.5
 """... and in samples of the logger, unless chance would not put so many so near."""
@@ -42,8 +43,8 @@ _LEAST_STEPS = 2.1
 from change to change."""
 
 _BETWEEN_JITTER = 0.1
-"""How far such an update may lie from the raster, as part of the period, beside what the logger's
-step hides."""
+"""Largest distance of such an update from the raster, as a share of the period, in addition to the
+uncertainty from the logger's step."""
 
 _UNEVEN = 0.02
 """Part of a step that a period may have over a number of whole ones and count as divided by it: the
@@ -244,7 +245,7 @@ def find_updates(
 
 
 _LEAST = 30
-"""Changes from which on their distances tell a period."""
+"""Least number of changes from which a period is estimated."""
 
 
 _EVEN = 0.02

@@ -54,7 +54,7 @@ _LOCK_UP_MARGIN = 1.3
 _LOCK_UP_HOLD = 0.3
 """Time that it is given to lock before main pressure, s."""
 _LOOK_AHEAD = 8.0
-"""How far the drive is run at first in search of the end of a leg, s."""
+"""Initial simulation span of the search for the end of a leg, s."""
 _LONGEST_SHIFT = 3.0
 """Longest time from the begin of a shift to synchronism, s."""
 _NO_SLIP = 1e-6
@@ -86,7 +86,7 @@ def _build_grid(first: int, last: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class _State:
-    """How far the drive is decided: up to `time` [s], with the lock-up clutch `locked_up`."""
+    """State of the drive up to `time` [s]; `locked_up` is the state of the lock-up clutch."""
 
     time: float
     gear: str

@@ -96,7 +96,7 @@ class ShiftPlan:
         return schedule.add_knots(new.element, self.filled, *self._plan_inertia_phase(0.0))
 
     def _compute_input_torque(self, pace: float) -> float:
-        """What both elements take from the input [N m] at `pace`, relative to the mean swing."""
+        """Torque of both elements on the input [N m]; `pace` is relative to the mean swing rate."""
         return self.torque - pace * self.inertia * self.swing / self.drive.inertia_phase
 
     def _plan_inertia_phase(self, after: float) -> Knots:

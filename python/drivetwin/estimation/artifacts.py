@@ -29,7 +29,7 @@ class StageResults:
     """
 
     signals: tuple[ShiftSignals, ...] = ()
-    """What the log showed of each shift; by every method."""
+    """Measured signals of each shift; for every method."""
     paper: tuple[PaperShift, ...] = ()
     """The paper's stages on each shift: beside the other methods for comparison, where it can be
     computed and the log has an output torque."""
@@ -37,17 +37,17 @@ class StageResults:
     """The integral method on each shift, from which the likelihood method starts; empty by the
     paper's method and without an output torque."""
     likelihood: LikelihoodFit | None = None
-    """The fit of all shifts together; None by another method, and where it did not converge."""
+    """Common fit of all shifts; None for another method, or if the fit did not converge."""
     gave_up: str = ""
-    """Why the likelihood method gave up, in words; empty where it did not or was not asked for."""
+    """Reason why the likelihood method failed; empty if it converged or was not requested."""
     loads: tuple[float, ...] = ()
     """Load of each shift at the output shaft [N m] where they differ, as on hills, T_v/i_f is then
     their mean; empty where the shifts of a log share one."""
     several: Several | None = None
     """The logs behind a fit of several, from `identify_joint`; None of one log."""
     suggestions: tuple[ExperimentRanking, ...] = ()
-    """Experiments that would tell what is left open, from `examined`; likelihood method only."""
+    """Recommended experiments by parameter, from `rank_experiments`; likelihood method only."""
     validation: tuple[Validation, ...] = ()
-    """Each shift simulated and compared, from `validated`; by every method."""
+    """Comparison of each shift with its simulation, from `attach_validation`; every method."""
     held_out: tuple[HeldOut, ...] = ()
     """Each shift that was predicted and not fitted, by log and time, from `identify_together`."""

@@ -47,13 +47,13 @@ ALL_BEFORE_LOSS = (
     "all of J′ but Jo′ turns before the loss of the gears: an input side of the gearbox J2e makes "
     "J′ wrong by up to J2e·(1/η² - 1) where the log both drives and overruns"
 )
-"""What the law `dissipative` could tell apart and the unknowns do not (THEORY section 3)."""
+"""Identifiability gap: `dissipative` separates J2e from J1, the unknowns do not (THEORY 3)."""
 NEAR = (
     f"of longer gears no more than {BEFORE:g} s before a shift and {AFTER:g} s after it count, as "
     "far as the converter is closed and all inputs are recorded"
 )
 GROWS = "grows with the square of the wheel speed and else "
-"""What the load does where the log shows it."""
+"""Clause added to the assumptions if an aerodynamic load term was estimated."""
 
 
 def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identification:

@@ -24,7 +24,7 @@ class Subject:
     model: DualClutch
     start: State
     note: str = ""
-    """Where the numbers come from, one line."""
+    """Origin of the numbers, one line."""
 
 
 def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:

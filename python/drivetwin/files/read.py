@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reading `result.json` and `twin.toml`: every fault is told by its key, none as a parser's own."""
+"""Reading of `result.json` and `twin.toml`; every error names the faulty key."""
 
 from __future__ import annotations
 

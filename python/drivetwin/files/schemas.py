@@ -43,8 +43,8 @@ is imported when it is asked for."""
 def build_json_schema(kind: FileKind | str) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a file, e.g. of `vehicle-card`.
 
-    It says which keys there are, their types and the limits of single values. What depends on
-    several keys is checked by the reader alone. Raises ValueError for a kind that does not exist.
+    The schema contains the keys, their types and the limits of single values. Constraints across
+    several keys are checked by the reader only. Raises ValueError for a kind that does not exist.
     """
     kind = FileKind(kind)
     module, name = _MODELS[kind]

@@ -167,7 +167,7 @@ def read_twin_file(path: Path | str) -> TwinFile:
 
 
 def _drop_null(value: Any) -> Any:
-    """Drop null table entries, which TOML does not know; null in an array becomes NaN."""
+    """Drop null table entries, as TOML has no null; null in an array becomes NaN."""
     if isinstance(value, dict):
         return {k: _drop_null(item) for k, item in value.items() if item is not None}
     if isinstance(value, list):

@@ -109,7 +109,7 @@ class DaskPool:
                 self._reconnect()
             return None
         task, _ = self._out.pop(number, (None, None))
-        if task is None:  # it was given up before, and is done again
+        if task is None:  # cancelled before, and submitted again
             return None
         if isinstance(done, Exception):
             return task, WorkerLost("the scheduler went away", blame=False)

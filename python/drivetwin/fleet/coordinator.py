@@ -29,8 +29,8 @@ from drivetwin.fleet.task import (
 )
 
 _COMMIT_EVERY = 1.0
-"""Time [s] after which what was learnt is made last. A run that is killed does not compute more
-than this again, and not even that: the parts tell their outcome."""
+"""Time [s] between commits of the index. A killed run repeats no more work than this; finished
+parts are not repeated, because they contain their outcome."""
 _TICK = 0.2
 _BACK_OFF = 0.5
 """First wait [s] after the loss of a worker; it doubles with every further loss of the log."""

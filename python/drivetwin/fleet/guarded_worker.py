@@ -142,7 +142,7 @@ class GuardedWorker:
     def _send(self, task: Task) -> None:
         assert self._process is not None
         assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # the answer's end tells
+        with contextlib.suppress(BrokenPipeError):  # detected by the end of the answer
             self._process.stdin.write(task.to_json().encode() + b"\n")
             self._process.stdin.flush()
 

@@ -57,8 +57,8 @@ ONE_FILE_EACH = (
     "NOT EXISTS (SELECT 1 FROM files AS other WHERE other.log = files.log AND (other.run > "
     "files.run OR (other.run = files.run AND other.path < files.path)))"
 )
-"""What holds of one file of each log: the first of those seen last. A file that was moved leaves
-its old path in the index; a log that stands at two places counts once.
+"""SQL condition that selects one file of each log: the first path of the last run. The index keeps
+the old path of a moved file, and a log stored at two places counts once.
 """
 
 RUN_COLUMNS = frozenset({"attempts", "seconds", "modified", "run"})

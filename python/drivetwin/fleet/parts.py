@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Parquet parts: one for each log at first, a few large ones in the end.
 
-A part is named after the key of its log and holds its outcome too, so that it says by itself what
-became of the log. Writing one twice gives the same bytes under the same name.
+A part is named after the key of its log and also contains the outcome of the log. Writing a part
+twice gives the same bytes under the same name.
 """
 
 from __future__ import annotations

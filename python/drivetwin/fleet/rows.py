@@ -36,8 +36,8 @@ class RowKind(StrEnum):
 class Row:
     """One number of a log, SI; `at` is a slip [rad/s].
 
-    `free_value`, `free_std` are what the log alone says where the value leans on a design value of
-    the card as well.
+    `free_value`, `free_std` are the estimate from the log alone if the value also depends on a
+    design value of the card.
     """
 
     kind: RowKind

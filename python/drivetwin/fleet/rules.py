@@ -20,7 +20,7 @@ from drivetwin.fleet.sources import Source
 
 UNIT = "unit"
 FILE_COLUMNS = ("path", "log", "rule", UNIT)
-"""What a question in SQL finds of a file, beside its fields."""
+"""Columns of a file in an SQL query, besides its fields."""
 
 
 def _check_group_count(pattern: str) -> str:
@@ -179,8 +179,9 @@ def read_rules(path: Path) -> RulesFile:
 
 
 def _resolve_paths(rule: RuleTable, number: int, file: Path) -> RuleTable:
-    """The rule with a name of its own, and with paths from the rules file's folder; a card that is
-    missing is told at once.
+    """Give a rule a name, and resolve its paths against the folder of the rules file.
+
+    Raises RulesError for a missing file.
     """
     changed = {"name": rule.name or f"rule {number}"}
     for key in ("vehicle", "channels"):

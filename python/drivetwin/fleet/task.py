@@ -14,7 +14,7 @@ from drivetwin.estimation.result.method import Method
 GO_ON = (
     "make room or give write permission, then run the same command again: what is done stays done"
 )
-"""What to do where a store cannot be written."""
+"""Remedy for the user if a store cannot be written."""
 
 
 class State(StrEnum):

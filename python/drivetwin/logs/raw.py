@@ -25,7 +25,7 @@ Window = tuple[float, float]
 class RawChannel:
     """One column as recorded: `time` (n,) [s], `values` (n,) in `unit`; None: file names no unit.
 
-    Values may hold NaN where the file says so; a sample that the file does not have is absent.
+    Values are NaN where the file contains NaN; a sample that the file does not have is absent.
     `notes` list the samples that the reader dropped, with the reason.
     """
 

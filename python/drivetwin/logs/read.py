@@ -48,10 +48,10 @@ def read_log(
     last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
     `card` no column is a pressure, and nothing is compared with the gearing.
 
-    What is damaged is left out and listed in `warnings`, also a pedal, gear or flag as a whole that
-    nobody asked for; nothing is replaced. Raises
-    FileFormatError, MissingExtraError, MissingChannelError, MappingError, UnitError, TimeError,
-    DamagedChannelError, PlausibilityError; each says what to do.
+    Damaged samples are left out and listed in `warnings`; so is a damaged pedal, gear or flag
+    channel that is not `needed`. Nothing is replaced. Raises FileFormatError, MissingExtraError,
+    MissingChannelError, MappingError, UnitError, TimeError, DamagedChannelError,
+    PlausibilityError; each contains a remedy.
     """
     path = Path(path)
     stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})

@@ -137,7 +137,7 @@ def _write_mat(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> No
             what = f"{twice[0]!r} would be a channel, and time or unit of another"
             raise FileFormatError(what, "rename the channel", Where(str(path)))
         content |= mine
-    # An open file is taken; the type stubs of SciPy do not say so.
+    # SciPy accepts an open file, but its type stubs do not declare it.
     savemat(file, content, long_field_names=True, do_compression=True)  # type: ignore[arg-type]
 
 

@@ -26,7 +26,7 @@ from drivetwin.validation.simulate_log import simulate_shift
 
 STEMS = ("eta", "J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
 RUNS = 100
-"""Runs of the ensemble: a band's width is then told to 7 %."""
+"""Runs of the ensemble; the width of a band is then accurate to 7 %."""
 SPEED = 0.1
 """Spread of the output speed at the start [rad/s]."""
 TWIST = 0.05
@@ -38,7 +38,9 @@ UNREST = 0.4
 def simulate_observed(
     twin: Twin, log: ShiftLog, shift: Shift, *, runs: int = RUNS, seed: int = 0
 ) -> Observation:
-    """Torques of one shift from engine torque and pressures alone; speeds tell the start.
+    """Estimate the torques of one shift by simulation from engine torque and pressures.
+
+    The measured speeds give the initial state only.
 
     Raises MissingParameterError, MissingChannelError, and SimulationError where the twin's own run
     does not complete.

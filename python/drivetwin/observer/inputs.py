@@ -121,9 +121,9 @@ def is_driving(model: DualClutch, seen: Recorded, delay: float) -> BoolArray:
 
 
 def build_course(model: DualClutch, seen: Recorded, delay: float, driving: BoolArray) -> Course:
-    """Inputs and locks over the grid; `delay` [s] is the age of the engine torque.
+    """Build the inputs and locks over the grid; `delay` [s] is the age of the engine torque.
 
-    `driving` (N-1,) is as `is_driving` tells it.
+    `driving` (N-1,) is the result of `is_driving`.
     """
     time, shift = seen.time, seen.shift
     middle = 0.5 * (time[1:] + time[:-1])

@@ -7,8 +7,8 @@ four phases of a shift the elements are locked, slipping or open, and
 
     M·v' = φ(T_e + e) - Gᵀ·T_slip·(1 + m) - shaft - load,   locked elements: no motion along slip
 
-is linear in x. What an element carries while it slips (`base`) is either its friction law at the
-measured pressure, or a level of which m then tells the rest.
+is linear in x. The torque of a slipping element (`base`) is either its friction law at the measured
+pressure, or a constant level; m is then the relative deviation from this level.
 """
 
 from __future__ import annotations

@@ -17,18 +17,18 @@ from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.spec import PriorValue
 
 FAR = 15.0
-"""Longest time [s] of the gears held before and after a shift: a second of the smoother takes some
-25 MB, and what happens so far away says nothing of the shift."""
+"""Longest time [s] of the gears held before and after a shift. One second of the smoother takes
+about 25 MB, and more distant samples contain no information on the shift."""
 
 
 def estimate_torques(
     twin: Twin, log: ShiftLog, shift: Shift, by: Observer = Observer.SMOOTHER
 ) -> Observation:
-    """Torques of one shift of a log with 95 % bands; an output torque in the log is not used.
+    """Estimate the torques of one shift with 95 % bands, without any output torque in the log.
 
-    Where the converter is open and the twin has its map, its turbine stands for the engine. The
-    gears before and after the shift count as far as its inputs were recorded, which the notes say,
-    and for FAR at most.
+    If the converter is open and the twin has its map, the turbine torque replaces the engine
+    torque. The gears before and after the shift are used as far as the inputs were recorded, and
+    for FAR at most; the notes contain any cut.
     Raises MissingParameterError where the twin is incomplete, MissingChannelError and InputError
     where the log is, DamagedChannelError where an input has a gap in the shift, SimulationError
     where the twin's own run fails.

@@ -86,7 +86,7 @@ def select_uncertain(
 def sample_friction(
     model: DualClutch, twin: Twin, rng: np.random.Generator
 ) -> tuple[ShiftElement, ...]:
-    """The elements of `model` with friction drawn from what the twin knows of it."""
+    """Sample the friction of the elements of `model` from the twin's uncertainty."""
     drawn = []
     for one in model.elements:
         curve = twin.friction.get(one.name)

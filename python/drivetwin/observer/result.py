@@ -43,8 +43,8 @@ class Observation:
     """The torques of one shift on `time` (n,) [s].
 
     `output_torque` is T_o of the shaft, `clutch_torque` goes by element and has the sign of its
-    slip where it slips (THEORY section 3). `notes` say what the observer did without, and where the
-    gears before and after the shift were cut.
+    slip where it slips (THEORY section 3). `notes` list missing inputs and cuts of the gears before
+    and after the shift.
     """
 
     shift: Shift

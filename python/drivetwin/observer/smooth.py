@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The smoother as an observer: all speeds of a shift, before and after, tell its torques.
+"""Smoother as an observer: torques of a shift from all speeds before, during and after it.
 
-The twin's parameters are unknown constants of the state, with the covariance of the twin; a first
-pass gives the motion about which they act linearly, the second tells all together. The load of the
-drive at hand is unknown and may drift with the road. How fast the friction may depart from its law
-is taken from the log, by likelihood.
+The twin's parameters are unknown constants of the state, with the covariance of the twin. A first
+pass gives the motion about which the model is linearised; the second estimates all states. The load
+of the drive is unknown and may drift with the road. The drift rate of the friction about its law is
+estimated from the log by maximum likelihood.
 """
 
 from __future__ import annotations
@@ -45,18 +45,18 @@ from drivetwin.twin.twin import Twin
 STEMS = ("eta", "J_prime", "J_out", "J_vehicle", "k_o", "c_o", "te_delay")
 """Parameters that count as unknown within the twin's covariance; the friction has its own state."""
 READ = 0.3
-"""What is left of the noise of a pressure after its smoothing: it acts as an error of P0."""
+"""Share of the pressure noise left after smoothing; it acts as an error of P0."""
 LOAD_WALK = 0.05
 """Drift of the load within a second, as a share of the greatest drive torque: grades change."""
 FRICTION_ERROR = 0.1
 """Relative standard deviation of an element's torque by its law at the start of its slip."""
 WALKS = (0.05, 0.2, 0.8)
-"""Drift [1/sqrt(s)] of the relative error of the friction law: what the log decides."""
+"""Candidates for the drift [1/sqrt(s)] of the friction law's relative error; chosen by the log."""
 FREE_WALKS = (0.3, 1.0, 3.0)
-"""The same where no pressure tells what an element carries."""
+"""Candidates for the drift [1/sqrt(s)] of an element's torque without a pressure signal."""
 LEVEL_ERROR = {True: 1.0, False: 0.05}
-"""Spread about zero of what an element carries at first, pressures unknown: an off-going element,
-which lets go under load, and an on-coming one."""
+"""Initial spread about zero of an element's torque without a pressure signal: for an off-going
+element (True), which breaks away under load, and for an on-coming one (False)."""
 TIGHT = 1e-3
 """Slip [rad/s] allowed where an element is locked."""
 RATE_SPAN = 0.01

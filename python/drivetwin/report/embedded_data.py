@@ -22,7 +22,7 @@ from drivetwin.estimation.result.estimate import FloatArray
 NOISE_PARTS = 16.0
 SPAN_PARTS = 65536.0
 EVEN = 0.01
-"""How far a time may be off an even grid, in shares of its step."""
+"""Largest deviation of a time from an even grid, as a share of its step."""
 
 
 @dataclass

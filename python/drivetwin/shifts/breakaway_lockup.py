@@ -68,7 +68,7 @@ def locate_break_away(
     found = _locate_hinge(slip, (anchor, window), Moving.AFTER, (first, stop))
     if found is None or seen is None or speeds.step < _BUS:
         return found
-    # On a bus the two speeds contradict each other a little before an element lets go for good.
+    # On a bus the two speeds are slightly inconsistent just before final break-away.
     doubt = 0.5 * max(seen.time - found.time, 0.0)
     return Boundary(found.time, float(np.hypot(found.sigma, doubt)))
 

@@ -168,7 +168,7 @@ def _compute_sigma(
         start=np.zeros_like(x),
     )
     sensitivity = np.where(x > 0.0, -side * slope, 0.0)
-    # What of the hinge's own effect no other coefficient can imitate.
+    # Part of the hinge's sensitivity orthogonal to all other coefficients.
     own = sensitivity - basis @ np.linalg.lstsq(basis, sensitivity, rcond=None)[0]
     length = float(np.linalg.norm(own))
     return 1.0 / length if length > 0.0 else float("inf")

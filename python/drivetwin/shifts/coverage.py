@@ -29,7 +29,7 @@ OLDEST, YOUNGEST = 0.08, 0.02
 """A stamp of the engine torque shows an instant so much earlier at most, or so much later [s]."""
 
 LEAST = 0.15
-"""Shortest time [s] of a held gear before and after the shift that anything is told from."""
+"""Shortest usable time [s] of an engaged gear before and after the shift."""
 
 BEFORE, AFTER = 8.0, 5.0
 """Longest time [s] of the gears held before and after the shift over which a load is taken as

@@ -67,9 +67,9 @@ def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
     Input samples inside a gap of the output speed are left out.
 
     Without an input speed the engine speed over i_in stands in (exact with lock-up engaged);
-    without an output speed the wheel speed times the final drive, which the twisting shaft
-    separates from the true one. Both are told in `warnings`. Raises MissingChannelError, and
-    TimeError where the two share no time.
+    without an output speed the wheel speed times the final drive, which differs by the twist rate
+    of the shaft. Both substitutions are listed in `warnings`. Raises MissingChannelError, and
+    TimeError if the two speeds share no time.
     """
     warnings: list[str] = []
     if "input_speed" in log:

@@ -25,12 +25,13 @@ Span = tuple[float, float]
 BoolArray = NDArray[np.bool_]
 
 TURBINE_TORQUE = "turbine torque"
-"""What the name of a torque starts with that is the turbine's, by the map."""
+"""Prefix of the source name of a turbine torque computed from the converter map."""
 
 CLOSED = 0.02
 """Relative slip between engine and input below which the lock-up clutch counts as closed."""
 _RIGID = 0.005
-"""The same where nothing else tells whether an open converter only runs through synchronism."""
+"""Bound like `CLOSED`, for logs without a signal that separates lock-up from a passing through
+synchronism of an open converter."""
 _HOLD = 0.3
 """Time [s] over which the slip must stay closed."""
 _LASTS = 1.0

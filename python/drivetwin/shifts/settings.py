@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Settings of shift detection, one place, validated when made."""
+"""Settings of shift detection, checked on construction."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class ShiftSettings:
     max_inertia_phase: float = 5.0
     """A longer time between two gears is driving in neutral or an open converter, no shift."""
     max_torque_phase: float = 1.0
-    """How far before break-away the onset of the on-coming element's torque is looked for."""
+    """Longest time before break-away searched for the onset of the on-coming element's torque."""
     unknown_torque_phase: float = 0.2
-    """Standard deviation of `torque_start` where no channel tells it."""
+    """Standard deviation of `torque_start` if no channel determines it."""
     hinge_window: float = 0.06
     """Span of moving slip that a boundary is fitted to; up to four times as long where it starts or
     ends gently, and longer where samples are sparse."""

@@ -20,7 +20,7 @@ _SHARE = 0.05
 _LIMIT = 4.0
 """Standard deviations of the noise beyond which a slip is no longer at rest."""
 _STEEP = 3.0
-"""By this factor above what counts as begun the pace of a slip is told."""
+"""Factor above the onset threshold at which the rate of a slip is evaluated."""
 _LASTING = 3
 """So many samples at rest in a row are a gear held."""
 _CALM = 2.0

@@ -18,7 +18,7 @@ _GLITCH = 0.05
 """A flag that changes for a shorter time [s] than this was sent wrongly, or by another sender."""
 
 _LATE = 0.3
-"""How late [s] a gear or flag may be told on the bus."""
+"""Largest delay [s] of a gear or flag on the bus."""
 
 
 def find_flag_spans(flag: Channel) -> tuple[Span, ...]:

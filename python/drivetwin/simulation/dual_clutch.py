@@ -196,7 +196,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How exactly a run is integrated.
+    """Accuracy settings of the integration.
 
     By default samples without events are passed by exact operators, slipping torques being cubics
     in time: an error of a few 1e-3 N·m on 1 ms samples. `exact` integrates to round-off instead, as

@@ -29,7 +29,7 @@ from drivetwin.simulation.serialize import as_json, as_names
 Element = Mapping[str, Any]
 OutputKind = Literal["speed", "angle", "twist", "shaft_torque", "slip", "friction_torque"]
 Output = tuple[OutputKind, str]
-"""What to record and of which node or element."""
+"""Recorded quantity, and the node or element that it belongs to."""
 
 
 def build_element(kind: str, name: str, **fields: object) -> Element:

@@ -79,7 +79,7 @@ def _scale_absolute(found: Identification) -> tuple[dict[str, FrictionCurve], Lo
 
 
 def list_borrowed_friction(found: Identification) -> list[str]:
-    """Say which elements run on their partner's curve because they never slipped under load."""
+    """List the elements with their partner's friction curve; they never slipped under load."""
     pairs = {
         (a, b)
         for shift in found.shifts

@@ -37,7 +37,7 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 COMMON = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Parameters that every model of a twin needs, besides a J′."""
 OF_ELEMENT = ("P0", "drum")
-"""Stems of the parameters of a shift element that stand for its design value where told."""
+"""Stems of the element parameters that replace the design value if identified."""
 SIMULATED = (*COMMON, "J_prime", *OF_ELEMENT, "te_delay")
 """Stems of the parameters that a simulation depends on; the others follow from them."""
 
@@ -54,7 +54,7 @@ class TwinGear:
 class TwinElement:
     """Design data of one shift element: ratios of eq. 15, gain [m^3], P0 [Pa], drum [kg m^2].
 
-    `P0` and `drum` are what the card says; parameters of the same name go before them.
+    `P0` and `drum` are the card's values; identified parameters of the same name replace them.
     """
 
     kind: ElementKind
@@ -75,11 +75,11 @@ class TwinElement:
 class Twin(DisplayMixin):
     """Identified model of one driveline; immutable, SI.
 
-    `parameters` by id (see parameters.py), also those that could not be told; `friction` by
+    `parameters` by id (see parameters.py), also the not identifiable ones; `friction` by
     element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
     pressure, torque and speed that the log covered; `inputs` file name -> SHA-256. The design
-    ranges [kg m^2] and `channels` by role are those of the vehicle card. `load_law` says how the
-    load torque grows with speed; None where it is constant. `converter` is the card's map of the
+    ranges [kg m^2] and `channels` by role are those of the vehicle card. `load_law` is the growth
+    of the load torque with speed; None where it is constant. `converter` is the card's map of the
     torque converter, None where it has none.
     """
 
@@ -118,11 +118,11 @@ class Twin(DisplayMixin):
         Only Je = J1·η + J2e is identifiable: J′ = Je + Jo′/i_g² gives it, and it is carried as
         J2e = 0, J1 = Je/η. `overrides` sets parameters by id, in place of identified ones: any of
         `list_model_ids`, of the two J′ one.
-        What is known over η only counts times the twin's own η, else times that of the overrides.
+        Values identified over η are multiplied by the twin's own η, else by that of the overrides.
         Without either (`divide_by_eta`) η is 1: the speeds are the same, all torques are then over
-        η. `load` [N m] is T_v/i_f on the road of this shift, known as the twin's own is.
+        η. `load` [N m] is T_v/i_f on the road of this shift, over η if the twin's own is.
         Raises MissingParameterError naming every parameter that neither source gives, and
-        InputError for a gear or element the twin does not know and for an override without effect.
+        InputError for a gear or element that the twin lacks and for an override without effect.
         """
         given = dict(overrides or {})
         self._refuse_idle(shift, given)
@@ -197,7 +197,7 @@ class Twin(DisplayMixin):
             ) from None
 
     def get_value(self, parameter_id: str, default: float) -> float:
-        """Identified value, or `default` where the log could not tell it."""
+        """Identified value, or `default` if the parameter is not identifiable."""
         estimate = self.parameters.get(parameter_id)
         return default if estimate is None or estimate.value is None else estimate.value
 
@@ -231,8 +231,10 @@ class Twin(DisplayMixin):
     def select_inertia_gear(
         self, shift: Shift, overrides: Mapping[str, float] | None = None
     ) -> str:
-        """Gear whose J′ carries the engine-side inertia in the model of a shift: overridden, else
-        stated without an interval, else told most narrowly for its size."""
+        """Select the gear whose J′ gives the engine-side inertia in the model of a shift.
+
+        Order of preference: overridden, exact design value, least relative standard deviation.
+        """
         given = overrides or {}
 
         def rank(gear: str) -> float:
@@ -270,7 +272,7 @@ class Twin(DisplayMixin):
     def _get_value(
         self, parameter_id: str, given: Mapping[str, float], scale: float
     ) -> float | None:
-        """Value of one parameter: given, told, or told over η and brought to `scale`."""
+        """Value of one parameter: given, identified, or identified over η and times `scale`."""
         value = given.get(parameter_id, self._is_known(parameter_id))
         ratio = self._is_known(parameter_id + OVER_ETA)
         if value is None and ratio is not None:

@@ -25,7 +25,7 @@ from drivetwin.validation.simulate_log import simulate_shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 BEFORE = "likelihood, from the gear held before the shift"
-"""Method of what is told of a log that was not fitted."""
+"""Method name of the estimates for a log that was not fitted."""
 
 
 def predict_held_shifts(
@@ -77,10 +77,11 @@ def _predict_misfit(
 def _select_log_estimates(
     found: Identification, log: ShiftLog, number: int, told: ShiftPrediction | None
 ) -> tuple[Identification, dict[str, Estimate]]:
-    """The identification with what the log has of its own: from the fit, else as `told`.
+    """Return the identification with the log-specific parameters: from the fit, else from `told`.
 
-    What was told is given again by itself, in the order of the estimates; empty for the fit's.
-    Raises IdentificationError for a log that the fit has not seen, by another method.
+    The second value contains the estimates from `told` alone, in the order of the estimates; it is
+    empty for a fitted log. Raises IdentificationError for a log that was not fitted if the method
+    is not the likelihood method.
     """
     several = found.evidence.several
     if number == 0:

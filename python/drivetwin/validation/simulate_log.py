@@ -47,8 +47,8 @@ def simulate_shift(
     The engine torque is moved by the twin's `te_delay`; the start state comes from the first
     measured moments, unless `start` gives it. `model` replaces the twin's own (e.g. the other loss
     law).
-    Raises MissingChannelError, MissingParameterError, DamagedChannelError where an input has a gap
-    in the shift or a compared channel knows nothing of it; a run that fails returns its status.
+    Raises MissingChannelError, MissingParameterError, and DamagedChannelError if an input has a gap
+    in the shift or a compared channel does not cover it; a run that fails returns its status.
     """
     model = model or twin.build_dual_clutch(shift)
     fills = {one.name: PriorValue(one.P0) for one in model.elements}
@@ -135,11 +135,10 @@ def attach_fit(found: Identification, validations: Sequence[Validation]) -> Iden
 
 
 def attach_validation(found: Identification, twin: Twin, log: ShiftLog) -> Identification:
-    """Identification with all its shifts simulated and compared.
+    """Simulate all shifts of an identification and attach the comparison with the log.
 
-    Where the log could not tell a parameter that the simulation needs, or holds nothing of a shift
-    to compare with, the fit stays empty and a warning says which: the parameters stand all the
-    same. Raises MissingChannelError.
+    If the simulation lacks a parameter, or a compared channel does not cover a shift, the fit stays
+    empty and a warning names the cause; the estimates are unchanged. Raises MissingChannelError.
     """
     try:
         return attach_fit(found, list(_simulate_shifts(twin, log, found)))
@@ -148,7 +147,7 @@ def attach_validation(found: Identification, twin: Twin, log: ShiftLog) -> Ident
 
 
 def _simulate_shifts(twin: Twin, log: ShiftLog, found: Identification) -> Iterator[Validation]:
-    """Simulate one shift after the other, telling how far it is; on hills with its own load."""
+    """Simulate the shifts in order with progress notices; on hills each with its own load."""
     loads = found.evidence.loads
     for count, shift in enumerate(found.shifts):
         notify_progress(count / len(found.shifts))
@@ -181,9 +180,9 @@ def clip_phases(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[fl
 
 
 def _select_window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
-    """Span of the shift's four phases that all channels cover, from a calm moment on.
+    """Select the span of the shift's four phases that all channels cover, from a calm moment on.
 
-    Raises DamagedChannelError for a channel that knows nothing of the shift itself.
+    Raises DamagedChannelError for a channel that does not cover the shift itself.
     """
     roles = ["engine_torque", *map(make_pressure_role, (shift.offgoing, shift.oncoming))]
     channels = [log[role] for role in (*roles, *(name for name in SIGNALS if name in log))]
@@ -281,7 +280,7 @@ def _clip_trace(
 
 
 def _collect_warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
-    """Say where the run failed or left the range of the log behind the twin."""
+    """Collect warnings for a failed run and for signals outside the range of the twin's log."""
     run = validation.trajectory
     texts = _describe_early_end(run)
     seen = {

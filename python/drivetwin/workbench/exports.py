@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from drivetwin.export.subject import Subject
 
 REPORT_LIMIT = 120.0
-"""Time [s] after which writing a report is given up."""
+"""Time limit [s] for writing a report."""
 
 
 class Record(StrEnum):

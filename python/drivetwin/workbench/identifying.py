@@ -21,7 +21,7 @@ from drivetwin.vehicle.card import VehicleCard
 from drivetwin.workbench.jobs import Emit, to_fault
 
 _WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
-"""How long the methods take, relative to each other."""
+"""Relative computing times of the methods."""
 
 
 @dataclass(frozen=True, eq=False)

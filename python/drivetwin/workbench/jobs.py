@@ -22,7 +22,7 @@ from drivetwin._util.progress import attach_listener
 from drivetwin.errors import DrivetwinError, InputError, Where
 
 Emit = Callable[[object], None]
-"""What a job calls with each result that it has."""
+"""Callback that a job calls with each result."""
 Work = Callable[..., None]
 """A function of a module: called as work(emit, *arguments) in the child."""
 

@@ -29,12 +29,12 @@ from drivetwin.workbench.jobs import Emit
 MEMORY = 2 * 2**30
 """Bytes that reading a file may take beyond what the libraries hold."""
 LONGEST = 60.0
-"""Time [s] after which reading a small file is given up."""
+"""Time limit [s] for reading a small file."""
 PER_BYTE = 2e-6
 """Time [s] that a log may take besides for each of its bytes: half an hour at 1 kHz, 160 MB of
 text, takes a minute on an idle machine and a multiple of it on a busy one."""
 AT_ALL = 600.0
-"""Time [s] after which reading is given up whatever the size."""
+"""Time limit [s] for reading a file of any size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
 
 
 def compute_time_limit(log: Path) -> float:
-    """Time [s] after which reading a log is given up, by the size of its file."""
+    """Compute the time limit [s] for reading a log from the size of its file."""
     size = log.stat().st_size if log.exists() else 0
     return min(LONGEST + PER_BYTE * size, AT_ALL)
 

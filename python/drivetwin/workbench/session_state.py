@@ -34,9 +34,9 @@ class SessionState:
     """The state of a session.
 
     `channels` are the corrections of the mapping, `moves` the boundaries set by hand [s] by number
-    of the shift, `changes` the sliders (SI) away from what was identified. `method` and `shift`
-    say which result and which shift the sliders show. `ended` says why the last identification
-    ended before its last method; empty where it did not.
+    of the shift, `changes` the sliders (SI) that differ from the identified values. `method` and
+    `shift` select the result and the shift of the sliders. `ended` is the reason why the last
+    identification ended before its last method; empty if it was completed.
     """
 
     log: Source | None = None

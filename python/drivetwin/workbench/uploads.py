@@ -2,7 +2,7 @@
 """Uploads from the browser: streamed to disk, limited in size, checked, never executed.
 
 An upload is bytes under a name of our own; the name that the browser gives is a label. Its
-content is parsed in a process of its own (see `reading.py`).
+content is parsed in a process of its own (see `sandboxed_parse.py`).
 """
 
 from __future__ import annotations

@@ -139,9 +139,9 @@ def plot_what_if(identified: Validation, present: Validation) -> go.Figure:
 
 
 def collect_changed_curves(figure: go.Figure, present: Validation) -> dict[int, dict[str, Any]]:
-    """New x and y of the traces of `figure_of` that follow the sliders, by their number.
+    """Collect new x and y of the traces of `plot_what_if` that follow the sliders, by trace index.
 
-    They are packed (`dtype`, `bdata` in base64): half of a move would else be spent on digits.
+    They are packed (`dtype`, `bdata` in base64), as formatting digits would take half of the time.
     """
     view = figure.layout.xaxis.range
     curves = [

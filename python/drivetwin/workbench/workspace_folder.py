@@ -71,7 +71,7 @@ class Folder:
         what = "this path leads outside the folder of the workbench"
         try:
             path = (self.root / name.strip()).resolve()
-            path.exists()  # asks the system, which knows what is no path at all
+            path.exists()  # raises an error for a string that is not a valid path
         except (OSError, ValueError, RuntimeError):
             path, what = Path("/"), "this is no path"
         if not name.strip():

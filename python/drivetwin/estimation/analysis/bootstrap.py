@@ -29,7 +29,7 @@ from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import Signal
 
 MIN_FITS = 10
-"""Fits from which a standard deviation is told."""
+"""Least number of fits for a standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)

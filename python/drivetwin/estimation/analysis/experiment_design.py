@@ -6,8 +6,8 @@ An experiment adds its own information to that of the log:
     F' = F + Jᵀ Σ⁻¹ J        covariance' = F'⁻¹
 
 J are the core's derivatives along the simulated experiment, Σ the covariance of its residuals
-with the input noise of the log's sensors (covariance.py). What the sensors' gains and offsets
-leave open no experiment narrows.
+with the input noise of the log's sensors (residual_covariance.py). No experiment reduces the
+uncertainty from the sensors' gains and offsets.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from drivetwin.parameters import get_parameter_spec
 
 AGE = "te_delay"
 REPEATS = (1, 2, 4)
-"""How often the best experiment is repeated at most, in steps."""
+"""Numbers of repetitions of the best experiment, tried in this order."""
 LEAST_KNOWN = 3
 """Number of identified parameters that are ranked beside the open ones."""
 NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"

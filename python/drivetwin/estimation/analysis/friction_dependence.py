@@ -3,15 +3,15 @@
 
     T_drag = d·s whatever the pressure        μ(s)·(1 + p·(P - P̄) + h·(θ - θ̄)) while slipping
 
-All are small, so that they act linearly about the minimum of the fit; with columns Z of what each
-does to the outputs and residuals r,
+All deviations are small and act linearly about the minimum of the fit. With the sensitivities Z of
+the outputs (one column each) and the residuals r,
 
     δ = S⁻¹ Zᵀ Σ⁻¹ r,   S = Zᵀ Σ⁻¹ Z - Zᵀ Σ⁻¹ J F⁻¹ Jᵀ Σ⁻¹ Z + prior
 
-which is the step of Gauss and Newton in all unknowns together. What is found is put back and the
-fit made again, until no more is found. Several shifts count together; within one, pressure and slip
-move together and tell little. Drag differs from contact friction by acting where the pressure is
-none.
+which is the Gauss-Newton step in all unknowns together. The fit is repeated with the deviations
+found, until no further one is found. The information of several shifts is summed; within one shift,
+pressure and slip are strongly correlated. Drag differs from contact friction by acting at zero
+pressure.
 """
 
 from __future__ import annotations
@@ -98,9 +98,8 @@ def estimate_departures(
 ) -> tuple[Departure, ...]:
     """Estimate the deviations of all elements of a likelihood identification.
 
-    `temperature` [K] is that of the oil over the log, which changes so slowly that it is also told
-    across a gap. Raises IdentificationError where the
-    identification is by another method.
+    `temperature` [K] is the oil temperature over the log; it varies slowly, so gaps are
+    interpolated. Raises IdentificationError for an identification by another method.
     """
     fit, signals = get_likelihood_fit(found)
     largest = max(float(np.max(np.abs(s.engine_torque.values))) for s in signals)

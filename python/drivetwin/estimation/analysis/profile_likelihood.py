@@ -40,7 +40,7 @@ class ProfileSettings:
     spacing: float = 0.5
     """Distance of neighbouring values, in standard deviations [-]."""
     max_reach: float = 10.0
-    """Distance at which a side that does not close is given up, in standard deviations [-]."""
+    """Distance at which the search on an open side stops, in standard deviations [-]."""
     rise: float = 3.841
     """Rise of Q at the ends of a 95 % interval: chi-squared of one degree of freedom [-]."""
     tolerance: float = 1e-3
@@ -101,7 +101,7 @@ def compute_profile(found: Identification, parameter: str) -> Profile:
 def get_likelihood_fit(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
     """Return the fit behind an identification and its signals.
 
-    Raises IdentificationError where it is by another method, or the likelihood method gave up.
+    Raises IdentificationError for another method, or if the likelihood method did not converge.
     """
     fit, gave_up = found.evidence.likelihood, found.evidence.gave_up
     if fit is None and gave_up:

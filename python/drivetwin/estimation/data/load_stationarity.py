@@ -47,11 +47,11 @@ def fit_constant_load(
     span: Span,
     vehicle: tuple[float, float] | None = None,
 ) -> ConstantLoadFit | None:
-    """Fit a load that is constant over `span` [s], but for what grows with the speed `wheel`.
+    """Fit a load over `span` [s] that is constant except for its growth with the speed `wheel`.
 
-    J3 and that growth too, unless the `vehicle` gives both: much more than noise is then left
-    where something else moves it, a brake or a change of grade. By itself a shift would take a
-    part of that for inertia. None where the span holds nothing to tell it from.
+    J3 and the growth are fitted too, unless `vehicle` gives both. With both given, a brake or a
+    change of grade leaves residuals well above the noise; a single shift with free J3 would assign
+    part of them to the inertia. Returns None if the data do not determine the load.
     """
     windows = build_recorded_windows(torque, wheel, (span,), WIDTH / 4.0)
     if windows.count <= UNKNOWNS:
@@ -74,10 +74,10 @@ def fit_constant_load(
 
 
 def estimate_common_vehicle(loads: Sequence[ConstantLoadFit]) -> tuple[float, float] | None:
-    """J3 [kg m^2] and growth of the load [N m s^2/rad^2] that most of the shifts agree on.
+    """Estimate J3 [kg m^2] and the growth of the load [N m s^2/rad^2] common to most shifts.
 
-    Medians weighted by information: a shift over which the load changes takes that for inertia or
-    for growth, be it never so steady else. None where they are too few to say which of them does.
+    Both are medians weighted by information, because a change of load during a shift biases J3 or
+    the growth of this shift. Returns None if there are too few shifts for a median.
     """
     told = [one for one in loads if min(one.J_vehicle[1], one.growth[1]) > 0.0]
     if len(told) < AGREEING:

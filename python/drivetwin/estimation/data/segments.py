@@ -40,9 +40,9 @@ class MomentumSettings:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A stretch of the log where one momentum equation holds.
+    """Part of the log in which one momentum equation holds.
 
-    `ratio` is i_g or i_h; `tied` says that the gear is locked, so ω_e = ratio·ω_out.
+    `ratio` is i_g or i_h; `tied` is true if the gear is locked, so ω_e = ratio·ω_out.
     """
 
     name: str
@@ -61,7 +61,7 @@ VENTED = 0.5
 
 
 LEAST_SPAN = 0.05
-"""A shorter stretch [s] holds no window that says anything."""
+"""Least duration [s] of a segment; shorter ones contain no informative window."""
 
 
 LEAST_BESIDE = 0.25

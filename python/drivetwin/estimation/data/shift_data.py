@@ -166,7 +166,7 @@ class ShiftSignals:
     log: int = 0
     """Number of the log, from 1, where several are fitted together; 0: there is one only."""
     torque_of_speeds: TorqueOfSpeeds | None = None
-    """Where the engine torque is that of a converter's turbine, computed from speeds."""
+    """Source of a turbine torque computed from speeds; None for a measured engine torque."""
 
     @property
     def output_gaps(self) -> tuple[Span, ...]:

@@ -100,8 +100,9 @@ class VehicleBalance:
         return np.asarray(mean * self.ratio**2)
 
     def solve_load(self, grown: FloatArray | None, start: FloatArray, prior: Prior) -> Fit:
-        """θ = (T_v/i_f, J3), and the growth of the load where `grown` (m,) says how far it grew.
+        """Estimate θ = (T_v/i_f, J3) and, with `grown` (m,), the growth of the load.
 
+        `grown` is the regressor of the growth, by window.
         Raises IdentificationError where torque and speed do not determine θ.
         """
         one = np.ones(self.windows.count)

@@ -23,7 +23,7 @@ REMEDY = (
     "check ratios, clutch gains and P0 on the card against the log; where it has an output torque, "
     "the integral method gives values without a model of the shift"
 )
-"""What to do where no search ends at a plausible minimum."""
+"""Remedy for the user if no search ends at a plausible minimum."""
 
 
 class BudgetExceeded(IdentificationError):

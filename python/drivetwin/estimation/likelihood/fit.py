@@ -19,7 +19,7 @@ from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVe
 class LikelihoodFit:
     """Minimum of Q at `point` with the estimate of the unknowns: `mean`, `covariance` (p, p).
 
-    `mean` is the minimum, or the average over minima that the log hardly distinguishes (kinds.py).
+    `mean` is the minimum, or the average over minima of similar likelihood (sampling_mode.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
     the expansion of Q there. The covariance is that of `compute_covariance`.
     """

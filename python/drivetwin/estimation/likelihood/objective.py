@@ -10,7 +10,8 @@ Driven by the inputs as measured, ŷ and its derivatives carry the same input no
 product has a mean: parameters that attenuate the noise (Jo′ before all) come out too large. So
 the run is driven by the expected inputs û, the measured ones less the noise that the residual
 shows, and what that takes off the residual, G·(u - û), is put back linearly. At the minimum this
-is the joint maximum over parameters and inputs (total least squares as in regression.py).
+is the joint maximum over parameters and inputs (total least squares as in
+errors_in_variables.py).
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from drivetwin.simulation.dual_clutch import (
 MAX_RESIDUAL_SIGMA = 1e9
 """Residual in standard deviations from which a run counts as failed."""
 SQUARE_RTOL = 1e-6
-"""What a sum of squares may be negative by, relative to the squares in it."""
+"""Tolerance for a negative sum of squares, relative to the squares in it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ OUTSIDE = 10.0
 BEHIND_GEARBOX = ("J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Unknowns whose initial value depends on the linear method's J3."""
 OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
-"""What a method reads off a load that it takes as constant."""
+"""Parameters that depend on whether the load is modelled as constant."""
 
 
 def estimate_without_linear(
@@ -103,8 +103,8 @@ def estimate_likelihood(
 def _list_disagreements(told: EstimateSet, linear: EstimateSet) -> list[str]:
     """Return a warning for each parameter on which both methods differ by more than their noise.
 
-    Where one of them alone has a load that grows with speed, which is told, the other must differ
-    on what it reads off a constant one.
+    `OF_A_CONSTANT_LOAD` is not compared if only one method has a load that grows with speed: the
+    difference is then expected, and the load is reported elsewhere.
     """
     alike = (told.load is None) == (linear.load is None)
     explained = frozenset() if alike else OF_A_CONSTANT_LOAD

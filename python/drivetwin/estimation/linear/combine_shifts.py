@@ -17,15 +17,16 @@ from drivetwin.estimation.linear.load_balance import is_common_load
 from drivetwin.estimation.linear.pipeline import NUISANCES, IntegralShift
 
 LOAD = "Tv_over_if"
-"""What is a shift's own on a hilly road; its number follows then, after `@`."""
+"""Id of the load; on a hilly road each shift has its own, with its number appended after `@`."""
 
 NUGGET = 1e-7
 """Variance, as a share of a parameter's own, by which parameters may leave the equation that makes
 one of the others: of J′ in two gears and Jo′ one follows, so their covariance is singular."""
 SHAFT = ("k_o", "c_o", "f_d_", "zeta_")
-"""How names begin of what is made of ring-down and inertias by equations that are not linear. Each
-shift has their slopes at its own values; those of two shifts contradict each other by second order,
-the square of a relative standard deviation, and by that a value may leave its equation."""
+"""Prefixes of parameters derived from ring-down and inertias by nonlinear equations. Each shift
+linearises them about its own values. The linearisations of two shifts differ to second order (the
+square of a relative standard deviation), so combined values may violate the equations by as much.
+"""
 AGREE = 1e-3
 """Probability of the shifts' scatter about a value below which its interval is widened to it."""
 

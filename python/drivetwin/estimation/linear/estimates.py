@@ -171,7 +171,7 @@ def _collect_card_values(
 def _collect_refusals(
     shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], known: dict[str, Estimate]
 ) -> dict[str, Estimate]:
-    """Estimates without a value for what no shift could tell."""
+    """Collect estimates without a value for parameters that no shift determines."""
     found = {}
     for shift, s in zip(shifts, signals, strict=True):
         gear = s.shift.end_gear

@@ -3,8 +3,8 @@
 
 Inertia phase, exact form of eq. 16:       T_c = (T_o + Jo′·ω_out')/i_out
 Torque phase, off-going element locked:    κ·T_c = η·T_e - T_o/i_g - J′·ω_e',  κ = a - b/i_g
-Both: T_c = sgn(s)·μ(|s|)·gain·(P - P0), slip s by eq. 15. The torque phase shows the torque at
-low pressure, which is what tells P0 from μ.
+Both: T_c = sgn(s)·μ(|s|)·gain·(P - P0), slip s by eq. 15. The torque phase contains the
+torque at low pressure, which separates P0 from μ.
 """
 
 from __future__ import annotations

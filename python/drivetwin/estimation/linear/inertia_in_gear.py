@@ -72,9 +72,10 @@ def estimate_gear_inertias(gears: Sequence[GearData]) -> tuple[HeldGear, ...]:
 def estimate_gear_inertia(
     gear: str, ratio: float, span: Span, torque: MeasuredSignal, speed: MeasuredSignal
 ) -> HeldGear:
-    """Balance of the gear of overall `ratio` held over `span`; `torque` is the engine's [N m].
+    """Estimate the inertia from the engaged gear of overall `ratio` over `span` [s].
 
-    `speed` is that of the output shaft [rad/s]. Its verdict says what the value is worth.
+    `torque` is the engine torque [N m], `speed` that of the output shaft [rad/s]. The result holds
+    the value and its verdict.
     """
     parts = split_at_gaps(span, (*torque.unrecorded, *speed.unrecorded))
     windows = join_windows([build_windows(part, WIDTH, WIDTH / STEPS) for part in parts])

@@ -96,10 +96,10 @@ def select_load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
 
 
 def find_growth_reference(signals: Sequence[ShiftSignals], i_f: float) -> float | None:
-    """Mean wheel speed of the log [rad/s] where the load of its shifts grows with speed, else None.
+    """Mean wheel speed of the log [rad/s] if the load of its shifts grows with speed, else None.
 
-    Each shift tells by itself, so that hills between them say nothing. Raises IdentificationError
-    where torque and speed of a shift do not determine its load.
+    The growth is estimated within each shift, so hills between shifts have no influence. Raises
+    IdentificationError if torque and speed of a shift do not determine its load.
     """
     speed = compute_mean_speed(signals, i_f)
     fits = [estimate_momentum_load(s, i_f, select_load_spans(s), speed).fit for s in signals]
@@ -128,8 +128,8 @@ def estimate_momentum_load(
 ) -> LoadFit:
     """Estimate (T_v/i_f, J3) from the balance of the vehicle over all windows.
 
-    Eq. 11 knows no gear, so `spans` may cover the whole log where the wheel speed is measured. With
-    `holds_at` [rad/s] the load may grow with speed, and T_v/i_f is that at this speed.
+    Eq. 11 is independent of the gear, so `spans` may cover the whole log if the wheel speed is
+    measured. With `holds_at` [rad/s] the load may grow with speed; T_v/i_f refers to this speed.
     Raises IdentificationError where torque and speed do not determine both.
     """
     wheel = signals.wheel_speed

@@ -101,9 +101,10 @@ def _compute_derived(
     ring: RingDown | None,
     gear: str,
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    """Shaft parameters, nuisances and AERO with all that they share: ids, values, covariance.
+    """Derive the shaft parameters, nuisances and AERO: ids, values and joint covariance.
 
-    Raises IdentificationError where the inertias beside the shaft are hardly told: none of it then.
+    Values and covariance also include the common parameters. Raises IdentificationError if the
+    inertias on both sides of the shaft are poorly determined.
     """
     size = len(momentum.names)
     unknown = [name for name, one in momentum.priors.items() if one.std > 0.0]
@@ -141,11 +142,12 @@ def identify_shift(
     start_inertia: float,
     load_at: float | None = None,
 ) -> IntegralShift:
-    """Run all stages on one shift. `start_inertia` [kg m^2]: any plausible J′. The load grows with
-    speed where T_v/i_f is to hold at one, `load_at` [rad/s].
+    """Run all stages on one shift.
 
-    Raises IdentificationError where inertia or load cannot be told; a missing oscillation or too
-    short an inertia phase only costs its own parameters.
+    `start_inertia` [kg m^2] is any plausible J′. With `load_at` [rad/s] the load may grow with
+    speed, and T_v/i_f refers to this speed. Raises IdentificationError if the data do not determine
+    inertia or load; without an oscillation, or with a too short inertia phase, only the parameters
+    of that stage are missing.
     """
     settings = MomentumSettings()
     shift = signals.shift

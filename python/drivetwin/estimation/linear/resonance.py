@@ -39,7 +39,7 @@ SURE = 4.0
 DAMPED = 0.3
 """Greatest damping ratio: beyond it nothing oscillates."""
 AGREEING = 2
-"""Fewest windows that must tell the same."""
+"""Least number of windows with consistent results."""
 
 
 @dataclass(frozen=True)

@@ -133,7 +133,7 @@ LONGEST = 1.6
 BAND = (2.0, 60.0)
 """Frequencies [Hz] in which a driveline's first torsional mode is looked for."""
 FASTEST = 0.8
-"""Highest frequency told, as a share of half the sampling rate."""
+"""Highest frequency estimated, as a share of the Nyquist frequency."""
 CHANCE = 1e-6
 """Probability with which noise alone may pass for an oscillation. So small, for one that just
 passes owes much of its size to noise, and what noise and ring make together decays too slowly."""

@@ -3,10 +3,10 @@
 
 One mechanism with the fit of one log: its problem takes the shifts of all logs. What belongs to
 the driveline is one unknown for all; load, age and rounding of the engine torque are unknowns of
-each log (unknowns.py), noise levels are found log by log. So a design prior counts once, and a
-sensor's gain or offset error, the same in all logs, is not averaged out: its shift of the common
-minimum is summed over all parts (tolerance.py). Each log is fitted alone first: that finds what is
-wrong with one of them, and the common fit starts from the mean of all weighted by information.
+each log (parametrization.py). Noise levels are estimated log by log. A design prior counts once. A
+sensor's gain or offset error is the same in all logs and is not averaged out: its shift of the
+common minimum is summed over all parts (sensor_tolerance.py). Each log is fitted alone first, to
+detect a faulty log; the common fit starts from the information-weighted mean of these fits.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from drivetwin.vehicle.spec import SensorTolerance
 ALONE = 0.6
 """Share of the time that the fits of single logs take."""
 NAMED = 3
-"""How many differences an error names at most."""
+"""Largest number of differences listed in an error."""
 
 
 def identify_joint(logs: Sequence[PreparedLog]) -> Identification:

@@ -70,9 +70,9 @@ def estimate_paper_friction(
 def fit_stribeck_law(slip: FloatArray, mu: FloatArray) -> Stribeck:
     """Stribeck law by least squares on μ-slip points (n,): linear in three, v_s on a grid.
 
-    v_s is not taken below the least slip seen, where nothing would show the law's rise. mu_c and
-    mu_s are no less than zero: a few points hardly tell the law's parts from each other, and would
-    leave one that no clutch has.
+    v_s is at least the smallest slip measured, because the data contain no rise of the law below
+    it. mu_c and mu_s are constrained to be nonnegative: with few points the terms are strongly
+    correlated, and an unconstrained fit may be unphysical.
     """
     best: tuple[float, FloatArray, float] | None = None
     for v_s in np.geomspace(max(2.0, float(slip.min())), 100.0, 40):

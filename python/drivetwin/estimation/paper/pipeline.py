@@ -24,7 +24,7 @@ from drivetwin.estimation.result.verdict import from_prior, get_experiment, refu
 from drivetwin.parameters import get_parameter_spec
 
 EXCITATION = 0.03
-"""Least relative variation of the engine torque in gear for eq. 10 to tell η from J′."""
+"""Least relative variation of the engine torque in gear for which eq. 10 separates η and J′."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,10 +139,10 @@ def assess_paper_shifts(
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[KnownDriveline],
 ) -> EstimateSet:
-    """Values of the first shift that tells them, with the doubts it raised.
+    """Take each value, with its doubts, from the first shift that determines it.
 
-    Without an interval no value counts as identified. Jo′ and P0 are the card's: the paper takes
-    them as known.
+    The paper's method gives no interval, so no value counts as identified. Jo′ and P0 are those of
+    the card, as the paper assumes them known.
     """
     estimates: dict[str, Estimate] = {}
     for shift in shifts:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Weighted least squares of the paper: weights from the plausible range of each sample's quotient.
 
-The paper does not say how it differentiates speeds. Here signals are averaged over windows of 10 ms
-and speeds differenced centrally between the neighbouring windows (THEORY section 4). The method is
-kept as the reference; section 5 and the modulating functions show how to do without a derivative.
+The paper does not specify how it differentiates speeds. Here signals are averaged over windows of
+10 ms, and speeds are differenced centrally between the neighbouring windows (THEORY section 4). The
+method is kept as the reference; section 5 and the modulating functions need no derivative.
 """
 
 from __future__ import annotations

@@ -289,7 +289,7 @@ def solve(
         assemble(theta), point, theta.size
     )
     chi2 = point.q / max(point.residual.size - theta.size, 1)
-    # More residual than the stated noise lowers what the data tell, not what the design tells.
+    # Residuals above the stated noise scale down the information of the data, not of the prior.
     covariance = _compute_information_inverse(
         _clip_curvature(information) / max(1.0, chi2) + prior.precision
     )

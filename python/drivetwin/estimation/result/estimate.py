@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 
 
 OF_RATIO = ", μ over η"
-"""What follows the method in words of a curve that is μ/η."""
+"""Suffix of the method name for a friction curve that is μ/η."""
 
 
 Z95 = 1.959963984540054
@@ -36,10 +36,10 @@ class Verdict(StrEnum):
 class Estimate:
     """One parameter's value and uncertainty, SI.
 
-    `std_noise` comes from the sensors' noise; `std_systematic` from the tolerances on the card, of
-    gain, offset and age, and from rows of the log that show values late. `value` is None exactly
-    when the verdict is `not identifiable`. `reason` says why a verdict is not `identified` and what
-    to record.
+    `std_noise` comes from the sensors' noise; `std_systematic` from the card's tolerances of gain,
+    offset and delay, and from delayed values in the log. `value` is None exactly when the verdict
+    is `not identifiable`. `reason` contains the cause of a verdict other than `identified`, and
+    the recording that would help.
     """
 
     id: str

@@ -64,9 +64,9 @@ def collect_shift_labels(signals: Sequence[ShiftSignals]) -> list[str]:
 
 
 def collect_low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
-    """By parameter id what a still engine torque in the lower gear costs it.
+    """Collect notes on parameters affected by a constant engine torque in the lower gear, by id.
 
-    A gear in which the torque moves before any of the shifts is told by that one.
+    A gear gets no note if the torque varies in it before at least one of the shifts.
     """
     notes: dict[str, str] = {}
     found = [(s, _describe_low_gear(s, s.shift.start_gear)) for s in signals]

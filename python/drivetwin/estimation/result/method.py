@@ -15,4 +15,4 @@ class Method(StrEnum):
 
 
 DEFAULT_METHOD = Method.LIKELIHOOD
-"""What answers where nobody asks for another."""
+"""Method used by default."""

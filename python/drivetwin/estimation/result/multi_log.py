@@ -37,7 +37,7 @@ class Several:
 
 
 SIGNIFICANT = 0.01
-"""Probability of χ² under agreeing logs below which they are said to disagree."""
+"""Probability of χ² under agreeing logs below which they count as inconsistent."""
 
 
 FAR = 3.0
@@ -58,7 +58,8 @@ class Consistency:
     """Homogeneity of the logs: χ² on `freedom` degrees, `p` its probability if they agree.
 
     `moves` has the largest move of every shared parameter, by id; `mu.<element>` stands for the
-    friction in the middle of the slip range seen. A log that does not tell one moves it by 0.
+    friction in the middle of the measured slip range. A log that does not determine a parameter
+    moves it by 0.
     """
 
     chi2: float

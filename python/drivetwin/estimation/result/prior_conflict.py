@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Design values and ranges of the card, held against what the log tells.
+"""Consistency check of the card's design values and ranges with the log.
 
-A design value is one measurement more. Where the log speaks against it the estimate lies between
-the two and may be neither: that is told, and what rests on it does not count as identified. A
-design range binds no estimate; one outside it is told.
+A design value is one additional measurement. If the log contradicts it, the estimate lies between
+the two and may match neither: a warning is issued, and the parameters that depend on it do not
+count as identified. A design range does not bound the estimate; a value outside gives a warning.
 """
 
 from __future__ import annotations
@@ -26,10 +26,11 @@ from drivetwin.vehicle.spec import PriorValue
 
 @dataclass(frozen=True)
 class Contradiction:
-    """A design value of parameter `id` that the log speaks against.
+    """Design value of parameter `id` that the log contradicts.
 
-    `log` is what it tells without it, `apart` the difference in standard deviations, `without` by
-    id what every parameter would be; empty where the log is too weak for that.
+    `log` is the estimate without this prior, `apart` the difference in standard deviations.
+    `without` contains the estimates of all parameters without this prior, by id; it is empty if
+    the log does not determine them.
     """
 
     id: str
@@ -126,10 +127,10 @@ def check_design_ranges(estimates: Mapping[str, Estimate], design: DesignData) -
 def check_efficiency_limit(
     estimates: Mapping[str, Estimate], law: LossLaw
 ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-    """The estimates, an η whose whole interval lies above 1 doubted, and what is said of it.
+    """Downgrade an η whose whole interval lies above 1; return the estimates and the warnings.
 
-    More power would leave the gears than enters, however well the simulation follows the log. In
-    overrun the law `paper` has such an η rightly: it is that of the power's other way.
+    With such an η more power would leave the gears than enters. In overrun the law `paper` has an
+    η above 1 by definition, because the power flow is reversed.
     """
     one = estimates.get("eta")
     if one is None or one.value is None or one.verdict is Verdict.DESIGN:

@@ -26,9 +26,10 @@ def add_priors(
     covariance: FloatArray,
     known: Mapping[str, PriorValue],
 ) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """Values (q,) and covariance (q, q) with the known ones brought in, and which of those that are
-    known exactly the log contradicts; of the others design.py tells.
+    """Update values (q,) and covariance (q, q) with the known values; return warnings too.
 
+    A warning is issued for each exactly known value that the log contradicts; prior_conflict.py
+    checks the others.
     Known values of parameters that are not among `ids` change nothing.
     """
     values, covariance = values.copy(), covariance.copy()

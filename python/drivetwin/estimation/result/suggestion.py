@@ -19,8 +19,8 @@ NONE_HELPS = "none of the known experiments narrows it by a tenth or more"
 class ExpectedPrecision:
     """Precision expected from an experiment: half width of the 95 % interval of a parameter, SI.
 
-    `shift` says by its gears on which shift of the log the experiment is built; empty where the log
-    has shifts between the same gears only.
+    `shift` names the gears of the shift on which the experiment is based; empty if all shifts of
+    the log are between the same gears.
     """
 
     experiment: Experiment

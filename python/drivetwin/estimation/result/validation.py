@@ -61,11 +61,11 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """One shift that was predicted.
+    """Prediction of one held-out shift.
 
-    `own` are the estimates of what its log has of its own, where the fit has not seen the log;
-    `bounds` go by compared signal, empty where no likelihood gave them. `validation` is None where
-    the shift could not be predicted; `notes` say why, and what stood in for what the fit lacks.
+    `own` are the estimates of the log-specific parameters if the log was not fitted. `bounds` are
+    by compared signal, empty without a likelihood fit. `validation` is None if the shift could not
+    be predicted; `notes` contain the reason and any substitutes for missing parameters.
     """
 
     source: str

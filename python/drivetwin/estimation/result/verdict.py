@@ -18,7 +18,7 @@ from drivetwin.vehicle.spec import PriorValue
 DELAY_IDENTIFIED = 0.005
 """Half width of the 95 % interval of a delay [s] below which it counts as identified."""
 PRIOR_SHARE = 0.8
-"""A posterior standard deviation above this share of the prior's says the prior decided."""
+"""Share of the prior's standard deviation above which a posterior's is dominated by the prior."""
 SENSORS = 0.8
 """Share of the total standard deviation from which the sensors' tolerances decide an interval."""
 CALIBRATE = (
@@ -146,15 +146,15 @@ def from_prior(
 
 
 def refuse_parameter(parameter_id: str, method: str, why: str) -> Estimate:
-    """A parameter that the log cannot tell, with the reason and the experiment that would."""
+    """Return a `not identifiable` estimate with the reason and a suitable experiment."""
     reason = f"{why}; {get_experiment(parameter_id)}"
     return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
 
 
 def reject_identified(one: Estimate, why: str) -> Estimate:
-    """The estimate with what speaks against it: however narrow, it is not identified.
+    """Downgrade an identified estimate to weak, with the reason `why`.
 
-    One that is refused, or the card's, stays as it is.
+    Estimates that are not identifiable or from the card are returned unchanged.
     """
     if one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
         return one

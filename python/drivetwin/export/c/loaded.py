@@ -33,7 +33,7 @@ COLUMNS = (
     *("engine_speed", "output_speed", "wheel_speed", "twist", "output_torque"),
     *("clutch_torque_1", "clutch_torque_2", "slip_1", "slip_2", "mode_1", "mode_2", "pieces"),
 )
-"""What a run returns, in order."""
+"""Columns of a run, in order."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,7 +47,7 @@ _NOT_IN_FMU = ("Makefile", "dt_observer.c", "dt_observer.h", "dt_run.c")
 
 @dataclass(frozen=True, eq=False)
 class BuildOptions:
-    """How an FMU is built; `platforms` empty: the one this program runs on, by its own compiler."""
+    """Build options of an FMU; empty `platforms`: the current one, by its own compiler."""
 
     version: FmiVersion = FmiVersion.FMI2
     platforms: tuple[Platform, ...] = ()

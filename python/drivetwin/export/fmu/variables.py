@@ -120,7 +120,7 @@ def _make_structured_name(name: str) -> str:
 
 
 _NOT_IN_QUOTES = r"[^A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ']"
-"""What a quoted name of FMI cannot hold, the apostrophe aside, which it escapes."""
+"""Characters not allowed in a quoted FMI name; the apostrophe is escaped instead."""
 
 
 def _build_parameter(

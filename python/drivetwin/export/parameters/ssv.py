@@ -117,7 +117,7 @@ def _collect_curves(
         for name, members in indexed.items()
     }
     within = {name: name.rpartition(".")[0] for name in arrays}
-    # What has an axis of its own is a curve, also where its name begins like another's.
+    # An array with its own axis is a curve, even if its name starts with another array's name.
     ends = within.keys() - within.values()
     axes = {prefix: name for name, prefix in within.items() if prefix in arrays and name in ends}
     curves = [

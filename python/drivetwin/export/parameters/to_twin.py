@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 METHOD = "parameter file"
 _DIVISORS = ("k_o", "i_in", "i_f", "i_c", "i_out")
-"""What the start of a run divides by before the core can refuse it, besides the gears' ratios."""
+"""Divisors in the initialisation of a run, besides the gear ratios; the core checks them later."""
 _KINDS = {Scalar: "number", Curve: "curve"}
 
 
@@ -153,7 +153,7 @@ def _set_number(twin: Twin, name: str, value: float) -> Twin:
 
 def _set_law_field(twin: Twin, element: str, field: str, value: float) -> Twin:
     curve = twin.friction[element]
-    assert curve.stribeck is not None  # Else the twin would not know the name.
+    assert curve.stribeck is not None  # Only a Stribeck law has parameters of this name.
     changes: dict[str, Any] = {field: value}
     law = replace(curve.stribeck, **changes)
     changed = replace(curve, stribeck=law, method=METHOD, stribeck_covariance=None)

@@ -76,8 +76,9 @@ def estimate_fleet(store: Store, wanted: Sequence[str] = ()) -> list[JointEstima
 def list_missing_estimates(
     store: Store, found: Sequence[JointEstimate], wanted: Sequence[str] = ()
 ) -> list[str]:
-    """Ids of the parameters of a store, or the `wanted` ones, that have no joint estimate: too few
-    logs tell them, or all have the card's design value.
+    """List the parameters of a store, or the `wanted` ones, without a joint estimate, by id.
+
+    A parameter has none if too few logs determine it, or if all have the card's design value.
     """
     names = store.read_rows(RowKind.PARAMETER).column("name").to_pylist()
     told = {one.parameter for one in found}

@@ -33,7 +33,7 @@ class LogFacts:
 class Observed:
     """One parameter of the vehicles that one rule reads: `value` (n,) and `std` (n,) by log.
 
-    The values exclude design priors. `run_score_tests` counts the logs without a value.
+    The values exclude design priors. `left_out` counts the logs without a value.
     """
 
     parameter: str

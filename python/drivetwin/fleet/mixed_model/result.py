@@ -26,9 +26,10 @@ class Drift:
 
 @dataclass(frozen=True)
 class UnitValue:
-    """A unit's deviation from the shared value, and its standard error; `since` the field's reading
-    at which the unit changed, None at first. `score` is the deviation in robust standard
-    deviations of all units; `odd` says that this is more than chance makes.
+    """Deviation of a unit from the shared value, and its standard error.
+
+    `since` is the field's reading at which the unit changed, None before any change. `score` is the
+    deviation in robust standard deviations of all units; `odd` is true if it is significant.
     """
 
     unit: str
@@ -83,9 +84,9 @@ class Points:
 class JointEstimate:
     """Joint estimate of one parameter over the units of one rule.
 
-    `value` is shared by all units, at the fields' references; `spread` (1 σ) how much units differ.
-    `excess` is the scatter of the logs over what they state. `run_score_tests` logs tell nothing of
-    it.
+    `value` is shared by all units, at the fields' references; `spread` (1 σ) is the scatter between
+    units. `excess` is the ratio of the scatter of the logs to their stated uncertainty. `left_out`
+    counts the logs without a value.
     """
 
     parameter: str

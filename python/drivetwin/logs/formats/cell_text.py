@@ -31,7 +31,7 @@ _NOT_A_NUMBER = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """A column as numbers: `values` (n,) where `present` (n,); NaN where the file says so.
+    """A column as numbers: `values` (n,) where `present` (n,); NaN where the file contains one.
 
     `fault` names the first cell that is neither number, empty, nor a word for "no number".
     """

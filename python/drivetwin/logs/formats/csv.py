@@ -46,7 +46,7 @@ _SEPARATORS = ("\t", ";", ",", "|", _BLANKS)
 """In the order tried."""
 
 _LOOKED_AT = 200
-"""Lines from which separator and width of the table are told."""
+"""Number of lines used to detect separator and width of the table."""
 
 _MOST_ROWS = 4
 """Rows of names, units, comments and types at most."""
@@ -80,7 +80,7 @@ class _Header:
     units: Sequence[str | None]
     times: Sequence[int]
     height: int
-    """How many rows it takes: names, perhaps units, comments, types."""
+    """Number of header rows: names, optionally units, comments, types."""
 
     @property
     def clocks(self) -> list[int]:

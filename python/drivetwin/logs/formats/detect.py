@@ -25,7 +25,7 @@ SUFFIXES = frozenset(
 """Endings by which a folder's logs are known; a file that is named by itself may have any."""
 
 _HEAD = 8192
-"""Bytes from which a format is told."""
+"""Number of bytes used to detect a format."""
 
 _BY_MAGIC: dict[bytes, Opener] = {
     b"MDF     ": open_mdf,
@@ -42,7 +42,7 @@ _REFUSED = {
     b"\x1f\x8b": "a gzip archive",
     b";$FILEVERSION": "a PCAN trace",
 }
-"""First bytes of formats that are told by name instead of `binary`."""
+"""First bytes of unsupported formats that an error names instead of `binary`."""
 
 
 def open_recording(

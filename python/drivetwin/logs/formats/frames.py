@@ -52,9 +52,9 @@ PAYLOAD, LONGEST = 8, 64
 class Frames:
     """Data frames in file order.
 
-    `time` (n,) [s]; `identifier` (n,) with 11 or 29 bits as `extended` (n,) says; `data` (n, width)
-    padded with 0xFF, as wide as the longest and at least 8; `length` (n,) of valid bytes; `bus`
-    (n,) an index into `buses`.
+    `time` (n,) [s]; `identifier` (n,) has 29 bits where `extended` (n,) is true, else 11; `data`
+    (n, width) is padded with 0xFF, as wide as the longest and at least 8; `length` (n,) is the
+    number of valid bytes; `bus` (n,) is an index into `buses`.
     """
 
     time: FloatArray

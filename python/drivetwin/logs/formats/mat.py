@@ -33,7 +33,7 @@ _PLAIN = (
 def open_mat(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Read a MATLAB file of version 4 to 7.3.
 
-    Time is in s, unless the file (`<name>_t_unit`, `time_unit`) or the mapping says otherwise.
+    Time is in s, unless the file (`<name>_t_unit`, `time_unit`) or the mapping gives another unit.
     Raises MissingExtraError (v7.3 without pymatreader), FileFormatError for a damaged file or one
     with closed objects only, MissingChannelError without any time vector, UnitError.
     """

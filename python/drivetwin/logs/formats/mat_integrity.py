@@ -45,7 +45,7 @@ def check_blocks(path: Path) -> None:
             _check_version4(file, size, path)
             return
         if len(head) < _HEADER or head[126:128] not in (b"IM", b"MI"):
-            return  # SciPy says what it is
+            return  # SciPy raises the error
         order = "<" if head[126:128] == b"IM" else ">"
         for number, (kind, length) in enumerate(_iterate_elements(file, order), start=1):
             start = file.tell()

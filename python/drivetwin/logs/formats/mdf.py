@@ -41,13 +41,13 @@ _MOST_INFLATION = 1100
 
 
 _LISTED = 8
-"""So many texts of a table are told."""
+"""Largest number of texts of a table that are listed."""
 
 _MASTERS = (2, 3)
 """Types of a channel of MDF 4 over which its group is recorded: stored, or counted."""
 
 _TIME, _NO_TIME = 1, (2, 3, 4)
-"""What such a channel holds: time; angle, distance or index."""
+"""Contents of a master channel: time; angle, distance or index."""
 
 _ALL_INVALID = 1
 """Flag of a channel of MDF 4 none of whose samples is valid."""

@@ -23,7 +23,7 @@ from drivetwin.logs.raw import RawChannel, Recording, Window
 _KIND = "a Parquet file"
 _UNIT_KEYS = ("unit", "units", "Unit")
 _PANDAS = "PANDAS_ATTRS"
-"""Where pandas keeps the attributes of a frame, `units` perhaps among them."""
+"""Metadata key of the attributes of a pandas frame, which may include `units`."""
 
 _NANOSECONDS = 1e-9
 

@@ -39,7 +39,7 @@ MAX_WRAPS = 3
 """So few steps back suggest a counter that wrapped, more suggest disorder."""
 
 SHORTEST_STEP, LONGEST_STEP = 2.5e-5, 0.9
-"""Sample intervals [s] between which a channel can show a shift; 50 Hz told in ms are below."""
+"""Plausible sample intervals [s]; stamps of 50 Hz in s that are read as ms (2e-5 s) are outside."""
 
 MAX_SPARSE = 100.0
 """Time from first to last sample in units of samples times interval; more is mostly gap."""
@@ -98,7 +98,7 @@ _TYPICAL: dict[Quantity, tuple[float, float]] = {
     Quantity.TORQUE: (50.0, 3e4),
     Quantity.FRACTION: (0.05, 1.0),
 }
-"""Where max|value| usually lies; a unit that leads there is proposed."""
+"""Typical range of max|value|; a unit that brings the values into it is proposed."""
 
 _MUST_VARY = frozenset(
     ("output_torque", "input_speed", "engine_speed", "output_speed", "wheel_speed")

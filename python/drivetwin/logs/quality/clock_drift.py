@@ -23,8 +23,8 @@ _DATES = (
 """Year first, or day.month.year."""
 
 _ONE_DAY = re.compile(r"[0-9]{1,2}/[0-9]{1,2}/[0-9]{2,4}|[0-9]{1,2}-[^\W\d_]{3,4}\.?-[0-9]{4}")
-"""Dates that count only where all rows have the same: with slashes day and month cannot be told
-apart, names of months are those of any country."""
+"""Dates that are accepted only if all rows have the same one: with slashes the order of day and
+month is ambiguous, and names of months depend on the language."""
 
 _ZONE = re.compile(r"(Z|[+-]\d{2}:?\d{2})$")
 

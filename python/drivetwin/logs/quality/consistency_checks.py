@@ -39,7 +39,7 @@ LEAST_LOAD = 0.2
 """Share of the largest engine torque above which the balance is looked at."""
 
 IN_GEAR, LEAST_SAMPLES = 0.01, 20
-"""A gear is held within this relative distance of its ratio; so few samples tell nothing."""
+"""Relative tolerance of the ratio of an engaged gear, and least number of samples in gear."""
 
 OPPOSED = -0.5
 """Normalised product of two torques below which one has the wrong sign."""

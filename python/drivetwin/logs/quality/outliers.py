@@ -97,8 +97,8 @@ _LOST = 2
 """Most messages in a row that are lost while the value before them is shown on, ..."""
 
 _MOVES = 4.0
-"""... told by a slope about it of so many times resolution and noise of a step, which repeat no
-number there, ..."""
+"""... detected by a slope about it of so many times resolution and noise of a step, so that numbers
+do not repeat by chance, ..."""
 
 _CATCHES_UP = 1.5
 """... and by a step after it of at most so many times what is missing by the one before it: a

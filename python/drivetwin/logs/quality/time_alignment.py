@@ -33,7 +33,7 @@ LONGEST = 100.0
 """Points of the raster for each sample at most: beyond that the log is nearly all gap."""
 
 SIGNIFICANT = 5.0
-"""Standard deviations from which a delay is told ..."""
+"""Standard deviations from which a delay is reported ..."""
 
 _LEAST_DELAY = 5e-3
 """... if it also exceeds this [s], and by so much half the coarser sample interval."""

@@ -26,7 +26,7 @@ from drivetwin.simulation.dual_clutch import FloatArray
 _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 _RATIO = Display("–")
 _BEFORE, _AFTER = 0.1, 0.6
-"""What a figure of one shift shows around it, s."""
+"""Time before and after a shift in its figure, s."""
 
 
 def plot_motion(run: DriveRun) -> go.Figure:

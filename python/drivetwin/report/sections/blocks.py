@@ -35,7 +35,7 @@ class Cell:
     secondary: bool = False
     """Left out on paper, where the page is narrow."""
     remark: str = ""
-    """What limits the row, under the note."""
+    """Limitation of the row, shown below the note."""
     href: str = ""
     """Page that the text leads to."""
 

@@ -34,7 +34,7 @@ _INSEPARABLE = (
 _CLOSE = 0.9
 """Correlation from which a pair is named."""
 _LEAST_KNOWN = 5
-"""How many parameters are listed with the experiment that would narrow them."""
+"""Number of least known parameters listed with a recommended experiment."""
 
 
 def build_limits_section(found: Identification) -> Section:

@@ -64,7 +64,7 @@ _TOPICS = {
     "gearbox": (Topic.GEARBOX,),
     "workspace": (Topic.LOG,),
 }
-"""What each view shows of a session."""
+"""Topics of a session that each view depends on."""
 _DUE = """(hidden, ...rest) => {
   const drawn = rest.pop();
   const present = rest.join(" ").trim();

@@ -70,9 +70,9 @@ def _select_steady(pressure: MeasuredSignal, smooth: FloatArray) -> FloatArray:
     """Compute the middle (n,) of the longest cubic about each sample that agrees with all shorter
     ones and with `smooth`, that over `SMOOTHING.window` (as `smooth_adaptive`).
 
-    Noise that flickers about P0 gives the fit many minima, and in each a torque that comes and goes
-    with the noise seems to tell P0 from μ: 5 kPa above P0 an estimate may be four standard
-    deviations off.
+    Pressure noise about P0 gives the fit many minima. In each of them the noise switches the torque
+    on and off, which is mistaken for information that separates P0 from μ. At 5 kPa above P0 an
+    estimate may be four standard deviations off.
     """
     values, steady = pressure.values, smooth
     margin = (

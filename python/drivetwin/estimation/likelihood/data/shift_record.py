@@ -116,7 +116,7 @@ class ShiftRecord:
 
     `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
     `engine_torque` are fresh values at their stamps, held at both ends; `pressures` by element.
-    Both are what drives a run, which is what was read less what is `held_back`.
+    Both are the inputs of the simulation: the values as read less `held_back`.
     """
 
     time: FloatArray
@@ -124,22 +124,22 @@ class ShiftRecord:
     pressures: Mapping[str, Signal]
     outputs: tuple[Output, ...]
     steady_torque: Signal
-    """Engine torque without its noise: what its rate of change is taken from."""
+    """Engine torque without its noise; its rate of change is computed from it."""
     bend: FloatArray
-    """What to add to the samples of the engine torque where it is a curve between them."""
+    """Correction of the engine-torque samples for the curvature between samples [N m]."""
     input_sigma: Mapping[str, float]
     """White noise of an input sample by name; the engine torque is `engine torque`, of one that is
     computed from speeds the part that is not from the compared one, in the mean."""
     held_back: Mapping[str, FloatArray] = field(default_factory=dict)
-    """What was taken off the samples of an input before it drives a run, by name: read less
-    driving. An input without an entry drives as it was read."""
+    """Difference between an input as read and as simulated, by name; an input without an entry is
+    used as read."""
     fills: Mapping[str, PriorValue] = field(default_factory=dict)
     """P0 [Pa] of the elements as the card has it: about it more noise is taken off a pressure."""
     curved: bool = False
     of_speeds: TorqueOfSpeeds | None = None
-    """Where the engine torque is computed from speeds: the noise of the compared one is in both."""
+    """Source of an engine torque computed from speeds; it shares noise with the compared speed."""
     rounding: Mapping[str, Quantization] = field(default_factory=dict)
-    """What rounding leaves of the samples of an input, by name; no entry where noise dithers it."""
+    """Quantisation of an input's samples, by name; no entry where noise exceeds the step."""
 
     @property
     def size(self) -> int:

@@ -18,7 +18,7 @@ from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.parameters import get_parameter_spec
 
 MAX_RELATIVE_STD = 0.2
-"""Relative standard deviation along a direction from which it counts as not told."""
+"""Relative standard deviation from which a direction counts as not identifiable."""
 BOUND_STD = 1e-3
 """Distance from a bound, in standard deviations, within which an unknown stands on it."""
 SHARE = 0.3

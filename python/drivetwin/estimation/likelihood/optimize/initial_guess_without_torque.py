@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Initial values from speeds and engine torque alone; torque-like values are divided by η.
 
-They tell ratios only (THEORY section 6). With η = 1 in the model, its parameters are those ratios;
-these are their start values:
+Without an output torque only ratios over η are identifiable (THEORY section 6). With η = 1 the
+model's parameters are these ratios. Their initial values follow from:
 
     T_e = (Je/η)·ω_e' + (J5/η)·ω_e'/i_g² + (T_v/i_f/η)/i_g     in gear, both gears together
     T_c/η = (T_e - (Je/η)·ω_e')/a                               in the inertia phase

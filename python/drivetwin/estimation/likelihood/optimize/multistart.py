@@ -38,13 +38,13 @@ class MultiStartSettings:
     raise it to hundreds if the outputs are much quieter than the inputs; so `doubtful_input_chi2`
     must be exceeded too [-]."""
     doubtful_input_chi2: float = 10.0
-    """The same bound for Q with input noise [-]."""
+    """Bound like `doubtful_chi2`, for Q with input noise [-]."""
     min_starts: int = 2
     """Number of starts after which the search ends if none of them is promising [-]."""
     plausible_chi2: float = 2.0
     """Q per sample above which a minimum is rejected as a wrong one [-]."""
     far_chi2: float = 4.0
-    """Q per sample above which a search with input noise is given up [-]."""
+    """Q per sample above which a search with input noise is stopped [-]."""
     min_input_decrease: float = 10.0
     """Decrease of Q by the expected inputs at a minimum from which another minimum is sought: as a
     rule they change Q by less than 5, and no unknown by half a standard deviation [-]."""
@@ -150,7 +150,7 @@ def _iterate_attempts(
 def _iterate_other_attempts(
     problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
 ) -> Iterator[LikelihoodFit | None]:
-    """Yield fits by stages, without the start that `_attempts` began with."""
+    """Yield fits by stages, without the start that `_iterate_attempts` began with."""
     restarts = (
         MULTI_START.shaft_factors[:1] if _is_near(problem, start) else MULTI_START.shaft_factors[1:]
     )
@@ -226,9 +226,10 @@ def _fit_inputs(
 ) -> OptimizeResult[LikelihoodObjective] | None:
     """Find the joint minimum over unknowns and inputs, from the one with the measured inputs.
 
-    Where an element slips at a pressure that is steady but for its noise, that noise seems to tell
-    μ from P0: the inputs expected at one minimum then lead to another, and so on. None where the
-    first search does not end. `iterations` counts those of all searches.
+    For an element that slips at a constant noisy pressure, the noise is mistaken for information
+    that separates μ from P0. The inputs expected at one minimum then lead to another minimum, so
+    the search is repeated. Returns None if the first search does not converge. `iterations` is the
+    sum over all searches.
     """
     joint: OptimizeResult[LikelihoodObjective] | None = None
     expected = found.problem.update_inputs(found.point)

@@ -23,7 +23,7 @@ POINTS = 60
 def build_friction_curves(
     fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], systematic: FloatArray
 ) -> dict[str, FrictionCurve]:
-    """Compute the curve of every element whose law is free (carriers.py).
+    """Compute the curve of every element whose friction law is free.
 
     `linear` are the curves of the linear method: their points and slip range are shown. Its
     place is taken by the slips of the simulation where there is none. `systematic` (p, p) is the
