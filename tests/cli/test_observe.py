@@ -67,13 +67,13 @@ def test_a_shift_with_a_gap_is_left_out_and_told(
     shifts = [bench.shift] * 2
     answers: list[DamagedChannelError | Observation] = [refusal, whole]
 
-    def told(*_: object) -> Observation:
+    def estimate(*_: object) -> Observation:
         answer = answers.pop(0)
         if isinstance(answer, DamagedChannelError):
             raise answer
         return answer
 
-    monkeypatch.setattr("drivetwin.observer.observe.estimate_torques", told)
+    monkeypatch.setattr("drivetwin.observer.observe.estimate_torques", estimate)
     monkeypatch.setattr(
         "drivetwin.shifts.detect.require_shifts", lambda *_: FoundShifts(tuple(shifts), ())
     )

@@ -45,7 +45,7 @@ MARGIN = 0.25
 BYTES = "bytes"
 """The damage that is done to the file itself."""
 AGE = "te_delay"
-"""How late the engine torque is told: what a late one changes is the parameter itself."""
+"""Delay of the engine torque; a delay changes this parameter itself."""
 
 
 def table_of(name: ScenarioName) -> tuple[Table, str]:
@@ -121,7 +121,7 @@ def parted(found: Identification, sound: Identification) -> set[str]:
     return {*moved(found, sound), *moved(sound, found)}
 
 
-def told(found: Identification, sound: Identification) -> bool:
+def reports_damage(found: Identification, sound: Identification) -> bool:
     """Whether a result says more than that of the undamaged log, or refuses more."""
 
     def said(one: Identification) -> int:
@@ -160,7 +160,7 @@ def damaged(method: Method, folder: Path) -> Callable[[int], str]:
             found = identified(_damaged(one.table, kind, seed, folder), one.card, method)
         except DrivetwinError as refusal:
             return f"{kind}: {type(refusal).__name__}"
-        if told(found, one.found):
+        if reports_damage(found, one.found):
             return f"{kind}: told"
         off = [name for name in moved(found, one.found, 2.0) if (kind, name) != ("late", AGE)]
         return f"{kind}: silent" if off else f"{kind}: holds"

@@ -43,7 +43,7 @@ def protect(server: Flask, host: str, script_hashes: list[str]) -> None:
         return response
 
     @server.errorhandler(HTTPException)
-    def told(error: HTTPException) -> Response:
+    def render_refusal(error: HTTPException) -> Response:
         too_large = f"a request may have {MAX_REQUEST / 2**20:.0f} MB"
         return make_refusal(error.code or 500, too_large if error.code == 413 else error.name)
 

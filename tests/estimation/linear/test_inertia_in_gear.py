@@ -15,7 +15,9 @@ from tests.support.coverage import assert_covers, vary_draws
 TRUE, LOAD, RATIO, ETA = 64.0, 90.0, 1.406, 0.9
 
 
-def told(seed: int, length: float = 20.0, swing: float = 250.0, grade: float = 15.0) -> HeldGear:
+def estimate_gear(
+    seed: int, length: float = 20.0, swing: float = 250.0, grade: float = 15.0
+) -> HeldGear:
     """Engine torque that wanders, a road whose grade wanders, an oscillation at 4.4 Hz, 20 ms."""
     rng = np.random.default_rng(seed)
     fine = np.arange(0.0, length, 1e-3)
@@ -41,7 +43,7 @@ def told(seed: int, length: float = 20.0, swing: float = 250.0, grade: float = 1
 
 @vary_draws()
 def test_the_interval_covers_the_truth(draws: int) -> None:
-    found = [told(seed) for seed in range(draws)]
+    found = [estimate_gear(seed) for seed in range(draws)]
     assert all(one.verdict is not Verdict.NOT_IDENTIFIABLE for one in found)
     inside = sum(
         abs(one.value - TRUE / ETA) <= one.half
@@ -53,7 +55,7 @@ def test_the_interval_covers_the_truth(draws: int) -> None:
 
 
 def test_a_short_gear_and_a_steady_pedal_are_refused() -> None:
-    for one in (told(1, length=4.0), told(2, swing=1.0, grade=40.0)):
+    for one in (estimate_gear(1, length=4.0), estimate_gear(2, swing=1.0, grade=40.0)):
         assert one.verdict is Verdict.NOT_IDENTIFIABLE
         assert one.value is None
         assert "ten seconds" in one.reason

@@ -30,7 +30,7 @@ def attach_reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEs
     fits = collect_output_fits(store)
     warnings = _collect_warnings(store, also)
 
-    def told(one: JointEstimate, outlier: Outlier) -> Outlier:
+    def add_reason(one: JointEstimate, outlier: Outlier) -> Outlier:
         others = [name for name in also[outlier.log] if name != one.parameter]
         parts = [
             f"{abs(outlier.score):.1f} standard deviations {_describe_side(outlier)} what unit "
@@ -44,7 +44,7 @@ def attach_reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEs
         return replace(outlier, reason="; ".join(parts))
 
     return [
-        replace(one, outliers=tuple(told(one, outlier) for outlier in one.outliers))
+        replace(one, outliers=tuple(add_reason(one, outlier) for outlier in one.outliers))
         for one in found
     ]
 
