@@ -11,7 +11,7 @@ import pytest
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.method import Method
-from tests.fuzz.identified import Base, base, identified, parted, told, written
+from tests.fuzz.identified import Base, base, identified, parted, reports_damage, written
 from tests.fuzz.tables import DAMAGING, HARMLESS
 
 
@@ -28,7 +28,7 @@ def test_harmless_changes_leave_the_result(kind: str, sound: Base, tmp_path: Pat
 
 
 TELLING = ("missing_anywhere", "stuck", "dropout", "spiked", "wrapped", "exchanged", "bad_clock")
-"""Damage that must be refused or told whatever channel it hits; others nothing may show."""
+"""Damage that must be refused or reports_damage whatever channel it hits; others nothing may show."""
 
 
 @pytest.mark.parametrize("kind", DAMAGING)
@@ -38,7 +38,7 @@ def test_damage_ends_as_a_result_or_a_typed_error(kind: str, sound: Base, tmp_pa
         found = identified(written(table, tmp_path), sound.card, Method.INTEGRAL)
     except DrivetwinError:
         return
-    assert kind not in TELLING or told(found, sound.found)
+    assert kind not in TELLING or reports_damage(found, sound.found)
 
 
 @pytest.mark.parametrize(
