@@ -28,7 +28,7 @@ def test_harmless_changes_leave_the_result(kind: str, sound: Base, tmp_path: Pat
 
 
 TELLING = ("missing_anywhere", "stuck", "dropout", "spiked", "wrapped", "exchanged", "bad_clock")
-"""Damage that must be refused or reports_damage whatever channel it hits; others nothing may show."""
+"""Damage that must be refused or reported in any channel; other damage may stay unnoticed."""
 
 
 @pytest.mark.parametrize("kind", DAMAGING)
