@@ -10,6 +10,7 @@ from drivetwin._util.toml import raise_faults, read_toml
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.errors import CardError
 from drivetwin.vehicle.check import check_card
+from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.schema import CardFile, SensorsTable
 from drivetwin.vehicle.spec import (
     ElementSpec,
@@ -60,6 +61,7 @@ def load_card(path: Path | str) -> VehicleCard:
         channels={role: table.to_spec() for role, table in file.channels.iterate_roles()},
         source=str(path),
         known={} if file.eta is None else {"eta": file.eta.to_prior()},
+        effects={EffectId(name): table.to_prior() for name, table in file.effects.items()},
         converter=None if file.converter is None else file.converter.to_spec(),
         sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
     )

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from drivetwin._util.toml import Fault, suggest_spelling, validate_schema
+from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.schema import CardFile, ElementTable, GearTable
 
 Table = TypeVar("Table", bound=BaseModel)
@@ -27,6 +28,7 @@ def check_card(document: Mapping[str, Any]) -> list[Fault]:
         *validate_schema(document, CardFile),
         *_check_gears(_parse_gears(document)),
         *_check_references(document),
+        *_check_effects(document),
         *_check_ratios(_parse_gears(document), _parse_elements(document)),
     ]
 
@@ -57,6 +59,15 @@ def _parse_elements(document: Mapping[str, Any]) -> dict[str, ElementTable]:
         for name, table in _get_tables(document, "elements").items()
     }
     return {name: table for name, table in tables.items() if table is not None}
+
+
+def _check_effects(document: Mapping[str, Any]) -> list[Fault]:
+    known = [one.value for one in EffectId if one is not EffectId.SENSOR_TOLERANCE]
+    return [
+        Fault(f"effects.{name}", f"there is no such effect; the effects are {', '.join(known)}")
+        for name in _get_tables(document, "effects")
+        if name not in known
+    ]
 
 
 def _check_gears(gears: Mapping[int, GearTable]) -> list[Fault]:

@@ -12,6 +12,7 @@ from drivetwin.channels.mapping_file import ByRole, ChannelTable
 from drivetwin.channels.units import BAR, RPM
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.converter import ConverterTable
+from drivetwin.vehicle.effects import EffectPrior
 from drivetwin.vehicle.spec import ElementSpec, PriorValue, SensorTolerance
 
 
@@ -185,6 +186,30 @@ class SensorsTable(StrictModel):
     pressure: dict[str, PressureSensor] = Field(default_factory=dict)
 
 
+class EffectTable(StrictModel):
+    """Prior of an effect: its standard deviation, and its value where it is known."""
+
+    value: float = 0.0
+    std: float = Field(ge=0)
+
+    def to_prior(self) -> EffectPrior:
+        """Return the prior in the unit of the effect."""
+        return EffectPrior(self.std, self.value)
+
+
+def _parse_effect(entry: object) -> object:
+    """Read a bare number as a standard deviation about zero, and `false` as no effect."""
+    if entry is False:
+        return {"std": 0.0}
+    is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
+    return {"std": entry} if is_number else entry
+
+
+EffectEntry = Annotated[
+    EffectTable, BeforeValidator(_parse_effect, json_schema_input_type=EffectTable | float | bool)
+]
+
+
 class CardFile(StrictModel):
     """A vehicle card."""
 
@@ -198,4 +223,5 @@ class CardFile(StrictModel):
     inertia: InertiaTable
     converter: ConverterTable | None = None
     sensors: SensorsTable = SensorsTable()
+    effects: dict[str, EffectEntry] = Field(default_factory=dict)
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()

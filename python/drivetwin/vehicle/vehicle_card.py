@@ -11,6 +11,7 @@ from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.errors import CardError, Where
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import (
     ElementSpec,
     Gear,
@@ -28,7 +29,8 @@ class VehicleCard:
     range of J' at the engine, `J_vehicle_range` [kg m^2] that of J3 at the wheel; `J_out` [kg m^2]
     is the inertia of the output side before the shaft (Jo' without drums), None if unknown.
     `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
-    parameters.py). `converter` is the map of the torque converter, None where the card has none.
+    parameters.py), `effects` what is known of departures from the model. `converter` is the map of
+    the torque converter, None where the card has none.
     `source` is the file that it was read from and `sha256` that of its content; both empty where
     it is from none, the latter also where it was changed since.
     """
@@ -47,6 +49,7 @@ class VehicleCard:
     source: str = ""
     known: Mapping[str, PriorValue] = field(default_factory=dict)
     converter: Converter | None = None
+    effects: Mapping[EffectId, EffectPrior] = field(default_factory=dict)
     sha256: str = ""
 
     @property

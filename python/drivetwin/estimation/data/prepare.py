@@ -88,6 +88,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> Prepare
         J_out=card.J_out,
         sensors=_collect_tolerances(log, first, card),
         known=card.known if first is log else {**card.known, "te_delay": NO_AGE},
+        effects=card.effects,
     )
     return PreparedLog(
         shifts=tuple(_prepare_shift(log, card, one, sampler) for one in fitted),

@@ -14,6 +14,7 @@ from drivetwin.channels.shiftlog import find_pauses
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
 PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
@@ -194,7 +195,8 @@ class DesignData:
 
     `J_prime_range` [kg m^2] is the design range of J' at the engine, `J_vehicle_range` [kg m^2]
     that of J3 at the wheel. `sensors` are the tolerances by role, those of the speed sensor that
-    ω_e is from under `engine_speed`; `known` are the priors by parameter id.
+    ω_e is from under `engine_speed`; `known` are the priors by parameter id, `effects` those of
+    effects that the model leaves out.
     """
 
     loss_law: LossLaw
@@ -204,6 +206,7 @@ class DesignData:
     J_out: PriorValue | None = None
     sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
     known: Mapping[str, PriorValue] = field(default_factory=dict)
+    effects: Mapping[EffectId, EffectPrior] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

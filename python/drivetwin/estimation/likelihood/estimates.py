@@ -14,12 +14,15 @@ from drivetwin.estimation.likelihood.diagnostics.identifiability import (
     describe_null_directions,
     find_at_bounds,
 )
-from drivetwin.estimation.likelihood.diagnostics.misspecification import run_score_tests
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     describe_contradiction,
     describe_unweighted,
     run_residual_tests,
 )
+from drivetwin.estimation.likelihood.effects.causes import describe_cause, find_cause
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
+from drivetwin.estimation.likelihood.effects.withdrawal import find_unreliable
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.selection.loss_law import describe_other_law
 from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
@@ -30,7 +33,6 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     make_log_id,
 )
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, build_friction_curves
-from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensor_shifts
 from drivetwin.estimation.linear.load_balance import AERO, describe_different_loads
 from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
@@ -49,7 +51,7 @@ from drivetwin.estimation.result.verdict import (
     reject_identified,
 )
 from drivetwin.parameters import OVER_ETA
-from drivetwin.vehicle.spec import PriorValue, SensorTolerance
+from drivetwin.vehicle.spec import PriorValue
 
 NO_SCALE = (
     "without an output torque sensor all torques share one unknown scale; what is told is the "
@@ -68,28 +70,28 @@ def build_estimates(
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[KnownDriveline],
     linear: Mapping[str, FrictionCurve],
-    tolerances: Mapping[str, SensorTolerance],
+    priors: EffectPriors,
 ) -> EstimateSet:
-    """Judge every parameter. `linear` are the friction curves of the linear method, by element."""
-    shifts = compute_sensor_shifts(fit, tolerances)
-    systematic = sum(
-        (np.outer(shift, shift) for shift in shifts.values()), np.zeros_like(fit.covariance)
-    )
-    values = compute_parameters(fit.problem, fit.mean, signals)
-    matrix = compute_jacobian(fit.problem, fit.mean, np.sqrt(np.diag(fit.covariance)), signals)
-    covariance = matrix @ fit.covariance @ matrix.T
-    spread = (
-        dict(zip(values, _compute_systematic_std(matrix, systematic), strict=True))
-        if shifts
-        else {}
-    )
+    """Judge every parameter.
+
+    `linear` are the friction curves of the linear method by element, `priors` the card's
+    statements on effects and sensors. Values and intervals allow for all effects that the model
+    leaves out; where these are too large for that, no value is identified.
+    """
+    correction = correct_fit(fit, priors)
+    told = keep_fit(fit) if correction is None else correction
+    values = compute_parameters(fit.problem, told.mean, signals)
+    matrix = compute_jacobian(fit.problem, told.mean, np.sqrt(np.diag(fit.covariance)), signals)
+    covariance = matrix @ told.covariance @ matrix.T
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    noise = np.minimum(_compute_std(matrix, told.noise), std)
     fitted = FittedParameters(
         ids=tuple(values),
         values=np.array([*values.values()]),
         covariance=covariance,
-        std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
+        std=noise,
         driveline=drivelines[0],
-        systematic=spread,
+        systematic=dict(zip(values, np.sqrt(std**2 - noise**2).tolist(), strict=True)),
         notes=collect_low_gear_notes(signals),
         method=METHOD,
         prior_method=WITH_PRIOR,
@@ -101,32 +103,31 @@ def build_estimates(
         if estimates[name].verdict is not Verdict.DESIGN
     }
     estimates |= {name: reject_identified(estimates[name], text) for name, text in limits.items()}
-    curves = build_friction_curves(fit, linear, systematic)
-    effects = tuple(run_score_tests(fit))
-    for effect in effects:
-        estimates = effect.held_against(estimates, ids, matrix)
-        curves = {name: effect.widened(fit, name, curve) for name, curve in curves.items()}
+    for name, why in zip(ids, find_unreliable(told, matrix, std), strict=True):
+        if why:
+            estimates[name] = reject_identified(estimates[name], why)
     for why in (
-        describe_contradiction(fit),
+        describe_contradiction(fit, told.residuals),
         describe_unweighted(fit, collect_shift_labels(signals)),
     ):
         if why:
             estimates = {name: reject_identified(one, why) for name, one in estimates.items()}
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
+    cause = find_cause(told, priors)
     return EstimateSet(
         estimates,
-        curves,
+        build_friction_curves(fit, linear, told),
         ids,
         compute_correlation(covariance),
         (
             *dict.fromkeys(fitted.notes.values()),
             *(one.text for one in fitted.conflicts),
             *(f"{name}: {text}" for name, text in limits.items()),
-            *_collect_warnings(fit, signals),
-            *(one.text for one in effects),
-            *describe_other_law(fit, values, matrix, np.sqrt(np.diag(covariance))),
+            *(() if cause is None else (describe_cause(cause, estimates, told, matrix),)),
+            *_collect_warnings(fit, told, signals),
+            *describe_other_law(fit, values, matrix, std),
         ),
-        _build_load_law(fit, systematic),
+        _build_load_law(fit, told),
         collect_loads(fit),
     )
 
@@ -152,14 +153,14 @@ def _estimate_fixed(
     return found
 
 
-def _build_load_law(fit: LikelihoodFit, systematic: FloatArray) -> LoadLaw | None:
+def _build_load_law(fit: LikelihoodFit, told: Correction) -> LoadLaw | None:
     """Build the load law with its growth with speed; None if the fit has a constant load."""
     if AERO not in fit.point.names:
         return None
     k, part = fit.point.names.index(AERO), fit.problem.parts[0]
-    std = float(np.sqrt(fit.covariance[k, k] + systematic[k, k]))
+    std = float(np.sqrt(told.covariance[k, k]))
     mean_speed = part.structure.mean_speed
-    return LoadLaw(fit.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
+    return LoadLaw(told.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
 
 
 def _estimate_without_scale(
@@ -187,15 +188,20 @@ def _estimate_without_scale(
     return one if ratio.verdict is Verdict.IDENTIFIED else reject_identified(one, "")
 
 
-def _compute_systematic_std(matrix: FloatArray, systematic: FloatArray) -> list[float]:
-    variance = np.einsum("qp,pr,qr->q", matrix, systematic, matrix)
-    return [float(np.sqrt(max(v, 0.0))) for v in variance]
+def _compute_std(matrix: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Compute the standard deviations (q,) of parameters from the covariance of the unknowns."""
+    variance = np.einsum("qp,pr,qr->q", matrix, covariance, matrix)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def _collect_warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
+def _collect_warnings(
+    fit: LikelihoodFit, told: Correction, signals: Sequence[ShiftSignals]
+) -> tuple[str, ...]:
     texts = []
     labels = collect_shift_labels(signals)
-    for s, label, tests in zip(signals, labels, run_residual_tests(fit).values(), strict=True):
+    for s, label, tests in zip(
+        signals, labels, run_residual_tests(fit, told.residuals).values(), strict=True
+    ):
         texts += list(s.shift.warnings)
         texts += [f"{label}: {text}" for test in tests for text in test.warnings]
     if why := describe_unweighted(fit, labels):

@@ -16,7 +16,7 @@ errors_in_variables.py).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,8 +80,8 @@ class ShiftTerm:
         try:
             found = simulate(
                 self.structure.build_model(point),
-                self._get_torque(point),
-                self._get_pressures(),
+                self.get_acting_torque(point),
+                self.get_pressures(),
                 self.structure.build_start(point),
                 self.record.time,
             )
@@ -106,8 +106,8 @@ class ShiftTerm:
         try:
             found: Sensitivities = simulate_sensitivities(
                 model,
-                self._get_torque(point),
-                self._get_pressures(),
+                self.get_acting_torque(point),
+                self.get_pressures(),
                 self.structure.build_start(point),
                 self.record.time,
                 names,
@@ -209,13 +209,29 @@ class ShiftTerm:
         returned = self.observe(point, response.propagate_inputs(held_back))
         return replace(self, weighting=weighting, returned=returned)
 
-    def _get_pressures(self) -> dict[str, Signal]:
+    def add_to_inputs(self, point: ParameterVector, changes: Mapping[str, Signal]) -> ShiftTerm:
+        """Return the part driven by inputs with `changes` by name, at the instants at which they
+        act at `point`."""
+        record, age = self.record, self.structure.get_value(point, "te_delay")
+        torque, pressures = record.engine_torque, dict(record.pressures)
+        for name, change in changes.items():
+            old = torque if name == TORQUE else pressures[name]
+            acts = old.time - age if name == TORQUE else old.time
+            values = old.values + np.interp(acts, change.time, change.values)
+            new = replace(old, values=values)
+            if name == TORQUE:
+                torque = new
+            else:
+                pressures[name] = new
+        return replace(self, record=replace(record, engine_torque=torque, pressures=pressures))
+
+    def get_pressures(self) -> dict[str, Signal]:
         """Return the pressures of all elements of the model; zero for those that stay open."""
         ends = self.record.time[[0, -1]]
         idle = {one.name: Signal(ends, np.zeros(2)) for one in self.structure.spinning}
         return {**self.record.pressures, **idle}
 
-    def _get_torque(self, point: ParameterVector) -> Signal:
+    def get_acting_torque(self, point: ParameterVector) -> Signal:
         """Return the engine torque as it acts: measured, less its mean error, advanced by its
         delay."""
         signal = self.record.engine_torque
@@ -305,7 +321,7 @@ class LikelihoodObjective:
             self.prior.compute_gradient(point.values),
         )
         data = np.zeros((size, size))
-        residuals, regressors = [], []
+        residuals, regressors, every = [], [], []
         for part in self.parts:
             found = part.linearise(point)
             if found is None:
@@ -325,12 +341,13 @@ class LikelihoodObjective:
             cost += square
             residuals.append(residual)
             regressors.append(regressor)
+            every.append(slopes)
         data = 0.5 * (data + data.T)
         if not (np.all(np.isfinite(data)) and _is_semidefinite(data)):
             return None
         information = data + self.prior.precision
         return NormalEquations(
-            cost, gradient, information, data, tuple(residuals), tuple(regressors)
+            cost, gradient, information, data, tuple(residuals), tuple(regressors), tuple(every)
         )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
@@ -44,7 +45,9 @@ def estimate_without_linear(
     """
     guess = _compute_own_guess(signals, drivelines, design)
     best, notes = select_model(signals, drivelines, design.loss_law, guess)
-    told = build_estimates(best, signals, drivelines, {}, design.sensors)
+    told = build_estimates(
+        best, signals, drivelines, {}, EffectPriors(design.effects, design.sensors)
+    )
     return replace(told, warnings=(*told.warnings, *notes)), best
 
 
@@ -95,7 +98,9 @@ def estimate_likelihood(
     found, shifts = linear
     guess = _compute_guess(signals, drivelines, shifts, design)
     best, notes = select_model(signals, drivelines, design.loss_law, guess)
-    told = build_estimates(best, signals, drivelines, found.friction, design.sensors)
+    told = build_estimates(
+        best, signals, drivelines, found.friction, EffectPriors(design.effects, design.sensors)
+    )
     warnings = (*told.warnings, *notes, *_list_disagreements(told, found))
     return replace(told, warnings=warnings), best
 

@@ -28,6 +28,7 @@ from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START
@@ -79,7 +80,8 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
                 f"alone they tell {'; '.join(find_largest_differences(alone)) or fault.what}",
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
-    told = build_estimates(fit, signals, drivelines, pool_curves(alone), merge_tolerances(logs))
+    priors = EffectPriors(design.effects, merge_tolerances(logs))
+    told = build_estimates(fit, signals, drivelines, pool_curves(alone), priors)
     tested = check_consistency(fit, signals, told.friction)
     shares = tuple(
         _build_log_share(k, log, one, fit)

@@ -29,7 +29,8 @@ class NormalEquations:
     """Q and its Gauss-Newton expansion at one point: half gradient (p,), information (p, p).
 
     `data` (p, p) is the information of the measurements alone. Per group of residuals: `residuals`
-    (n,) and the weighted derivatives `regressors` (n, p), Σ⁻¹ times those of the model outputs.
+    (n,), the derivatives of the model outputs `slopes` (n, p), and `regressors` (n, p), Σ⁻¹ times
+    these.
     """
 
     cost: float
@@ -38,6 +39,7 @@ class NormalEquations:
     data: FloatArray
     residuals: tuple[FloatArray, ...]
     regressors: tuple[FloatArray, ...]
+    slopes: tuple[FloatArray, ...] = ()
 
 
 class Objective(Protocol):

@@ -28,7 +28,9 @@ IndexArray = NDArray[np.intp]
 
 TORQUE = ENGINE_TORQUE
 """Name of the engine torque among the inputs; the others are pressures by element."""
-OUTPUTS = ("output_torque", "engine_speed", "output_speed", "wheel_speed")
+OUTPUT_TORQUE = "output_torque"
+"""Name of the shaft torque among the compared signals."""
+OUTPUTS = (OUTPUT_TORQUE, "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""
 ESSENTIAL = ("engine_speed", "output_speed")
 """Outputs without which no shift can be fitted."""

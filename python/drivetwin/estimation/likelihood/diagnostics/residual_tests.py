@@ -60,25 +60,29 @@ class ResidualTest:
 
 
 def compute_white_residuals(
-    fit: LikelihoodFit,
+    fit: LikelihoodFit, residuals: Sequence[FloatArray] | None = None
 ) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
     """Return times (n,) and normalised residuals (n,), input noise removed, by shift and output.
 
     Of a right model they are white with variance one, or less where input noise explains a part.
+    `residuals` (n,) of each shift replace those of the fit.
     """
     return {
         part.structure.label: {
             out.name: (part.record.time[out.place], white)
             for out, _, white in split_whitened(part, residual)
         }
-        for part, residual in zip(fit.problem.parts, fit.normal.residuals, strict=True)
+        for part, residual in zip(fit.problem.parts, residuals or fit.normal.residuals, strict=True)
     }
 
 
-def run_residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]]:
-    """Test every output by label of the shift."""
+def run_residual_tests(
+    fit: LikelihoodFit, residuals: Sequence[FloatArray] | None = None
+) -> dict[str, tuple[ResidualTest, ...]]:
+    """Test every output by label of the shift; `residuals` as in `compute_white_residuals`."""
     found = {}
-    for part, outputs in zip(fit.problem.parts, compute_white_residuals(fit).values(), strict=True):
+    whitened = compute_white_residuals(fit, residuals).values()
+    for part, outputs in zip(fit.problem.parts, whitened, strict=True):
         inputs = {TORQUE: part.record.engine_torque} | {
             f"pressure of {name}": signal for name, signal in part.record.pressures.items()
         }
@@ -88,7 +92,7 @@ def run_residual_tests(fit: LikelihoodFit) -> dict[str, tuple[ResidualTest, ...]
     return found
 
 
-def describe_contradiction(fit: LikelihoodFit) -> str:
+def describe_contradiction(fit: LikelihoodFit, residuals: Sequence[FloatArray]) -> str:
     """Return why the residuals contradict every value of the fit; empty if they do not.
 
     Noise is correlated with no input, unless it is as slow as the log is long. A correlated
@@ -97,7 +101,7 @@ def describe_contradiction(fit: LikelihoodFit) -> str:
     """
     found = {
         (test.output, source): abs(size)
-        for tests in run_residual_tests(fit).values()
+        for tests in run_residual_tests(fit, residuals).values()
         for test in tests
         for source, size in test.correlation.items()
     }

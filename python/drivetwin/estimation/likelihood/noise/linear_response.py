@@ -120,16 +120,28 @@ class LinearResponse:
         return bool(np.all(np.isfinite(self.transition)))
 
 
-def linearise_run(model: DualClutch, run: Trajectory, record: ShiftRecord) -> LinearResponse:
-    """Linearise around `run`, simulated on the record's grid."""
+@dataclass(frozen=True, eq=False)
+class LinearRates:
+    """Continuous-time linearisation over the N-1 steps of a run.
+
+    `rate` (N-1, 4, 4) is A, `inverse` (N-1, 4, 4) the accelerations per force on the speeds,
+    `force` (N-1, 4) by input name the force of that input's disturbance.
+    """
+
+    rate: FloatArray
+    inverse: FloatArray
+    force: dict[str, FloatArray]
+
+
+def compute_rates(model: DualClutch, run: Trajectory, record: ShiftRecord) -> LinearRates:
+    """Linearise the driveline of `model` around `run` over each of its steps."""
     time = run.time
-    step = np.diff(time)
     middle = 0.5 * (time[1:] + time[:-1])
     locked = {one.name: _find_locked(run, one.name, middle) for one in model.elements}
     driving = _find_driving(model, run)
-    free = np.zeros((step.size, STATES, STATES))
+    free = np.zeros((middle.size, STATES, STATES))
     free += _build_shaft_matrix(model)
-    torque = np.zeros((step.size, STATES))
+    torque = np.zeros((middle.size, STATES))
     for way, inside in _iterate_directions(driving):
         torque[inside, 0] = model.get_efficiency(driving=way)
     force = {TORQUE: torque}
@@ -147,12 +159,19 @@ def linearise_run(model: DualClutch, run: Trajectory, record: ShiftRecord) -> Li
     inverse = _build_acceleration(model, locked, driving)
     rate = inverse @ free
     rate[:, 3] = (0.0, 1.0, -model.i_f, 0.0)
+    return LinearRates(rate, inverse, force)
+
+
+def linearise_run(model: DualClutch, run: Trajectory, record: ShiftRecord) -> LinearResponse:
+    """Linearise around `run`, simulated on the record's grid."""
+    step = np.diff(run.time)
+    rates = compute_rates(model, run, record)
     with np.errstate(over="ignore", invalid="ignore"):
-        transition, mean = compute_exponential(rate * step[:, None, None])
-    effect = mean @ inverse * step[:, None, None]
-    for k, jump in _iterate_jumps(model, run, driving):
+        transition, mean = compute_exponential(rates.rate * step[:, None, None])
+    effect = mean @ rates.inverse * step[:, None, None]
+    for k, jump in iterate_jumps(model, run):
         transition[k], effect[k] = jump @ transition[k], jump @ effect[k]
-    drive = {name: np.einsum("kij,kj->ki", effect, f) for name, f in force.items()}
+    drive = {name: np.einsum("kij,kj->ki", effect, f) for name, f in rates.force.items()}
     return LinearResponse(step, transition, drive, effect)
 
 
@@ -264,10 +283,10 @@ def _build_acceleration(
     return result
 
 
-def _iterate_jumps(
-    model: DualClutch, run: Trajectory, driving: BoolArray
-) -> Iterator[tuple[int, FloatArray]]:
-    """(step, saltation (4, 4)) of every lock: z moves by the change of acceleration times δt."""
+def iterate_jumps(model: DualClutch, run: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """Yield (step, saltation (4, 4)) of every lock: z moves by the change of acceleration times
+    δt."""
+    driving = _find_driving(model, run)
     for event in run.events:
         if event.kind != "lock":
             continue

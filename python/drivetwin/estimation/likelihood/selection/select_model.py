@@ -93,7 +93,6 @@ def select_model(
         point, covariance = level or (best.point, best.covariance)
         guess = growing if aero_load.is_significant(point, covariance) else constant
         narrower = build_problem(signals, drivelines, loss_law, guess, hilly=level is None)
-        wider = best
         best, problem = _restrict(best, point, narrower, shifts) or (best, problem)
     notes = aero_load.describe(best)
     with (
@@ -108,8 +107,6 @@ def select_model(
         best, doubts = average_modes(problem, best)
     with limit_evaluations(SELECTION.max_sampling_mode_work):
         best, either = widen_over_modes(problem, best)
-    if AERO not in best.point.names:
-        best = aero_load.average_with_boundary_model(best, wider)
     return best, (*notes, *describe_modes(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
 

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: MIT
+"""Columns of all effects at a point of the unknowns, scaled to a prior of unit variance."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.effects.effect import Disturbance, Group
+from drivetwin.estimation.likelihood.effects.operating_point import (
+    OperatingPoint,
+    evaluate_operating_point,
+)
+from drivetwin.estimation.likelihood.effects.sensor_tolerance import build_sensor_columns
+from drivetwin.estimation.likelihood.effects.table import EFFECTS
+from drivetwin.estimation.likelihood.noise.linear_response import STATES, build_output_row
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.vehicle.effects import EffectId, EffectPrior
+from drivetwin.vehicle.spec import SensorTolerance
+
+
+@dataclass(frozen=True, eq=False)
+class EffectPriors:
+    """Statements of the card on effects and sensors; what is not stated has the default prior."""
+
+    effects: Mapping[EffectId, EffectPrior] = field(default_factory=dict)
+    sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
+
+    def get_prior(self, effect: EffectId) -> EffectPrior:
+        """Return the prior of an effect in its unit."""
+        return self.effects.get(effect, EffectPrior(EFFECTS[effect].std))
+
+
+@dataclass(frozen=True, eq=False)
+class InputColumns:
+    """Changes (N-1, q) of one input by the columns, at `time` (N-1,)."""
+
+    time: FloatArray
+    matrix: FloatArray
+
+    def select(self, columns: list[int]) -> InputColumns:
+        """Return some of the columns."""
+        return InputColumns(self.time, self.matrix[:, columns])
+
+
+@dataclass(frozen=True, eq=False)
+class EffectColumns:
+    """Columns of the effects: change of the compared samples per prior standard deviation.
+
+    `groups` (q,) is the group of each column, `matrices` (n, q) one for each shift. `known` (n,)
+    are the changes by the stated values of effects, by shift.
+    """
+
+    groups: tuple[Group, ...]
+    matrices: tuple[FloatArray, ...]
+    known: tuple[FloatArray, ...]
+    scale: FloatArray
+    """Prior standard deviation (q,) of each column's amount, in stated ones."""
+    inputs: tuple[Mapping[str, InputColumns], ...]
+    """Changes of the inputs by the columns, by name, for each shift."""
+
+    def compute_inputs(self, amounts: FloatArray) -> list[dict[str, Signal]]:
+        """Compute the changes of the inputs by name for `amounts` (q,), for each shift."""
+        return [
+            {name: Signal(one.time, one.matrix @ amounts) for name, one in each.items()}
+            for each in self.inputs
+        ]
+
+    @property
+    def acts_on_inputs(self) -> FloatArray:
+        """1 for each column (q,) that acts through inputs alone, else 0."""
+        acting = np.zeros(len(self.groups))
+        for each in self.inputs:
+            for one in each.values():
+                acting[np.any(one.matrix != 0.0, axis=0)] = 1.0
+        return acting
+
+    def follow(self, first: EffectColumns, acting: FloatArray) -> EffectColumns:
+        """Return the columns of `first` as formed anew, in its order and with its scale.
+
+        `acting` (q,) are the amounts of `first` that drive the run already: their answer is taken
+        out of the stated changes, so that the amounts are again the whole ones.
+        """
+        keys, mine = number_groups(first.groups), number_groups(self.groups)
+        picked = [mine.index(key) for key in keys if key in mine]
+        kept = [k for k, key in enumerate(keys) if key in mine]
+        found = self.select(picked).rescale(first.scale[kept])
+        known = tuple(
+            one - matrix @ acting[kept]
+            for one, matrix in zip(found.known, found.matrices, strict=True)
+        )
+        return replace(found, known=known)
+
+    def find_columns(self, group: Group) -> list[int]:
+        """Return the numbers of the columns of a group."""
+        return [k for k, one in enumerate(self.groups) if one == group]
+
+    def select(self, columns: Sequence[int]) -> EffectColumns:
+        """Return some of the columns."""
+        picked = list(columns)
+        return replace(
+            self,
+            groups=tuple(self.groups[k] for k in picked),
+            matrices=tuple(one[:, picked] for one in self.matrices),
+            scale=self.scale[picked],
+            inputs=tuple(
+                {name: one.select(picked) for name, one in each.items()} for each in self.inputs
+            ),
+        )
+
+    def rescale(self, scale: FloatArray) -> EffectColumns:
+        """Return the columns multiplied by `scale` (q,)."""
+        matrices = tuple(one * scale for one in self.matrices)
+        inputs = tuple(
+            {name: InputColumns(one.time, one.matrix * scale) for name, one in each.items()}
+            for each in self.inputs
+        )
+        return replace(self, matrices=matrices, scale=self.scale * scale, inputs=inputs)
+
+
+def build_columns(
+    problem: LikelihoodObjective,
+    point: ParameterVector,
+    priors: EffectPriors,
+    only: Collection[Group] | None = None,
+) -> EffectColumns | None:
+    """Build the columns of all effects that are not off; None if a shift has no linear response.
+
+    `only` restricts them to some groups.
+
+    A column that changes no compared sample is left out.
+    """
+    shifts: list[_ShiftColumns] = []
+    for part in problem.parts:
+        at = evaluate_operating_point(part, point)
+        one = None if at is None else _build_shift_columns(at, priors, only)
+        if one is None:
+            return None
+        shifts.append(one)
+    keys = list(dict.fromkeys(key for one in shifts for key in one.keys))
+    empty = np.ones(len(keys), dtype=bool)
+    for one in shifts:
+        empty &= ~np.any(one.align(one.matrix, keys), axis=0)
+    keys = [key for key, none in zip(keys, empty, strict=True) if not none]
+    return EffectColumns(
+        groups=tuple(group for group, _ in keys),
+        matrices=tuple(one.align(one.matrix, keys) for one in shifts),
+        known=tuple(one.known for one in shifts),
+        scale=np.ones(len(keys)),
+        inputs=tuple(
+            {
+                name: InputColumns(one.time, one.align(matrix, keys))
+                for name, matrix in one.inputs.items()
+            }
+            for one in shifts
+        ),
+    )
+
+
+_Key = tuple[Group, int]
+
+
+def number_groups(groups: Sequence[Group]) -> list[_Key]:
+    """Return each group with the number of its column, from 1."""
+    count: dict[Group, int] = {}
+    keys = []
+    for group in groups:
+        count[group] = count.get(group, 0) + 1
+        keys.append((group, count[group]))
+    return keys
+
+
+@dataclass(frozen=True, eq=False)
+class _ShiftColumns:
+    """Columns of one shift by key: answers (n, q), changes of the inputs (N-1, q) by name."""
+
+    keys: tuple[_Key, ...]
+    matrix: FloatArray
+    known: FloatArray
+    time: FloatArray
+    inputs: Mapping[str, FloatArray]
+
+    def align(self, matrix: FloatArray, keys: Sequence[_Key]) -> FloatArray:
+        """Return the columns of a matrix (m, q) in the order of `keys`; zero for foreign ones."""
+        found = np.zeros((len(matrix), len(keys)))
+        for k, key in enumerate(keys):
+            if key in self.keys:
+                found[:, k] = matrix[:, self.keys.index(key)]
+        return found
+
+
+def _build_shift_columns(
+    at: OperatingPoint, priors: EffectPriors, only: Collection[Group] | None
+) -> _ShiftColumns | None:
+    """Build the columns of one shift; None if they are not finite."""
+    named = [one for one in _number_columns(at, priors) if only is None or one[0][0] in only]
+    disturbances = [one for _, one in named]
+    matrix = observe(at, disturbances)
+    if not np.all(np.isfinite(matrix)):
+        return None
+    stated = list(_build_known(at, priors))
+    known = observe(at, [one for one, _ in stated]) @ np.array([sign for _, sign in stated])
+    inputs: dict[str, FloatArray] = {}
+    for k, one in enumerate(disturbances):
+        for name, values in one.inputs.items():
+            nothing = np.zeros((at.middle.size, len(disturbances)))
+            inputs.setdefault(name, nothing)[:, k] = values
+    keys = tuple(key for key, _ in named)
+    return _ShiftColumns(keys, matrix, known, at.middle, inputs)
+
+
+def _number_columns(
+    at: OperatingPoint, priors: EffectPriors
+) -> Iterator[tuple[tuple[Group, int], Disturbance]]:
+    """Yield the disturbances of one prior standard deviation with their group and number."""
+    found = list(_build_random(at, priors))
+    keys = number_groups([group for group, _ in found])
+    yield from zip(keys, (one for _, one in found), strict=True)
+
+
+def _build_random(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Group, Disturbance]]:
+    for name, effect in EFFECTS.items():
+        prior = priors.get_prior(name)
+        if prior.std > 0.0:
+            for one in effect.build(at, prior.std):
+                yield Group(name, one.subject), one
+    for one in build_sensor_columns(at, priors.sensors):
+        yield Group(EffectId.SENSOR_TOLERANCE, one.subject), one
+
+
+def _build_known(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Disturbance, float]]:
+    """Yield the disturbances of effects with a stated value, of that size."""
+    for name, effect in EFFECTS.items():
+        value = priors.get_prior(name).value
+        if value:
+            for one in effect.build(at, abs(value)):
+                yield one, float(np.sign(value))
+
+
+def observe(at: OperatingPoint, disturbances: Sequence[Disturbance]) -> FloatArray:
+    """Compute the changes (n, q) of the compared samples by q disturbances."""
+    response, count = at.response, len(disturbances)
+    if count == 0:
+        return np.zeros((at.record.size, 0))
+    push = np.zeros((at.middle.size, STATES, count))
+    for k, one in enumerate(disturbances):
+        if one.force is not None:
+            push[:, :, k] += np.einsum("kij,kj->ki", response.effect, one.force)
+        for name, values in one.inputs.items():
+            push[:, :, k] += response.drive[name] * values[:, None]
+    state = response.propagate_columns(push)
+    for k, one in enumerate(disturbances):
+        if one.respond is not None:
+            state[:, :, k] += one.respond()
+    state = state[at.rows]
+    found = []
+    for out in at.record.outputs:
+        row = build_output_row(at.model, out.name)
+        seen = np.einsum("i,kiq->kq", row, state[out.centre])
+        for k, one in enumerate(disturbances):
+            if out.name in one.outputs:
+                seen[:, k] += out.sample(at.record.time, one.outputs[out.name][at.rows])
+        found.append(seen)
+    return np.concatenate(found)

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+"""Description of an effect that the model leaves out: meaning, prior size, columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
+from drivetwin.vehicle.effects import EffectId
+
+
+@dataclass(frozen=True, order=True)
+class Group:
+    """Columns that belong to one cause: an effect, and the element, gear or sensor that has it."""
+
+    effect: EffectId
+    subject: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """Action of an effect on the driveline, or on the measured signals, over the steps of a run.
+
+    `subject` is the element, gear or frequency to which the effect belongs; empty for one of the
+    whole driveline. `force` (N-1, 4) acts on the speeds of engine, output and wheel [N m],
+    `inputs` (N-1,) are changes of inputs by name, `outputs` (N,) direct changes of compared
+    signals by name, `respond` computes a change (N, 4) of the state that is already a response.
+    """
+
+    subject: str = ""
+    force: FloatArray | None = None
+    inputs: Mapping[str, FloatArray] = field(default_factory=dict)
+    outputs: Mapping[str, FloatArray] = field(default_factory=dict)
+    respond: Callable[[], FloatArray] | None = None
+
+
+Builder = Callable[[OperatingPoint, float], Sequence[Disturbance]]
+"""Builds the columns of an effect at an operating point for one standard deviation of its prior,
+given in the unit of the effect. Columns of one subject are independent; they form one group."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """One departure from the model.
+
+    `std` is the default standard deviation of its normal prior about zero in `unit`, `source` the
+    reason for it. `meaning` completes "the log shows ..."; `remedy` is advice where it is found.
+    A `random` effect is a sample of a random process: no single value of it can be stated.
+    The columns grow with the `power` of the size.
+    """
+
+    id: EffectId
+    meaning: str
+    unit: str
+    std: float
+    source: str
+    remedy: str
+    build: Builder
+    random: bool = False
+    power: float = 1.0

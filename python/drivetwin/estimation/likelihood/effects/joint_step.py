@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: MIT
+"""One Gauss-Newton step in the unknowns and the amounts of all effects together.
+
+With F the information of the unknowns, g the gradient of Q/2, J the slopes of the compared
+samples, r their residual, W = Σ⁻¹ and Z the columns of the effects, whose amounts a are normal
+about zero with unit variance:
+
+    M = [[F, JᵀWZ], [ZᵀWJ, ZᵀWZ + 1]],   (Δθ, a) = M⁻¹·(-g, ZᵀWr)
+
+The covariance of the unknowns is the upper left block of M⁻¹ (Schur complement). For one group of
+columns alone, A = ZᵀWZ - ZᵀWJ·F⁻¹·JᵀWZ and b = ZᵀWr + ZᵀWJ·F⁻¹·g, and the log evidence of the
+effect against its absence is ½·bᵀ(A + 1)⁻¹b - ½·log|A + 1|. The gradient is not left out: what
+remains of it at the end of a search would look like an effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
+from drivetwin.estimation.likelihood.effects.columns import EffectColumns
+from drivetwin.estimation.likelihood.effects.effect import Group
+from drivetwin.estimation.likelihood.fit import invert_information
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.optimize.objective import NormalEquations
+from drivetwin.vehicle.effects import EffectId
+
+
+@dataclass(frozen=True)
+class SizeSettings:
+    """Settings of the prior sizes by evidence."""
+
+    smallest: float = 0.4
+    """Least size of an effect that the log does not show, as a share of the stated one."""
+    largest: float = 5.0
+    """Greatest size, as a factor of the stated one: beyond it the stated prior is refuted."""
+    rounds: int = 30
+    """Greatest number of fixed-point iterations."""
+    rtol: float = 0.02
+    """Relative change of all sizes at which the iteration has converged."""
+
+
+SIZES = SizeSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedColumns:
+    """Weighted sums over all shifts for the columns of the effects.
+
+    `own` (q, q) is ZᵀWZ, `cross` (p, q) JᵀWZ, `pull` (q,) ZᵀWr, `gradient` (p,) that of Q/2, the
+    stated values of effects taken out of r. `weighted` (n, q) is WZ of each shift.
+    """
+
+    columns: EffectColumns
+    own: FloatArray
+    cross: FloatArray
+    pull: FloatArray
+    gradient: FloatArray
+    weighted: tuple[FloatArray, ...]
+
+    def rescale(self, scale: FloatArray) -> WeightedColumns:
+        """Return the sums of the columns multiplied by `scale` (q,)."""
+        return replace(
+            self,
+            columns=self.columns.rescale(scale),
+            own=self.own * np.outer(scale, scale),
+            cross=self.cross * scale,
+            pull=self.pull * scale,
+            weighted=tuple(one * scale for one in self.weighted),
+        )
+
+    def select(self, picked: list[int]) -> WeightedColumns:
+        """Return the sums of some of the columns."""
+        return replace(
+            self,
+            columns=self.columns.select(picked),
+            own=self.own[np.ix_(picked, picked)],
+            cross=self.cross[:, picked],
+            pull=self.pull[picked],
+            weighted=tuple(one[:, picked] for one in self.weighted),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class GroupEvidence:
+    """Evidence of one group alone: `nats` is the log of the ratio of its likelihood to that
+    without it, `amounts` (k,) its posterior mean in prior standard deviations, `answer` (q,) the
+    weighted scalar products of its fitted effect with all columns, the unknowns adjusted.
+    `columns` (k,) are its numbers, `std` (k,) the standard deviations of the amounts, `moves` (p,)
+    what the unknowns move by them."""
+
+    nats: float
+    amounts: FloatArray
+    std: FloatArray
+    columns: tuple[int, ...]
+    answer: FloatArray
+    moves: FloatArray
+
+    @property
+    def power(self) -> float:
+        """Weighted sum of squares of its fitted effect, the unknowns adjusted."""
+        return max(float(self.answer[list(self.columns)] @ self.amounts), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class JointStep:
+    """Step in p unknowns and q amounts.
+
+    `moves` (p,) and `amounts` (q,), `inverse` (p+q, p+q) is M⁻¹, `excess` (p+q, p+q) the variance
+    of the gradient by slow errors, `chi2` the residual power per sample after the step, at least
+    1. `residuals` are the corrected ones (n,) by shift. `contributions` (p,) by group are the
+    moves of the unknowns that its amounts cause.
+    """
+
+    columns: EffectColumns
+    moves: FloatArray
+    amounts: FloatArray
+    inverse: FloatArray
+    excess: FloatArray
+    chi2: float
+    residuals: tuple[FloatArray, ...]
+    contributions: Mapping[Group, FloatArray]
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance (p+q, p+q) of unknowns and amounts."""
+        return self.chi2 * self.inverse + self.inverse @ self.excess @ self.inverse
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviations (q,) of the amounts."""
+        own = self.covariance[self.moves.size :, self.moves.size :]
+        return np.asarray(np.sqrt(np.diag(own)))
+
+
+def weight_columns(
+    problem: LikelihoodObjective, normal: NormalEquations, columns: EffectColumns
+) -> WeightedColumns:
+    """Form the weighted sums of `columns` at the point of the expansion `normal`."""
+    count, size = len(columns.groups), normal.gradient.size
+    own, cross, pull = np.zeros((count, count)), np.zeros((size, count)), np.zeros(count)
+    gradient, weighted = normal.gradient.copy(), []
+    for part, z, known, residual, regressors in zip(
+        problem.parts,
+        columns.matrices,
+        columns.known,
+        normal.residuals,
+        normal.regressors,
+        strict=True,
+    ):
+        one = part.weighting.apply_inverse(z)
+        own += z.T @ one
+        cross += regressors.T @ z
+        pull += one.T @ (residual - known)
+        gradient += regressors.T @ known
+        weighted.append(one)
+    return WeightedColumns(columns, own, cross, pull, gradient, tuple(weighted))
+
+
+def scale_by_evidence(
+    sums: WeightedColumns, information: FloatArray, chi2: float
+) -> WeightedColumns:
+    """Scale the columns of each group to the prior size of greatest evidence, all groups together.
+
+    Fixed point of MacKay (Neural Computation 4, 1992): the prior variance of a group becomes the
+    mean square of its amounts, posterior variance included. Stated sensor tolerances stay.
+    """
+    follows = invert_information(information) @ sums.cross
+    power = max(chi2, 1.0)
+    own = (sums.own - sums.cross.T @ follows) / power
+    pull = (sums.pull + follows.T @ sums.gradient) / power
+    groups = [
+        sums.columns.find_columns(one)
+        for one in dict.fromkeys(sums.columns.groups)
+        if one.effect is not EffectId.SENSOR_TOLERANCE
+    ]
+    scale = np.ones(pull.size)
+    for _ in range(SIZES.rounds):
+        before = scale.copy()
+        spread = np.linalg.inv(np.eye(pull.size) + np.outer(scale, scale) * own)
+        amounts = spread @ (scale * pull)
+        square = amounts**2 + np.diag(spread)
+        for k in groups:
+            size = scale[k] * np.sqrt(np.mean(square[k]))
+            scale[k] = np.clip(size, SIZES.smallest, SIZES.largest)
+        if np.max(np.abs(scale / before - 1.0)) < SIZES.rtol:
+            break
+    return sums.rescale(scale)
+
+
+def compute_evidence(
+    sums: WeightedColumns, information: FloatArray, chi2: float
+) -> dict[Group, GroupEvidence]:
+    """Compute the evidence of each group alone, with residual power `chi2` per sample."""
+    follows = invert_information(information) @ sums.cross
+    power = max(chi2, 1.0)
+    own = (sums.own - sums.cross.T @ follows) / power
+    pull = (sums.pull + follows.T @ sums.gradient) / power
+    found = {}
+    for group in dict.fromkeys(sums.columns.groups):
+        k = sums.columns.find_columns(group)
+        matrix = own[np.ix_(k, k)] + np.eye(len(k))
+        spread = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+        amounts = spread @ pull[k]
+        nats = 0.5 * float(pull[k] @ amounts) - 0.5 * float(np.linalg.slogdet(matrix)[1])
+        found[group] = GroupEvidence(
+            nats,
+            amounts,
+            np.sqrt(np.diag(spread)),
+            tuple(k),
+            own[:, k] @ amounts,
+            -follows[:, k] @ amounts,
+        )
+    return found
+
+
+def select_one_mode(
+    sums: WeightedColumns, evidence: Mapping[Group, GroupEvidence]
+) -> WeightedColumns:
+    """Keep the input-shaft mode of greatest evidence alone: only one of them exists."""
+    modes = [one for one in evidence if one.effect is EffectId.INPUT_SHAFT_MODE]
+    best = max(modes, key=lambda one: evidence[one].nats, default=None)
+    others = {one for one in modes if one != best}
+    return sums.select([k for k, one in enumerate(sums.columns.groups) if one not in others])
+
+
+def take_joint_step(
+    problem: LikelihoodObjective, normal: NormalEquations, sums: WeightedColumns
+) -> JointStep:
+    """Step from the expansion `normal` in the unknowns and the amounts of the effects."""
+    size, count = normal.gradient.size, sums.pull.size
+    matrix = np.block([[normal.information, sums.cross], [sums.cross.T, sums.own + np.eye(count)]])
+    inverse = invert_information(matrix)
+    right = np.concatenate([-sums.gradient, sums.pull])
+    step = inverse @ right
+    moves, amounts = step[:size], step[size:]
+    residuals = tuple(
+        residual - known - slopes @ moves - z @ amounts
+        for residual, known, slopes, z in zip(
+            normal.residuals, sums.columns.known, normal.slopes, sums.columns.matrices, strict=True
+        )
+    )
+    power = sum(
+        float(one @ part.weighting.apply_inverse(one))
+        for one, part in zip(residuals, problem.parts, strict=True)
+    )
+    chi2 = max(power / problem.size, 1.0)
+    corrected = replace(
+        normal,
+        information=matrix,
+        residuals=residuals,
+        regressors=tuple(
+            np.column_stack(both) for both in zip(normal.regressors, sums.weighted, strict=True)
+        ),
+    )
+    follows = invert_information(normal.information) @ sums.cross
+    contributions = {
+        group: -follows[:, k] @ amounts[k]
+        for group in dict.fromkeys(sums.columns.groups)
+        for k in [sums.columns.find_columns(group)]
+    }
+    return JointStep(
+        sums.columns,
+        moves,
+        amounts,
+        inverse,
+        compute_long_run_excess(problem, corrected, chi2),
+        chi2,
+        residuals,
+        contributions,
+    )

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+"""Output torque that is measured late or early against the speeds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
+from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
+from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
+from drivetwin.vehicle.effects import EffectId
+
+
+def build(at: OperatingPoint, std: float) -> list[Disturbance]:
+    """Delay the simulated output torque; the speeds are the reference clock."""
+    rate = np.gradient(at.run.shaft_torque, at.run.time)
+    return [Disturbance(outputs={OUTPUT_TORQUE: -std * rate})]
+
+
+EFFECT = Effect(
+    EffectId.OUTPUT_TORQUE_DELAY,
+    "a delay of the output torque against the speeds",
+    "s",
+    0.003,
+    "anti-aliasing filters and telemetry of torque sensors delay by 1 to 5 ms",
+    "set channels.output_torque.time_shift_s in the channel mapping and compare",
+    build,
+)

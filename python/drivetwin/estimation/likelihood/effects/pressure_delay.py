@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+"""Pressure that is measured late or early against the torque that it makes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
+from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
+from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
+from drivetwin.vehicle.effects import EffectId
+
+
+def build(at: OperatingPoint, std: float) -> list[Disturbance]:
+    """Advance the pressure of each element, by the rate of the pressure without noise."""
+    found = []
+    for name, signal in at.record.pressures.items():
+        sigma = at.record.input_sigma[name]
+        steady = smooth_adaptive(MeasuredSignal(signal.time, signal.values, sigma))
+        rate = at.compute_rate(np.interp(at.run.time, signal.time, steady))
+        found.append(Disturbance(name, inputs={name: std * rate}))
+    return found
+
+
+EFFECT = Effect(
+    EffectId.PRESSURE_DELAY,
+    "a delay of the measured pressure",
+    "s",
+    0.003,
+    "lines between sensor port and piston, and filters of pressure sensors, delay by 1 to 5 ms",
+    "set time_shift_s of the pressure in the channel mapping and compare",
+    build,
+)
