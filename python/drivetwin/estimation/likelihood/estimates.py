@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Conclusions of the likelihood method: estimates, verdicts, curves and warnings."""
+"""Conclusions of the likelihood method: estimates, verdicts, curves and findings."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.diagnostics.identifiability import (
-    describe_null_directions,
     find_at_bounds,
+    find_null_directions,
 )
 from drivetwin.estimation.likelihood.diagnostics.misspecification import run_score_tests
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
-    describe_contradiction,
-    describe_unweighted,
-    run_residual_tests,
+    check_residuals,
+    check_weighting,
 )
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.selection.loss_law import describe_other_law
+from drivetwin.estimation.likelihood.selection.loss_law import check_other_law
 from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
@@ -31,16 +30,16 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
 )
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, build_friction_curves
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensor_shifts
-from drivetwin.estimation.linear.load_balance import AERO, describe_different_loads
+from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
 from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
-    collect_low_gear_notes,
+    check_excitation,
     collect_shift_labels,
 )
 from drivetwin.estimation.result.verdict import (
-    KNOWN,
+    apply_errors,
     assess,
     assess_with_prior,
     compute_correlation,
@@ -48,15 +47,11 @@ from drivetwin.estimation.result.verdict import (
     refuse_parameter,
     reject_identified,
 )
+from drivetwin.findings import Code, explain
 from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 
-NO_SCALE = (
-    "without an output torque sensor all torques share one unknown scale; what is told is the "
-    "quantity over η; add an output-shaft torque sensor"
-)
 AGE = "te_delay"
-NO_AGE = "the engine torque moves too little for its age to show"
 WITH_ETA = "likelihood over η, times η from design"
 """Method of a torque-like parameter of a log without an output torque, where η is on the card."""
 WITH_PRIOR = "likelihood with design prior"
@@ -90,28 +85,25 @@ def build_estimates(
         std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
         driveline=drivelines[0],
         systematic=spread,
-        notes=collect_low_gear_notes(signals),
+        notes=check_excitation(signals),
         method=METHOD,
         prior_method=WITH_PRIOR,
     )
     ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
-    limits = {
-        name: text
-        for name, text in find_at_bounds(fit, ids, matrix).items()
-        if estimates[name].verdict is not Verdict.DESIGN
-    }
-    estimates |= {name: reject_identified(estimates[name], text) for name, text in limits.items()}
+    limits = [
+        one
+        for one in find_at_bounds(fit, ids, matrix)
+        if estimates[one.subject].verdict is not Verdict.DESIGN
+    ]
+    estimates = apply_errors(estimates, limits)
     curves = build_friction_curves(fit, linear, systematic)
     effects = tuple(run_score_tests(fit))
     for effect in effects:
         estimates = effect.held_against(estimates, ids, matrix)
         curves = {name: effect.widened(fit, name, curve) for name, curve in curves.items()}
-    for why in (
-        describe_contradiction(fit),
-        describe_unweighted(fit, collect_shift_labels(signals)),
-    ):
-        if why:
-            estimates = {name: reject_identified(one, why) for name, one in estimates.items()}
+    labels = collect_shift_labels(signals)
+    disagreements = (*check_residuals(fit, labels), *check_weighting(fit, labels))
+    estimates = apply_errors(estimates, disagreements)
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
     return EstimateSet(
         estimates,
@@ -120,11 +112,13 @@ def build_estimates(
         compute_correlation(covariance),
         (
             *dict.fromkeys(fitted.notes.values()),
-            *(one.text for one in fitted.conflicts),
-            *(f"{name}: {text}" for name, text in limits.items()),
-            *_collect_warnings(fit, signals),
-            *(one.text for one in effects),
-            *describe_other_law(fit, values, matrix, np.sqrt(np.diag(covariance))),
+            *(one.finding for one in fitted.conflicts),
+            *limits,
+            *disagreements,
+            *find_null_directions(fit),
+            *report_different_loads(collect_loads(fit)),
+            *(one.finding for one in effects),
+            *check_other_law(fit, values, matrix, np.sqrt(np.diag(covariance))),
         ),
         _build_load_law(fit, systematic),
         collect_loads(fit),
@@ -148,7 +142,7 @@ def _estimate_fixed(
     for one in (part.structure for part in fit.problem.parts):
         if one.get_unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
             name = make_log_id(AGE, one.log)
-            found[name] = refuse_parameter(name, METHOD, NO_AGE)
+            found[name] = refuse_parameter(name, METHOD, explain(Code.DELAY_NOT_EXCITED))
     return found
 
 
@@ -171,9 +165,10 @@ def _estimate_without_scale(
     systematic part.
     """
     if eta is None:
-        return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
+        reason = explain(Code.NO_TORQUE_SCALE)
+        return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=reason)
     if ratio is None:
-        return from_prior(name, eta, KNOWN)
+        return from_prior(name, eta)
     if ratio.value is None or ratio.std_noise is None:
         return replace(ratio, id=name)
     spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
@@ -190,14 +185,3 @@ def _estimate_without_scale(
 def _compute_systematic_std(matrix: FloatArray, systematic: FloatArray) -> list[float]:
     variance = np.einsum("qp,pr,qr->q", matrix, systematic, matrix)
     return [float(np.sqrt(max(v, 0.0))) for v in variance]
-
-
-def _collect_warnings(fit: LikelihoodFit, signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
-    texts = []
-    labels = collect_shift_labels(signals)
-    for s, label, tests in zip(signals, labels, run_residual_tests(fit).values(), strict=True):
-        texts += list(s.shift.warnings)
-        texts += [f"{label}: {text}" for test in tests for text in test.warnings]
-    if why := describe_unweighted(fit, labels):
-        texts.append(why)
-    return (*texts, *describe_null_directions(fit), *describe_different_loads(collect_loads(fit)))

@@ -18,6 +18,7 @@ from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.findings import Code
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from tests.estimation.likelihood.fixtures import fitted, problem, truth_of
 from tests.support.bench import Bench, Knowledge, record_bench
@@ -44,9 +45,9 @@ def test_a_late_torque_is_told_with_its_delay(delay: float) -> None:
     (seen,), (std,) = step.amounts, step.std
     assert abs(seen - delay) < 3.0 * std + 0.15 * delay
     (effect,) = run_score_tests(found)
-    assert f"{1e3 * seen:.1f} ±" in effect.text
-    assert "late against the speeds" in effect.text
-    assert f"channels.output_torque.time_shift_s = -{seen:.4f}" in effect.text
+    assert effect.finding.numbers["delay"].value == seen
+    assert "ms late relative to the speeds" in effect.finding.text
+    assert f"channels.output_torque.time_shift_s = -{seen:.4f}" in effect.finding.remedy
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -61,10 +62,10 @@ def test_what_a_late_torque_moves_is_not_identified() -> None:
     """The age of the engine torque takes nearly all of the delay."""
     made, found = _with_delay(0.002)
     told = build_estimates(found, [made.signals], [made.driveline], {}, {})
-    assert any("late against the speeds" in text for text in told.warnings)
+    assert Code.OUTPUT_TORQUE_LATE in [one.code for one in told.findings]
     age = told.estimates["te_delay"]
     assert age.verdict is Verdict.WEAK
-    assert "with the output torque in time the log gives" in age.reason
+    assert "With the output torque in time the log gives" in age.reason
     assert told.estimates["J_vehicle"].verdict is Verdict.IDENTIFIED
 
 
@@ -84,12 +85,13 @@ def test_slow_errors_of_a_sensor_widen_how_late_it_is() -> None:
 def test_a_late_pressure_is_told() -> None:
     """To first order: Stribeck's law bends to follow it, so that more than is seen may be late."""
     made, found = _with_delay(0.015, "pressure.B3")
-    told = [one for one in run_score_tests(found) if one.text.startswith("the pressure of B3 is")]
+    told = [one.finding for one in run_score_tests(found)]
+    told = [one for one in told if one.code is Code.PRESSURE_LATE]
     assert len(told) == 1
-    assert "late against the torque that it makes" in told[0].text
-    assert "channels.pressure.B3.time_shift_s = -0.0" in told[0].text
+    assert "ms late relative to its torque" in told[0].text
+    assert "channels.pressure.B3.time_shift_s = -0.0" in told[0].remedy
     concluded = build_estimates(found, [made.signals], [made.driveline], {}, {})
-    assert told[0].text in concluded.warnings
+    assert told[0] in concluded.findings
 
 
 def test_friction_of_another_shape_is_told_and_its_band_holds_the_truth() -> None:
@@ -107,7 +109,7 @@ def test_friction_of_another_shape_is_told_and_its_band_holds_the_truth() -> Non
     found = fit_local(posed, start)
     assert found is not None
     told = build_estimates(found, [made.signals], [made.driveline], {}, {})
-    assert any("the friction of B3 departs from a Stribeck law" in text for text in told.warnings)
+    assert any("Friction of B3 deviates from a Stribeck law" in one.text for one in told.findings)
     curve = told.friction["B3"]
     seen = (curve.slip > 5.0) & (curve.slip < 60.0)
     true = np.interp(curve.slip, slip, mu)

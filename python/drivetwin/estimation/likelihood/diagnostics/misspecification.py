@@ -16,7 +16,6 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.fit import (
@@ -33,6 +32,7 @@ from drivetwin.estimation.optimize.objective import NormalEquations
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
 from drivetwin.estimation.result.estimate_set import add_systematic_band
 from drivetwin.estimation.result.verdict import reject_identified
+from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.simulation.dual_clutch import Trajectory
 
 OUTPUT_TORQUE = "output_torque"
@@ -98,11 +98,11 @@ class Shapes:
 class Misspecification:
     """An effect that the log shows and the fit leaves out.
 
-    `text` says what it is, `corrected` what the fit would have to be given. `moves` (p,) is where
+    `corrected` is what the fit would have to be given. `moves` (p,) is where
     the unknowns would follow, and `beside` what μ of one element gains beside that of its law.
     """
 
-    text: str
+    finding: Finding
     corrected: str
     moves: FloatArray
     element: str = ""
@@ -120,8 +120,9 @@ class Misspecification:
             one = told[name]
             if one.value is None or one.std_total is None or abs(move) <= Z95 * one.std_total:
                 continue
-            value = format_with_unit(one.value + move, one.unit, digits=5)
-            told[name] = reject_identified(one, f"with {self.corrected} the log gives {value}")
+            value = Number(one.value + move, one.unit)
+            why = explain(Code.DEPENDS_ON_EFFECT, effect=self.corrected, value=value)
+            told[name] = reject_identified(one, why)
         return told
 
     def widened(self, fit: LikelihoodFit, name: str, curve: FrictionCurve) -> FrictionCurve:
@@ -223,38 +224,31 @@ def _step(
     return ScoreStep(amounts, spread[effects, effects], moves, fall)
 
 
-def _delay(found: ScoreStep) -> str:
-    """A delay with its interval, and to which side."""
-    side = "late" if found.amounts[0] > 0.0 else "early"
-    half = Z95 * found.std[0]
-    return f"{1e3 * abs(found.amounts[0]):.1f} ± {1e3 * half:.1f} ms {side}"
-
-
-def _shift(found: ScoreStep, channel: str) -> str:
-    """The line of the mapping that takes a delay away."""
-    line = f"channels.{channel}.time_shift_s = {-found.amounts[0]:.4f}"
-    return f"set {line} in the channel mapping and compare"
+def _report_delay(found: ScoreStep, code: Code, element: str = "") -> Finding:
+    """Report a delay with its interval, side and the time shift that takes it away."""
+    amount = float(found.amounts[0])
+    return report(
+        code,
+        element=element,
+        delay=Number(abs(amount), "s", Z95 * float(found.std[0])),
+        side="late" if amount > 0.0 else "early",
+        shift=Number(-amount, "s"),
+        fall=found.fall,
+    )
 
 
 def _torque_told(found: ScoreStep) -> Iterator[Misspecification]:
     if not found.significant:
         return
-    text = (
-        f"the output torque is {_delay(found)} against the speeds, if the model of the shaft "
-        f"holds: c_o, ζ and the age of the engine torque hang on it; {_shift(found, OUTPUT_TORQUE)}"
-    )
-    yield Misspecification(text, "the output torque in time", found.moves)
+    finding = _report_delay(found, Code.OUTPUT_TORQUE_LATE)
+    yield Misspecification(finding, "the output torque in time", found.moves)
 
 
 def _pressure_told(found: ScoreStep, name: str) -> Iterator[Misspecification]:
     if not found.significant:
         return
-    text = (
-        f"the pressure of {name} is {_delay(found)} against the torque that it makes, if its "
-        f"friction follows a Stribeck law (Q falls by {found.fall:.0f}): μ and P0 hang on it; "
-        f"{_shift(found, f'pressure.{name}')}"
-    )
-    yield Misspecification(text, f"the pressure of {name} in time", found.moves)
+    finding = _report_delay(found, Code.PRESSURE_LATE, name)
+    yield Misspecification(finding, f"the pressure of {name} in time", found.moves)
 
 
 def _shape_told(found: ScoreStep, name: str, shapes: Shapes) -> Iterator[Misspecification]:
@@ -262,14 +256,8 @@ def _shape_told(found: ScoreStep, name: str, shapes: Shapes) -> Iterator[Misspec
         return
     grid = shapes.largest * np.linspace(0.0, 1.0, GRID)
     departs = float(np.max(np.abs(shapes.at(grid) @ found.amounts)))
-    text = (
-        f"the friction of {name} departs from a Stribeck law over slip by up to {departs:.2g}, if "
-        f"its pressure is in time and μ goes with nothing else (Q falls by {found.fall:.0f}): μ "
-        "and P0 hang on it; compare with friction of free shape (examine --friction free), and "
-        "check the sensor of that pressure"
-    )
     yield Misspecification(
-        text,
+        report(Code.FRICTION_SHAPE, element=name, size=departs, fall=found.fall),
         f"friction of {name} of free shape",
         found.moves,
         name,
