@@ -81,7 +81,7 @@ def identify_vehicle(seed: int) -> Log:
         return Log({}, {}, {}, (), (), fault.what)
     for one in (found, misread):
         if one.method is not DEFAULT_METHOD:
-            return Log({}, {}, {}, (), (), one.warnings[0])
+            return Log({}, {}, {}, (), (), one.findings[0].text)
     least = compute_widths(found, recorded)
     refused = [one.id for one in found.estimates.values() if one.value is None]
     return Log(

@@ -103,22 +103,23 @@ def test_what_shifts_warns_of_is_told_in_the_same_words(
     arguments = [str(log), "--vehicle", str(bench_files.card)]
     found = _inspect(capsys, *arguments)
     assert main(["shifts", *arguments, "--json"]) == 0
-    assert found["warnings"] == json.loads(capsys.readouterr().out)["warnings"]
-    assert any("'TrqOut': far beyond" in text for text in found["warnings"])
-    assert any("check scale and unit" in text for text in found["warnings"])
+    assert found["findings"] == json.loads(capsys.readouterr().out)["findings"]
+    texts = [one["text"] for one in found["findings"]]
+    assert any("'TrqOut': far beyond" in text for text in texts)
+    assert any("check scale and unit" in text for text in texts)
     assert found["refusal"] is None
     assert main(["inspect", *arguments]) == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert all(f"warning: {' '.join(text.split())}" in shown for text in found["warnings"])
+    assert all(f"warning: {' '.join(text.split())}" in shown for text in texts)
 
 
 def test_without_a_card_channels_are_looked_at_by_themselves(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = _damaged(bench_files.log, tmp_path / "log.csv", factor=0.1)
-    (warning,) = _inspect(capsys, str(log))["warnings"]
-    assert "'TrqOut'" in warning
-    assert "left out" in warning
+    (one,) = _inspect(capsys, str(log))["findings"]
+    assert "'TrqOut'" in one["text"]
+    assert "left out" in one["text"]
 
 
 def test_a_log_in_which_nothing_is_recognised_is_listed(
@@ -129,7 +130,7 @@ def test_a_log_in_which_nothing_is_recognised_is_listed(
     log.write_text(f"time,Foo,Bar\ns,Nm,rpm\n{rows}")
     found = _inspect(capsys, str(log))
     assert [column["name"] for column in found["columns"]] == ["Foo", "Bar"]
-    assert (found["warnings"], found["refusal"]) == ([], None)
+    assert (found["findings"], found["refusal"]) == ([], None)
 
 
 def test_why_a_log_is_refused_is_told_and_the_columns_all_the_same(

@@ -11,13 +11,11 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.prepare import prepare
-from drivetwin.estimation.identify import MAP_EXACT
+from drivetwin.findings import Code
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
-
-KINDS = "samples are means"
 
 
 def test_noise_that_turbine_and_its_torque_share_is_no_sign_of_means(tmp_path: Path) -> None:
@@ -28,8 +26,9 @@ def test_noise_that_turbine_and_its_torque_share_is_no_sign_of_means(tmp_path: P
     shifts = detect_shifts(log, card)
     found = identify(log, card, shifts)
     # Taken for noise of its own, Q fell by 32 for means of all outputs, and J_prime_2 was 3 σ off.
-    assert not [text for text in found.warnings if KINDS in text]
-    assert MAP_EXACT in found.warnings
+    codes = {one.code for one in found.findings}
+    assert Code.MEAN_SAMPLES not in codes
+    assert Code.CONVERTER_MAP_EXACT in codes
     for name in ("eta", "J_prime_2", "J_prime_3", "J_vehicle", "Tv_over_if", "k_o"):
         one, truth = found.estimates[name], made.truth.parameters[name]
         assert one.value is not None

@@ -26,7 +26,7 @@ def test_log_and_card_read_back(bench: DynoRun, tmp_path: Path) -> None:
     (tmp_path / "card.toml").write_text(format_card(bench.scenario), encoding="utf-8")
     card = load_card(tmp_path / "card.toml")
     log = read_log(tmp_path / "run.csv", card)
-    assert not log.warnings
+    assert not log.findings
     for channel in bench.channels:
         if channel.role == "engine_torque":
             continue

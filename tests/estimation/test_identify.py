@@ -21,6 +21,7 @@ from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import Method
+from drivetwin.findings import Code, render
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
@@ -81,7 +82,8 @@ def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
     found = identify(*recording("paper_like"), Method.LIKELIHOOD)
     assert found.method is Method.INTEGRAL
     assert found.evidence.gave_up == "the search crawls"
-    assert found.warnings[0].startswith("likelihood: the search crawls; the values are those of")
+    (failed,) = [one for one in found.findings if one.code is Code.LIKELIHOOD_FAILED]
+    assert failed.text.startswith("Likelihood fit failed (the search crawls)")
     integral = identified("paper_like", Method.INTEGRAL)
     assert found.estimates["J_vehicle"].value == integral.estimates["J_vehicle"].value
     assert integral.evidence.gave_up == ""
@@ -105,8 +107,8 @@ def test_gears_held_too_briefly_for_the_linear_method_are_fitted_without_it() ->
         identify(log, card, shifts, Method.INTEGRAL)
     found = identify(log, card, shifts, Method.LIKELIHOOD)
     assert found.method is Method.LIKELIHOOD
-    (told,) = [text for text in found.warnings if text.startswith("linear method: no 0.4 s of")]
-    assert told.endswith("the likelihood started without it")
+    (told,) = [one.text for one in found.findings if one.code is Code.LINEAR_METHOD_FAILED]
+    assert told.startswith("Linear method failed (no 0.4 s of")
     truth = {"eta": 0.85, "J_prime_2": 17.50, "J_vehicle": 6056.0, "k_o": 1.76e5, "c_o": 280.0}
     for name, value in truth.items():
         estimate = found.estimates[name]
@@ -130,11 +132,11 @@ def test_where_neither_method_finds_anything_the_linear_one_says_what_to_record(
 
 def test_constant_engine_torque_is_said_in_words_not_hidden() -> None:
     found = identified("paper_like", Method.INTEGRAL)
-    assert "cannot tell η from J′" in found.estimates["eta"].reason
-    assert "cannot tell η from J′" in found.estimates["J_prime_2"].reason
+    assert "η and J′ are not separately" in found.estimates["eta"].reason
+    assert "η and J′ are not separately" in found.estimates["J_prime_2"].reason
     assert found.estimates["te_delay"].verdict is Verdict.NOT_IDENTIFIABLE
     assert found.estimates["te_delay"].value is None
-    assert any("gear 2 alone determines η and J′ poorly" in text for text in found.warnings)
+    assert Code.GEAR_POORLY_EXCITED in [one.code for one in found.findings]
 
 
 def test_a_log_with_throttle_steps_tells_everything() -> None:
@@ -197,19 +199,22 @@ def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
     )
     found = identify(*recording("truck_a"), Method.LIKELIHOOD)
     assert found.method is Method.INTEGRAL
-    assert any("went astray" in text for text in found.warnings)
+    assert any("went astray" in text for text in render(found.findings))
     assert Verdict.IDENTIFIED not in [one.verdict for one in found.estimates.values()]
     stiffness = found.estimates["k_o"]
     assert (stiffness.verdict, stiffness.value is None) == (Verdict.WEAK, False)
-    assert "no simulation" in stiffness.reason
+    assert "went astray" in stiffness.reason
 
 
 def test_inertias_outside_the_cards_ranges_are_told() -> None:
     log, card, shifts = recording("truck_a")
-    assert not [one for one in identify(log, card, shifts).warnings if "design range" in one]
+    assert not [
+        one for one in identify(log, card, shifts).findings if one.code is Code.OUTSIDE_DESIGN_RANGE
+    ]
     strict = replace(card, J_prime_range=(3.0, 9.0), J_vehicle_range=(1000.0, 2000.0))
-    texts = [one for one in identify(log, strict, shifts).warnings if "design range" in one]
-    assert [one.split()[0] for one in texts] == ["J_prime_2", "J_prime_3", "J_vehicle"]
+    found = identify(log, strict, shifts).findings
+    outside = [one for one in found if one.code is Code.OUTSIDE_DESIGN_RANGE]
+    assert [one.subject for one in outside] == ["J_prime_2", "J_prime_3", "J_vehicle"]
 
 
 def test_tolerances_enter_the_likelihood_as_shifts_of_its_minimum() -> None:

@@ -126,7 +126,7 @@ def reports_damage(found: Identification, sound: Identification) -> bool:
 
     def said(one: Identification) -> int:
         reasons = [e for e in one.estimates.values() if e.reason]
-        return sum(len(s.warnings) for s in one.shifts) + len(one.warnings) + len(reasons)
+        return len(one.findings) + len(reasons)
 
     fewer = len(found.shifts) < len(sound.shifts) or found.method is not sound.method
     return fewer or said(found) > said(sound)

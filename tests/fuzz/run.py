@@ -31,7 +31,7 @@ def outcome(path: Path, folder: Path) -> str:
         log = read_log(path, card(folder))
     except DrivetwinError as refusal:
         return f"columns, then {type(refusal).__name__}"
-    return "log with warnings" if log.warnings else "log"
+    return "log with warnings" if log.findings else "log"
 
 
 def prepare(name: str, folder: Path) -> Callable[[int], str]:

@@ -21,6 +21,7 @@ from drivetwin.errors import (
     TimeError,
     UnitError,
 )
+from drivetwin.findings import render
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
 from tests.logs.fixtures import UNITS, card, columns, write
@@ -47,7 +48,7 @@ def test_channels_are_in_si_by_role(tmp_path: Path) -> None:
     assert log.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert log.source == str(path)
     assert log.inputs == {"log.csv": log.sha256}
-    assert log.warnings == ()
+    assert log.findings == ()
 
 
 def test_another_unit_and_column_order_give_the_same_log(tmp_path: Path) -> None:
@@ -85,7 +86,7 @@ def test_a_mapping_asserts_unit_sign_scale_offset_and_time(tmp_path: Path) -> No
         "log.csv": log.sha256,
         "map.toml": hashlib.sha256(content).hexdigest(),
     }
-    assert log.warnings == ()
+    assert log.findings == ()
 
 
 @pytest.mark.parametrize(("mapping", "late"), [("", 0.01), ("[time]\nsimultaneous = true\n", 0.0)])
@@ -97,7 +98,7 @@ def test_rows_that_repeat_messages_are_late_unless_they_are_simultaneous(
     table["EngTrq"] = np.repeat(700.0 + 50.0 * np.sin(np.arange(300)), 2)
     log = mapped(tmp_path, table, UNITS, mapping)
     assert [one.late for one in log.channels.values()] == pytest.approx([late] * len(log.channels))
-    assert any("simultaneous = true" in text for text in log.warnings) == (late > 0.0)
+    assert any("simultaneous = true" in text for text in render(log.findings)) == (late > 0.0)
 
 
 def test_a_unit_asserted_against_the_file_is_told(tmp_path: Path) -> None:
@@ -106,7 +107,9 @@ def test_a_unit_asserted_against_the_file_is_told(tmp_path: Path) -> None:
     mapping = '[channels.pressure.B2]\nsource = "PrsBrk2"\nunit = "Pa"\n'
     log = mapped(tmp_path, table, UNITS, mapping)
     assert log.get_pressure("B2").values.max() == pytest.approx(14e5)
-    assert log.warnings == ("channel 'PrsBrk2': read in 'Pa' as mapped, the file says 'bar'",)
+    assert render(log.findings) == (
+        "channel 'PrsBrk2': read in 'Pa' as mapped, the file says 'bar'.",
+    )
 
 
 def drop(name: str) -> Callable[[Table], None]:
@@ -232,7 +235,7 @@ def test_recorded_logs(name: str, samples: int) -> None:
     assert {channel.time.size for channel in log.channels.values()} == {samples}
     assert [role for role, channel in log.channels.items() if channel.held] == ["engine_torque"]
     assert 12e5 < log.get_pressure("B2").values.max() < 16e5
-    assert log.warnings == ()
+    assert log.findings == ()
 
 
 def test_the_remedy_of_a_refusal_is_a_mapping_that_cures_it(tmp_path: Path) -> None:
@@ -291,4 +294,4 @@ def test_a_channel_that_starts_late_is_told_with_its_times(tmp_path: Path) -> No
     path = write(tmp_path, table)
     log = read_log(path, card(tmp_path))
     assert log["output_torque"].time[0] == 0.3
-    assert "channel 'TrqOut': no samples from 0.000 s to 0.300 s" in log.warnings
+    assert "channel 'TrqOut': no samples from 0.000 s to 0.300 s." in render(log.findings)

@@ -58,7 +58,7 @@ def test_a_shift_log_is_the_same_in_every_format(tmp_path: Path, suffix: str) ->
         assert np.array_equal(again[role].time, channel.time)
         assert again[role].values == pytest.approx(channel.values, rel=1e-14)
         assert again[role].held == channel.held
-    assert again.warnings == first.warnings
+    assert again.findings == first.findings
 
 
 @pytest.mark.parametrize("suffix", [*SUFFIXES, ".MF4", ".MAT"])

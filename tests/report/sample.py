@@ -10,6 +10,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import SignalTrace, Validation
+from drivetwin.findings import Code, report
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
@@ -178,7 +179,7 @@ def validation() -> Validation:
         traces=traces,
         fit=fit,
         status="completed",
-        warnings=(),
+        findings=(),
     )
 
 
@@ -205,7 +206,7 @@ def identification() -> Identification:
         },
         inputs={"sample <1>.csv": "ab" * 32},
         settings={"width": 0.4, "grid": (1.0, 0.95), "limit": float("nan")},
-        warnings=("engine torque is constant: 2nd gear hardly excited",),
+        findings=(report(Code.GEAR_POORLY_EXCITED, variation=1.0, gear="2"),),
         assumptions=("P0 of B2 as on the card",),
         correlation_ids=("eta", "J_prime_2"),
         correlation=np.array([[1.0, 0.6], [0.6, 1.0]]),

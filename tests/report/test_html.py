@@ -15,6 +15,7 @@ import pytest
 
 from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
+from drivetwin.findings import render
 from drivetwin.report.html import build_report_sections, render_report, save_report
 from drivetwin.report.sections.blocks import FigureBlock
 from drivetwin.validation.simulate_log import attach_fit
@@ -56,7 +57,7 @@ def test_every_parameter_and_reason_is_shown(page: str, found: Identification) -
     for estimate in found.estimates.values():
         assert estimate.id in markup
         assert estimate.reason in markup
-    for text in (*found.warnings, *found.assumptions, *found.inputs.values()):
+    for text in (*render(found.findings), *found.assumptions, *found.inputs.values()):
         assert text in markup
 
 
@@ -96,7 +97,7 @@ def test_sparse_identification_leaves_sections_out(found: Identification) -> Non
         fit={},
         evidence=StageResults(),
         correlation=None,
-        warnings=(),
+        findings=(),
     )
     titles = [section.anchor for section in build_report_sections(sparse, log())]
     assert "friction" not in titles

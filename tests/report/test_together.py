@@ -40,5 +40,5 @@ def test_a_disagreement_stands_on_the_first_page() -> None:
     made = loaded()
     page = render_joint_report(made.found, made.fitted)
     first = page.partition('<section id="logs"')[0]
-    assert "the logs do not agree on what they share" in first
-    assert "standard deviations off the others" in first
+    assert "The logs do not agree on their shared parameters" in first
+    assert "standard deviations from the others" in first

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import DamagedChannelError
+from drivetwin.findings import render
 from drivetwin.shifts.coverage import (
     AFTER,
     BEFORE,
@@ -89,7 +90,7 @@ def test_gap_of_the_engine_torque_cuts_the_gear_before() -> None:
     cut = trim_to_recorded(log((1.0, 1.2), "engine_torque"), SHIFT, FILLS)
     assert cut.before == pytest.approx((1.2 + YOUNGEST, 2.0), abs=2e-3)
     assert cut.after == SHIFT.after
-    assert "no samples from 0.999 s to 1.201 s" in cut.warnings[0]
+    assert "no samples from 0.999 s to 1.201 s" in render(cut.findings)[0]
     assert trim_to_recorded(log((1.0, 1.2), "engine_torque"), cut, FILLS) is cut
 
 
@@ -114,7 +115,10 @@ def test_input_that_starts_late_or_ends_early_cuts_as_a_gap_does(
 ) -> None:
     late = trim_to_recorded(log((-1.0, 1.0), role), SHIFT, FILLS)
     assert late.before == pytest.approx((1.001 + reach[0], 2.0))
-    assert f"{role!r} has no samples from 0.000 s to 1.001 s: gear 2 counts" in late.warnings[0]
+    assert (
+        f"{role!r} has no samples from 0.000 s to 1.001 s: gear 2 is used"
+        in render(late.findings)[0]
+    )
     early = trim_to_recorded(log((4.0, 9.0), role), SHIFT, FILLS)
     assert early.after == pytest.approx((2.5, 3.999 - reach[1]))
     assert early.before == SHIFT.before
@@ -180,7 +184,7 @@ def with_converter(opened: tuple[float, float]) -> ShiftLog:
 def test_a_gear_counts_while_the_converter_is_closed() -> None:
     cut = trim_to_recorded(with_converter((-1.0, 1.2)), SHIFT, FILLS)
     assert cut.before == pytest.approx((1.2 + LETS_GO, 2.0), abs=0.06)
-    assert "the converter is open" in cut.warnings[-1]
+    assert "the converter is open" in render(cut.findings)[-1]
     cut = trim_to_recorded(with_converter((3.8, 6.0)), SHIFT, FILLS)
     assert cut.after == pytest.approx((2.5, 3.8 - LETS_GO), abs=0.06)
 

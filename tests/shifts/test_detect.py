@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MissingChannelError, TimeError
+from drivetwin.findings import render
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.settings import ShiftSettings
 from drivetwin.shifts.shift import Shift
@@ -127,7 +128,7 @@ def test_phases_join_and_are_named() -> None:
     assert shift.after[1] == pytest.approx(4.0, abs=2e-3)
     assert shift.torque_phase[0] == pytest.approx(1.35, abs=3 * shift.sigma["torque_start"])
     assert shift.sigma["torque_start"] < 0.01
-    assert shift.warnings == ()
+    assert shift.findings == ()
 
 
 @pytest.mark.parametrize(
@@ -171,7 +172,7 @@ def test_engine_and_wheel_speed_stand_in_with_warnings() -> None:
     )
     (shift,), _ = detect_shifts(stand_in, card)
     assert shift.lockup_time == pytest.approx(1.85, abs=2e-3)
-    text = " ".join(shift.warnings)
+    text = " ".join(render(shift.findings))
     assert "engine speed" in text
     assert "wheel speed" in text
     assert "power state" in text
@@ -184,7 +185,7 @@ def test_torque_phase_from_output_torque_without_pressures() -> None:
     delay = 0.015
     assert shift.torque_phase[0] == pytest.approx(1.35 - delay, abs=0.01)
     assert shift.sigma["torque_start"] > delay
-    assert any("output torque" in warning for warning in shift.warnings)
+    assert any("output torque" in warning for warning in render(shift.findings))
 
 
 def test_torque_phase_unknown_is_said_with_a_wide_sigma() -> None:
@@ -192,7 +193,7 @@ def test_torque_phase_unknown_is_said_with_a_wide_sigma() -> None:
     (shift,), _ = detect_shifts(log, _UP.card())
     assert shift.torque_phase[0] == shift.torque_phase[1] == shift.inertia_phase[0]
     assert shift.sigma["torque_start"] >= ShiftSettings().unknown_torque_phase
-    assert any("torque phase set empty" in warning for warning in shift.warnings)
+    assert any("torque phase set empty" in warning for warning in render(shift.findings))
 
 
 def test_oncoming_element_that_takes_hold_after_break_away() -> None:
@@ -202,7 +203,7 @@ def test_oncoming_element_that_takes_hold_after_break_away() -> None:
     channels = {**log.channels, "pressure.B3": replace(late, values=shifted)}
     (shift,), _ = detect_shifts(replace(log, channels=channels), _UP.card())
     assert shift.torque_phase[0] == shift.inertia_phase[0]
-    assert any("after break-away" in warning for warning in shift.warnings)
+    assert any("after break-away" in warning for warning in render(shift.findings))
 
 
 def _pressure_cut(span: tuple[float, float]) -> ShiftLog:
@@ -247,7 +248,9 @@ def test_refused_where_the_open_element_rests_above_P0() -> None:
 
 def test_ratio_off_the_card_is_warned_of() -> None:
     (shift,), _ = detect_shifts(_UP.log(), make_card({"2": 1.92, "3": 1.43}))
-    assert any("gear 2 is 1.91, the card says 1.92" in warning for warning in shift.warnings)
+    assert any(
+        "gear 2 is 1.91, the vehicle card has 1.92" in warning for warning in render(shift.findings)
+    )
 
 
 def test_gap_and_spikes_outside_the_shift_do_no_harm() -> None:

@@ -61,4 +61,4 @@ def test_measured_logs(name: str) -> None:
     ]
     assert at[1] < at[0]
     assert shift.quality["torque_hole_depth"] > 0.2 * at[0]
-    assert shift.warnings == ()
+    assert shift.findings == ()

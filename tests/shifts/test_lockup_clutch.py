@@ -13,12 +13,12 @@ from drivetwin.errors import IdentificationError
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.lockup_clutch import (
     LETS_GO,
+    check_lockup_observed,
     compute_mean_slip,
     detect_lock_ups,
     find_open_spans,
     refer_to_turbine,
     require_locked_converter,
-    warn_unobserved_lockup,
 )
 from drivetwin.simulation.converter_map import Converter
 from tests.shifts.fixtures import Plan, make_card
@@ -195,14 +195,14 @@ def test_a_map_that_ends_short_of_the_shift_is_refused() -> None:
 
 def test_a_converter_that_no_channel_shows_is_told() -> None:
     card = replace(CARD, converter=CONVERTER)
-    assert warn_unobserved_lockup(log(INLET), card) == ()
+    assert check_lockup_observed(log(INLET), card) == ()
     blind = ShiftLog({"input_speed": log(INLET)["input_speed"]}, "made", "")
-    assert warn_unobserved_lockup(blind, CARD) == ()
-    (text,) = warn_unobserved_lockup(blind, card)
-    assert "no engine_speed" in text
+    assert check_lockup_observed(blind, CARD) == ()
+    (one,) = check_lockup_observed(blind, card)
+    assert "no engine_speed" in one.text
     flag = log(INLET, np.ones(TIME.size))["lockup_engaged"]
     assert (
-        warn_unobserved_lockup(
+        check_lockup_observed(
             replace(blind, channels={**blind.channels, "lockup_engaged": flag}), card
         )
         == ()

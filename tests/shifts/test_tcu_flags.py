@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
+from drivetwin.findings import render
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.tcu_flags import find_flag_spans
 from tests.shifts.fixtures import Plan
@@ -53,7 +54,7 @@ def test_agreeing_flags_add_nothing() -> None:
     )
     found = detect_shifts(log, PLAN.card())
     assert found.rejected == ()
-    assert found.shifts[0].warnings == ()
+    assert found.shifts[0].findings == ()
 
 
 def test_contradictions_are_told() -> None:
@@ -61,8 +62,8 @@ def test_contradictions_are_told() -> None:
         PLAN.log(), shift_in_process=flag((2.9, 3.4)), gear=np.where(TIME < 2.0, 4.0, 3.0)
     )
     (shift,), (empty,) = detect_shifts(log, PLAN.card())
-    assert "the shift flag is not set during this shift" in shift.warnings
-    assert any("tells gear 4" in text and "gear 2" in text for text in shift.warnings)
+    assert "Shift flag is not set during this shift." in render(shift.findings)
+    assert any("Gear signal is 4" in text and "gear 2" in text for text in render(shift.findings))
     assert empty.time == pytest.approx((2.9, 3.4))
     assert "no change of gear" in empty.reason
 
@@ -75,7 +76,7 @@ def test_the_flag_bounds_a_torque_phase_that_nothing_else_tells() -> None:
     onset, sigma = shift.torque_phase[0], shift.sigma["torque_start"]
     assert onset == pytest.approx(1.25, abs=0.01)
     assert abs(onset - (1.5 - PLAN.torque_phase)) < 2.0 * sigma
-    assert "shift flag at 1.000 s" in shift.warnings[-1]
+    assert "shift flag at 1.000 s" in render(shift.findings)[-1]
 
 
 def test_a_flag_where_a_speed_is_missing_says_which() -> None:

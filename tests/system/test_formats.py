@@ -13,6 +13,7 @@ from drivetwin.dyno.files import convert_channels, format_card
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
+from drivetwin.findings import render
 from drivetwin.logs.write import write_log
 
 ROUND_OFF = 1e-9
@@ -35,7 +36,7 @@ def test_the_result_does_not_depend_on_the_format(tmp_path: Path) -> None:
     first, *others = results(tmp_path, Method.LIKELIHOOD).values()
     assert first.method is Method.LIKELIHOOD
     for other in others:
-        assert other.warnings == first.warnings
+        assert render(other.findings) == render(first.findings)
         assert [s.quality for s in other.shifts] == [
             pytest.approx(s.quality, rel=ROUND_OFF, abs=ROUND_OFF) for s in first.shifts
         ]

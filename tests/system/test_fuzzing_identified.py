@@ -11,6 +11,7 @@ import pytest
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.method import Method
+from drivetwin.findings import render
 from tests.fuzz.identified import Base, base, identified, parted, reports_damage, written
 from tests.fuzz.tables import DAMAGING, HARMLESS
 
@@ -60,4 +61,4 @@ def test_a_late_output_torque_is_told(others: tuple[str, ...], sound: Base, tmp_
         values = table.columns[name]
         table = table.with_column(name, np.concatenate([np.full(4, values[0]), values[:-4]]))
     found = identified(written(table, tmp_path), sound.card, Method.INTEGRAL)
-    assert any("TrqOut" in text and "time_shift_s" in text for text in found.warnings)
+    assert any("TrqOut" in text and "time_shift_s" in text for text in render(found.findings))

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import MappingError, MissingChannelError
+from drivetwin.findings import Code
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.shifts.lockup_clutch import detect_lock_ups
@@ -138,7 +139,7 @@ def test_a_shift_that_is_not_all_there_is_refused(
 def test_without_an_input_speed_the_engine_speed_stands_in(tmp_path: Path) -> None:
     found = found_in([one.blank(ETC1, 5, 7) for one in recorded()], tmp_path)
     assert [(s.start_gear, s.end_gear) for s in found.shifts] == [p[:2] for p in PHASES]
-    assert "input speed taken from the engine speed" in found.shifts[0].warnings[0]
+    assert found.shifts[0].findings[0].code is Code.INPUT_SPEED_SUBSTITUTED
 
 
 def test_no_gearbox_speeds_no_shifts(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.validation import HeldOut, Outcome
+from drivetwin.findings import render
 from drivetwin.validation.cross_validation import predict_held_shifts
 from tests.estimation.asked import by_the_paper
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario, source, together
@@ -64,7 +65,7 @@ def test_what_cannot_be_predicted_says_why() -> None:
     (one,) = predict_held_shifts(together().found, card(), blind, log.shifts.shifts, 3)
     assert one.outcome is Outcome.NOT_PREDICTED
     assert one.validation is None
-    assert "engine_torque" in one.notes[0]
+    assert "engine_torque" in render(one.findings)[0]
     assert one.name == "blind.csv, shift 2→3"
 
 
@@ -75,7 +76,7 @@ def test_another_method_predicts_its_own_log_without_a_judgement() -> None:
     assert known.outcome is Outcome.NOT_JUDGED
     (foreign,) = predict_held_shifts(found, card(), log.log, log.shifts.shifts, 1)
     assert foreign.outcome is Outcome.NOT_PREDICTED
-    assert "likelihood" in foreign.notes[0]
+    assert "likelihood" in render(foreign.findings)[0]
 
 
 def test_a_law_of_another_element_is_said_and_not_judged() -> None:
@@ -89,4 +90,4 @@ def test_a_law_of_another_element_is_said_and_not_judged() -> None:
     found = replace(found, friction={"B9": law}, evidence=evidence)
     (one,) = predict_held_shifts(found, card(), log.log, log.shifts.shifts, 1)
     assert one.outcome is Outcome.NOT_JUDGED
-    assert "friction law of B9 stands in for it" in one.notes[0]
+    assert "friction law of B9 is used instead" in render(one.findings)[0]

@@ -15,6 +15,7 @@ from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
+from drivetwin.findings import render
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
@@ -135,7 +136,7 @@ def _curve(clutch: dict[str, float]) -> FrictionCurve:
 def test_true_parameters_follow_the_reference(twin: Twin, log: ShiftLog, shift: Shift) -> None:
     result = simulate_shift(twin, log, shift)
     assert result.status == "completed"
-    assert result.warnings == ()
+    assert result.findings == ()
     for signal, phases in result.fit.items():
         for phase, fit in phases.items():
             assert fit.fit_percent > 99.0, (signal, phase)
@@ -163,7 +164,7 @@ def test_late_engine_torque_is_moved_back(twin: Twin, log: ShiftLog, shift: Shif
 
 def test_leaving_the_validity_range_warns(twin: Twin, log: ShiftLog, shift: Shift) -> None:
     narrow = replace(twin, validity={"slip": (0.0, 20.0), "speed": (0.0, 300.0)})
-    (warning,) = simulate_shift(narrow, log, shift).warnings
+    (warning,) = render(simulate_shift(narrow, log, shift).findings)
     assert "range of slip" in warning
 
 
@@ -178,7 +179,7 @@ def test_the_slip_of_an_open_element_leaves_no_range(
     assert (slip[shift.offgoing] == open_speed).any()
     covered = replace(twin, validity={"slip": (0.0, seen)})
     before = simulate_shift(covered, log, shift)
-    assert replace_run(before, covered, log, replace(run, slip=slip)).warnings == ()
+    assert render(replace_run(before, covered, log, replace(run, slip=slip)).findings) == ()
 
 
 def test_the_log_behind_a_twin_leaves_no_range_of_it(
@@ -186,16 +187,16 @@ def test_the_log_behind_a_twin_leaves_no_range_of_it(
 ) -> None:
     narrow = replace(twin, validity={"slip": (0.0, 20.0)})
     one = simulate_shift(narrow, log, shift)
-    assert one.warnings
-    assert attach_fit(identification(), [one]).warnings == identification().warnings
+    assert render(one.findings)
+    assert render(attach_fit(identification(), [one]).findings) == render(identification().findings)
     failed = replace(one, trajectory=replace(one.trajectory, status="events too dense"))
-    assert "ended early" in attach_fit(identification(), [failed]).warnings[-1]
+    assert "ended early" in render(attach_fit(identification(), [failed]).findings)[-1]
     speed = one.traces["input_speed"]
     astray = {**one.traces, "input_speed": replace(speed, simulated=2.0 * speed.simulated)}
-    told = attach_fit(identification(), [replace(one, traces=astray)]).warnings
+    told = render(attach_fit(identification(), [replace(one, traces=astray)]).findings)
     shift = one.shift
     name = f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s"
-    assert told[-1].startswith(f"{name}: the simulated input speed goes from")
+    assert told[-1].startswith(f"{name}: Simulated input speed ranges from")
 
 
 def test_start_state_keeps_the_gear_and_the_measured_twist(
@@ -240,7 +241,7 @@ def test_a_torque_that_stopped_before_the_shift_is_named(
         simulate_shift(twin, stopped, shift)
     told = attach_validation(replace(identification(), shifts=(shift,)), twin, stopped)
     assert told.fit == {}
-    assert "no validation: 'T_o_Nm'" in told.warnings[-1]
+    assert "No validation: 'T_o_Nm'" in render(told.findings)[-1]
 
 
 def test_fit_percent_is_measured_against_the_mean_of_the_whole_log() -> None:
@@ -267,6 +268,6 @@ def test_incomplete_model_leaves_a_warning_and_no_fit(
     found = replace(identification(), shifts=(shift,))
     incomplete = attach_validation(found, replace(twin, parameters=told), log)
     assert incomplete.fit == {}
-    assert "no validation" in incomplete.warnings[-1]
-    assert "k_o" in incomplete.warnings[-1]
+    assert "No validation" in render(incomplete.findings)[-1]
+    assert "k_o" in render(incomplete.findings)[-1]
     assert attach_validation(found, twin, log).fit["output_torque"]["all"].fit_percent > 99.8

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.errors import InputError
+from drivetwin.findings import render
 from drivetwin.workbench.phases import (
     Boundary,
     get_boundary_times,
@@ -32,7 +33,7 @@ def test_a_moved_boundary_moves_both_phases_it_parts(identified: Session) -> Non
     assert "inertia_start" not in fresh.sigma
     assert fresh.sigma["lockup"] == shift.sigma["lockup"]
     assert fresh.quality["torque_phase_time"] == pytest.approx(time - shift.torque_phase[0])
-    assert any("set by hand" in text for text in fresh.warnings)
+    assert any("set by hand" in text for text in render(fresh.findings))
 
 
 def test_lock_up_moves_the_end_of_the_inertia_phase(identified: Session) -> None:

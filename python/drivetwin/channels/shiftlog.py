@@ -16,6 +16,7 @@ from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.update_raster import find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
+from drivetwin.findings import Finding
 from drivetwin.simulation.dual_clutch import LATEST
 
 FloatArray = NDArray[np.float64]
@@ -146,7 +147,7 @@ class ShiftLog(DisplayMixin):
     channels: Mapping[str, Channel]
     source: str
     sha256: str
-    warnings: tuple[str, ...] = field(default=())
+    findings: tuple[Finding, ...] = ()
     mappings: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -14,6 +14,7 @@ from drivetwin.cli.arguments import ChannelsFile, VehicleFile
 from drivetwin.cli.atomic_outputs import refuse_same_names
 from drivetwin.cli.output import (
     JsonFlag,
+    print_findings,
     print_json,
     print_line,
     print_paragraph,
@@ -167,8 +168,4 @@ def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) 
         print_table(build_suggestion_table(suggestions, found.estimates))
     if found.fit:
         print_table(build_fit_table(found.fit, "Simulation over measurement"))
-    for shift in found.shifts:
-        for text in (each for each in shift.warnings if each not in found.warnings):
-            print_paragraph(f"{shift.start_gear}→{shift.end_gear}: {text}")
-    for warning in found.warnings:
-        print_paragraph(f"warning: {warning}")
+    print_findings(found.findings)

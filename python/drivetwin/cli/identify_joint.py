@@ -113,8 +113,8 @@ def print_joint(found: Identification) -> None:
     if held:
         print_table(_build_holdout_table(held, found))
     for one in held:
-        for text in one.notes:
-            print_paragraph(f"{one.name}: {text}")
+        for finding in one.findings:
+            print_paragraph(f"{one.name}: {finding.text}")
 
 
 def _build_log_table(several: Several) -> Table:

@@ -12,6 +12,7 @@ from drivetwin.cli.arguments import ChannelsFile, LogFile
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
+    print_findings,
     print_json,
     print_line,
     print_paragraph,
@@ -20,6 +21,7 @@ from drivetwin.cli.output import (
     to_error_document,
 )
 from drivetwin.errors import DrivetwinError
+from drivetwin.findings import Finding
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -51,6 +53,7 @@ def inspect(
     from drivetwin._util.atomic import write_text
     from drivetwin.channels.mapping import Mapped
     from drivetwin.channels.mapping_file import format_mapping, read_mapping
+    from drivetwin.files.records import dump_findings
     from drivetwin.logs.formats.detect import open_recording
     from drivetwin.logs.survey import survey_recording
     from drivetwin.vehicle.card import load_card
@@ -59,12 +62,13 @@ def inspect(
     stated = Mapped({}) if channels is None else read_mapping(channels)
     with show_step(f"reading {log.name}"), open_recording(log, stated.options) as recording:
         found = survey_recording(recording, str(log), card, stated)
-        warnings, refusal = _read_as_mapped_log(recording, log, card, stated)
+        findings, refusal = _read_as_mapped_log(recording, log, card, stated)
     if write_mapping is not None:
         write_text(write_mapping, format_mapping(found.mapping, found.options, found.unitless))
     if as_json:
         error = None if refusal is None else to_error_document(refusal)["error"]
-        print_json({**found.to_document(), "warnings": warnings, "refusal": error})
+        remarks = {"findings": dump_findings(findings), "refusal": error}
+        print_json(found.to_document() | remarks)
         return
     print_table(_build_table([column.to_document() for column in found.columns], log.name))
     for text in found.notes:
@@ -73,9 +77,7 @@ def inspect(
         print_paragraph(
             f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping"
         )
-    for text in warnings:
-        if text not in found.notes:
-            print_paragraph(f"warning: {text}")
+    print_findings(one for one in findings if one.names.get("text") not in found.notes)
     if refusal is not None:
         print_paragraph(f"shifts and identify refuse this log: {refusal}")
     if write_mapping is not None:
@@ -84,12 +86,12 @@ def inspect(
 
 def _read_as_mapped_log(
     recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped
-) -> tuple[tuple[str, ...], DrivetwinError | None]:
-    """Read a log as for use, missing roles allowed; return the warnings or the error."""
+) -> tuple[tuple[Finding, ...], DrivetwinError | None]:
+    """Read a log as for use, missing roles allowed; return the findings or the error."""
     from drivetwin.logs.read import read_recording
 
     try:
-        return read_recording(recording, log, card, stated, needed=()).warnings, None
+        return read_recording(recording, log, card, stated, needed=()).findings, None
     except DrivetwinError as fault:
         return (), fault
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from drivetwin.errors import DrivetwinError
+from drivetwin.findings import Finding
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -104,6 +105,12 @@ def show_step(text: str) -> Iterator[None]:
         live.add_task("", total=None, clock=clock)
         with attach_listener(clock.update):
             yield
+
+
+def print_findings(findings: Iterable[Finding]) -> None:
+    """Print findings with their severity, each on its own line."""
+    for one in findings:
+        print_paragraph(f"{one.severity}: {one.text}")
 
 
 def show_error(error: DrivetwinError, *, as_json: bool) -> None:

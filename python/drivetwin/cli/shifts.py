@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivetwin._util.display_units import format_uncertainty
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load_inputs
-from drivetwin.cli.output import JsonFlag, print_json, print_paragraph, print_table, show_step
+from drivetwin.cli.output import (
+    JsonFlag,
+    print_findings,
+    print_json,
+    print_paragraph,
+    print_table,
+    show_step,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -32,6 +39,7 @@ def shifts(
     inertia over η in each gear held, where the log carries them.
     """
     from drivetwin.cli.tables import build_shift_table
+    from drivetwin.files.records import dump_findings
     from drivetwin.shifts.detect import detect_shifts, find_gear_spans
     from drivetwin.shifts.lockup_clutch import detect_lock_ups
 
@@ -41,7 +49,8 @@ def shifts(
     closings = detect_lock_ups(recording, card)
     seen = _estimate_from_speeds(recording, card, found.shifts)
     if as_json:
-        print_json(_to_document(found, closings, seen) | {"warnings": recording.warnings})
+        remarks = {"findings": dump_findings(recording.findings)}
+        print_json(_to_document(found, closings, seen) | remarks)
         return
     if found.shifts:
         print_table(build_shift_table(found.shifts, log.name))
@@ -49,8 +58,7 @@ def shifts(
         held = ", ".join(dict.fromkeys(gear for gear, _ in find_gear_spans(recording, card)))
         print_paragraph(f"no gear shift; gear held: {held or 'none'}")
     _print_details(found, closings, seen)
-    for warning in recording.warnings:
-        print_paragraph(f"warning: {warning}")
+    print_findings(recording.findings)
 
 
 class _SpeedResults(NamedTuple):
@@ -112,8 +120,7 @@ def _print_details(found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedR
     for shift, swing in seen.swings:
         print_paragraph(f"{_format_name(shift)}: {_describe_resonance(swing)}")
     for shift in found.shifts:
-        for warning in shift.warnings:
-            print_paragraph(f"{_format_name(shift)}: {warning}")
+        print_findings(one.set_subject(_format_name(shift)) for one in shift.findings)
     for candidate in found.rejected:
         start, end = candidate.time
         print_paragraph(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}")

@@ -12,9 +12,9 @@ import typer
 from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
 from drivetwin.cli.output import (
     JsonFlag,
+    print_findings,
     print_json,
     print_line,
-    print_paragraph,
     print_table,
     show_step,
 )
@@ -92,8 +92,7 @@ def simulate(
                 run.fit, f"Shift {run.shift.start_gear}→{run.shift.end_gear}: {run.status}"
             )
         )
-        for warning in run.warnings:
-            print_paragraph(f"warning: {warning}")
+        print_findings(run.findings)
     if output is not None:
         print_line(f"wrote {output}")
 
@@ -116,6 +115,8 @@ def _apply_parameters(twin: Twin, parameters: Path) -> Twin:
 
 
 def _to_document(run: Validation) -> dict[str, object]:
+    from drivetwin.files.records import dump_findings
+
     return {
         "from": run.shift.start_gear,
         "to": run.shift.end_gear,
@@ -124,7 +125,7 @@ def _to_document(run: Validation) -> dict[str, object]:
             signal: {phase: vars(fit) for phase, fit in phases.items()}
             for signal, phases in run.fit.items()
         },
-        "warnings": list(run.warnings),
+        "findings": dump_findings(run.findings),
     }
 
 

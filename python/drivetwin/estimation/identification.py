@@ -16,6 +16,7 @@ from drivetwin.estimation.result.estimate import (
     SignalFit,
 )
 from drivetwin.estimation.result.method import Method
+from drivetwin.findings import Finding
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 
@@ -41,7 +42,7 @@ class Identification(DisplayMixin):
     """File name -> SHA-256 of every input."""
     settings: dict[str, Any]
     evidence: StageResults = field(default_factory=StageResults)
-    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     assumptions: tuple[str, ...] = ()
     correlation_ids: tuple[str, ...] = ()
     correlation: FloatArray | None = None

@@ -24,10 +24,11 @@ from drivetwin.estimation.paper.pipeline import (
     identify_paper_shift,
 )
 from drivetwin.estimation.result.estimate import FloatArray
-from drivetwin.estimation.result.estimate_set import EstimateSet
+from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
-from drivetwin.estimation.result.verdict import reject_identified
+from drivetwin.estimation.result.verdict import apply_errors
+from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.shifts.coverage import AFTER, BEFORE
 
@@ -35,14 +36,6 @@ BEHIND_CONVERTER = (
     "the converter is open in the shifts: what drives the gearbox is its turbine, by the map on "
     "the card from the speeds of engine and input; J′ is without the engine"
 )
-MAP_EXACT = (
-    "the converter's map counts as exact: η is off by as much as its torques are; state their "
-    "tolerance as gain_tolerance under [sensors.engine_torque] of the card"
-)
-GAVE_UP = (
-    "of the integral method: no simulation with such parameters follows the log within its noise"
-)
-"""Why a value is not identified where the likelihood method has found no plausible minimum."""
 ALL_BEFORE_LOSS = (
     "all of J′ but Jo′ turns before the loss of the gears: an input side of the gearbox J2e makes "
     "J′ wrong by up to J2e·(1/η² - 1) where the log both drives and overruns"
@@ -72,7 +65,14 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         found, evidence = _estimate_torqueless_log(log, method)
     shifts, design = tuple(s.shift for s in log.signals), log.design
     estimates, gains = check_efficiency_limit(found.estimates, design.loss_law)
-    told = (*gains, *_check_card(found, log, method), *log.notes)
+    findings = (
+        *log.findings,
+        *_report_unfitted(log),
+        *collect_shift_findings(log.signals),
+        *found.findings,
+        *gains,
+        *_check_card(found, log, method),
+    )
     return Identification(
         estimates=estimates,
         friction=found.friction,
@@ -85,7 +85,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         inputs=dict(log.inputs),
         settings=_collect_settings(design, method),
         evidence=replace(evidence, signals=log.signals, loads=found.loads),
-        warnings=(*log.warnings, *_describe_unfitted(log), *found.warnings, *told),
+        findings=findings,
         assumptions=(
             *((BEHIND_CONVERTER,) if log.turbine_driven else ()),
             *_collect_assumptions(design, method, found),
@@ -97,26 +97,21 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
     )
 
 
-def _check_card(found: EstimateSet, log: PreparedLog, method: Method) -> tuple[str, ...]:
-    """Warn of a converter map that counts as exact and of inertias outside their design ranges.
+def _check_card(found: EstimateSet, log: PreparedLog, method: Method) -> tuple[Finding, ...]:
+    """Report a converter map that counts as exact and of inertias outside their design ranges.
 
     The paper's method doubts each value by itself; behind a converter J′ is without the engine.
     """
     is_exact = log.turbine_driven and "engine_torque" not in log.design.sensors
-    exact = (MAP_EXACT,) if is_exact else ()
+    exact = (report(Code.CONVERTER_MAP_EXACT),) if is_exact else ()
     elsewhere = method is Method.PAPER or log.turbine_driven
     return exact if elsewhere else (*exact, *check_design_ranges(found.estimates, log.design))
 
 
-def _describe_unfitted(log: PreparedLog) -> list[str]:
+def _report_unfitted(log: PreparedLog) -> list[Finding]:
     """Count the detected shifts that take no part in the fit."""
-    count = len(log.candidates) - len(log.shifts)
-    if count == 0:
-        return []
-    return [
-        f"{count} of {len(log.candidates)} shifts are not fitted: report and `rejected` of the "
-        "result say why"
-    ]
+    count, total = len(log.candidates) - len(log.shifts), len(log.candidates)
+    return [report(Code.SHIFTS_NOT_FITTED, count=count, total=total)] if count else []
 
 
 _Stage = tuple[EstimateSet, Method, StageResults]
@@ -153,13 +148,14 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
         with scale_progress(0.9 if likely else 0.5, 0.95, "tolerances of the sensors"):
             found = add_tolerances(integral, log.signals, log.drivelines, log.design)
     if gave_up:
-        text = f"likelihood: {gave_up}; the values are those of the integral method"
-        estimates = {name: reject_identified(one, GAVE_UP) for name, one in found.estimates.items()}
-        found = replace(found, estimates=estimates, warnings=(text, *found.warnings))
+        failed = report(Code.LIKELIHOOD_FAILED, why=gave_up)
+        estimates = apply_errors(found.estimates, [failed])
+        found = replace(found, estimates=estimates, findings=(failed, *found.findings))
     try:
         evidence = replace(evidence, paper=_identify_paper_shifts(log))
     except IdentificationError as error:
-        found = replace(found, warnings=(*found.warnings, f"paper's method: {error.what}"))
+        failed = report(Code.PAPER_METHOD_FAILED, why=error.what)
+        found = replace(found, findings=(*found.findings, failed))
     return found, method, evidence
 
 
@@ -174,8 +170,8 @@ def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) ->
             found, fit = estimate_without_linear(log.signals, log.drivelines, log.design)
     except IdentificationError:
         raise refusal from None
-    text = f"linear method: {refusal.what}; the likelihood started without it"
-    found = replace(found, warnings=(text, *found.warnings))
+    failed = report(Code.LINEAR_METHOD_FAILED, why=refusal.what)
+    found = replace(found, findings=(failed, *found.findings))
     return found, Method.LIKELIHOOD, StageResults(likelihood=fit)
 
 

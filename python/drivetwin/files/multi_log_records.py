@@ -10,7 +10,7 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from drivetwin.estimation.result.multi_log import LogShare
 from drivetwin.estimation.result.validation import HeldOut, Outcome
-from drivetwin.files.records import FitRecord, ParameterRecord, Record
+from drivetwin.files.records import FindingRecord, FitRecord, ParameterRecord, Record
 
 
 class MoveRecord(Record):
@@ -77,7 +77,7 @@ class HeldOutRecord(Record):
     fit: dict[str, dict[str, FitRecord]]
     expected: dict[str, ExpectedRecord]
     own: dict[str, ParameterRecord]
-    notes: list[str]
+    findings: list[FindingRecord]
 
     @model_validator(mode="before")
     @classmethod
@@ -99,5 +99,5 @@ class HeldOutRecord(Record):
                 for name in fit
             },
             "own": source.own,
-            "notes": source.notes,
+            "findings": source.findings,
         }

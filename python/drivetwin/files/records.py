@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 
 from drivetwin._util.plain_values import convert_nonfinite
+from drivetwin.errors import Where
 from drivetwin.estimation.result.estimate import (
     OF_RATIO,
     Estimate,
@@ -19,6 +21,7 @@ from drivetwin.estimation.result.estimate import (
     Verdict,
 )
 from drivetwin.estimation.result.suggestion import Experiment, ExperimentRanking
+from drivetwin.findings import Code, Finding, Number, Severity
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
 
@@ -170,6 +173,50 @@ class FitRecord(Record):
 
     rmse: OptionalFloat
     fit_percent: OptionalFloat
+
+
+class NumberRecord(Record):
+    """A number of a finding in its SI unit, with the half width of its interval."""
+
+    value: OptionalFloat
+    unit: str
+    half_width: OptionalFloat = None
+
+
+class PlaceRecord(Record):
+    """Place of a finding; `time` in s on the log's clock."""
+
+    file: str | None = None
+    channel: str | None = None
+    time: OptionalFloat = None
+    key: str | None = None
+
+
+class FindingRecord(Record):
+    """A finding: its `text` follows from code, subject, place, numbers and names."""
+
+    code: Code
+    severity: Severity
+    subject: str
+    place: PlaceRecord
+    numbers: dict[str, NumberRecord]
+    names: dict[str, str]
+    remedy: str
+    text: str
+
+    def to_finding(self) -> Finding:
+        """Back to the finding."""
+        numbers = {
+            key: Number(math.nan if one.value is None else one.value, one.unit, one.half_width)
+            for key, one in self.numbers.items()
+        }
+        place = Where(**self.place.model_dump())
+        return Finding(self.code, self.subject, place, numbers, self.names)
+
+
+def dump_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """Return findings as JSON values."""
+    return [FindingRecord.from_result(one).model_dump(mode="json") for one in findings]
 
 
 SchemaName = Annotated[str, Field(alias="schema")]

@@ -17,6 +17,7 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.files.multi_log_records import HeldOutRecord, SeveralRecord
 from drivetwin.files.read import read_record
 from drivetwin.files.records import (
+    FindingRecord,
     FitRecord,
     FrictionRecord,
     Interval,
@@ -29,7 +30,7 @@ from drivetwin.files.records import (
 )
 from drivetwin.vehicle.shift_kind import ShiftKind
 
-RESULT_SCHEMA = "drivetwin/result-3"
+RESULT_SCHEMA = "drivetwin/result-4"
 
 
 class ShiftRecord(Record):
@@ -47,7 +48,7 @@ class ShiftRecord(Record):
     lockup_time: FiniteFloat
     sigma: dict[str, OptionalFloat]
     quality: dict[str, OptionalFloat]
-    warnings: list[str]
+    findings: list[FindingRecord]
 
 
 class RejectedRecord(Record):
@@ -77,7 +78,7 @@ class ResultFile(Record):
     several: SeveralRecord | None = None
     held_out: list[HeldOutRecord] = Field(default_factory=list)
     suggestions: list[SuggestionRecord] = Field(default_factory=list)
-    warnings: list[str]
+    findings: list[FindingRecord]
     assumptions: list[str]
 
     @model_validator(mode="before")
@@ -105,7 +106,7 @@ class ResultFile(Record):
 
 _SAME_NAME = (
     *("method", "loss_law", "friction", "load", "shifts", "rejected", "fit", "validity", "inputs"),
-    *("warnings", "assumptions"),
+    *("findings", "assumptions"),
 )
 """Fields that an identification has under the same name."""
 

@@ -162,7 +162,7 @@ def make_result_rows(found: Identification, card: VehicleCard, mu_slip: float) -
             for number, shift in enumerate(found.shifts)
             for name, value in shift.quality.items()
         ),
-        *(Row(RowKind.WARNING, "", reason=text) for text in found.warnings),
+        *(Row(RowKind.WARNING, one.code.value, reason=one.text) for one in found.findings),
     ]
 
 

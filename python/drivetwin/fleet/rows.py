@@ -29,7 +29,7 @@ class RowKind(StrEnum):
     FIELD = "field"
     """Mean of a channel that the rules made a field."""
     WARNING = "warning"
-    """Empty; the text is the `reason`."""
+    """Code of a finding, empty for other remarks; the text is the `reason`."""
 
 
 @dataclass(frozen=True)

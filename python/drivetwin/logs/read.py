@@ -16,6 +16,7 @@ from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, get_quantity
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.channels.units import find_unit, list_first_spellings, resolve_channel_unit
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, UnitError, Where
+from drivetwin.findings import Code, report
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.quality.channel_checks import Checked, check_channel
 from drivetwin.logs.quality.consistency_checks import (
@@ -48,7 +49,7 @@ def read_log(
     last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
     `card` no column is a pressure, and nothing is compared with the gearing.
 
-    Damaged samples are left out and listed in `warnings`; so is a damaged pedal, gear or flag
+    Damaged samples are left out and listed in `findings`; so is a damaged pedal, gear or flag
     channel that is not `needed`. Nothing is replaced. Raises FileFormatError, MissingExtraError,
     MissingChannelError, MappingError, UnitError, TimeError, DamagedChannelError,
     PlausibilityError; each contains a remedy.
@@ -104,7 +105,8 @@ def read_recording(
     if not stated.options.time.simultaneous:
         channels, late = mark_late_samples(channels)
         warnings += late
-    return ShiftLog(channels, str(path), _compute_digest(path), tuple(dict.fromkeys(warnings)))
+    findings = tuple(report(Code.RECORDING, text=text) for text in dict.fromkeys(warnings))
+    return ShiftLog(channels, str(path), _compute_digest(path), findings)
 
 
 def _refuse_unitless(

@@ -49,7 +49,7 @@ def simulate_observed(
         {role: c for role, c in log.channels.items() if role != "output_torque"},
         log.source,
         log.sha256,
-        log.warnings,
+        log.findings,
     )
     base = simulate_shift(twin, quiet, shift)
     if base.status != "completed":

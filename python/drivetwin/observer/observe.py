@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.findings import render
 from drivetwin.observer.ensemble import simulate_observed
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.result import Observation
@@ -37,5 +38,5 @@ def estimate_torques(
     fills = {one.name: PriorValue(one.P0) for one in twin.build_dual_clutch(shift).elements}
     whole = trim_to_window(trim_to_recorded(log, shift, fills, twin.i_in), (FAR, FAR))
     found = (smooth if by is Observer.SMOOTHER else simulate_observed)(twin, log, whole)
-    cuts = whole.warnings[len(shift.warnings) :]
+    cuts = render(whole.findings[len(shift.findings) :])
     return replace(found, notes=(*cuts, *found.notes))

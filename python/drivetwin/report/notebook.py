@@ -16,6 +16,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
 from drivetwin.estimation.result.validation import Validation
+from drivetwin.findings import render
 from drivetwin.report.figures.comparison import plot_friction_overlay
 from drivetwin.report.figures.parameters import plot_intervals
 from drivetwin.report.figures.recording import QUANTITIES, plot_log
@@ -135,7 +136,7 @@ def _(log: ShiftLog) -> Summary:
         rate = format_significant(1.0 / one.step, 3)
         rows.append((role, one.source_name, rate, low, high, display.label))
     head = ("role", "channel", "Hz", "from", "to", "unit")
-    return Summary(log.source, [Table(head, rows, frozenset({2, 3, 4}))], log.warnings)
+    return Summary(log.source, [Table(head, rows, frozenset({2, 3, 4}))], render(log.findings))
 
 
 @summarise.register
@@ -146,7 +147,7 @@ def _(found: Identification) -> Summary:
         [_build_parameter_table(found.estimates.values()), *_build_fit_tables(found.fit)],
         [
             *_collect_reasons(found.estimates.values()),
-            *(f"warning: {text}" for text in found.warnings),
+            *(f"{one.severity}: {one.text}" for one in found.findings),
         ],
     )
 
@@ -166,7 +167,7 @@ def _(validation: Validation) -> Summary:
     return Summary(
         f"Shift {shift.start_gear}→{shift.end_gear} simulated: {validation.status}",
         list(_build_fit_tables(validation.fit)),
-        validation.warnings,
+        render(validation.findings),
     )
 
 

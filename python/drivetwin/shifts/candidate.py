@@ -10,6 +10,7 @@ import numpy as np
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.channels.units import BAR
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.breakaway_lockup import Boundary, locate_break_away, locate_lock_up
 from drivetwin.shifts.gear_runs import Run
 from drivetwin.shifts.kinematics import FloatArray, GearboxSpeeds
@@ -77,7 +78,7 @@ def build_shift(search: Search, before: Run, after: Run) -> Shift:
     )
     _check_passage(search, begin, lock)
     span = _compute_usable_span(search, before, after)
-    kind, warnings = classify_shift(
+    kind, findings = classify_shift(
         search.log, search.ratios[start_gear] > search.ratios[end_gear], begin.time
     )
     step = search.ratios[end_gear] / search.ratios[start_gear]
@@ -100,7 +101,7 @@ def build_shift(search: Search, before: Run, after: Run) -> Shift:
         after=(lock.time, span[1]),
         lockup_time=lock.time,
         sigma={"torque_start": onset.sigma, "inertia_start": begin.sigma, "lockup": lock.sigma},
-        warnings=(*speeds.warnings, *warnings, *more, *_check_ratios(search, before, after)),
+        findings=(*speeds.findings, *findings, *more, *_check_ratios(search, before, after)),
     )
 
 
@@ -163,10 +164,10 @@ def _locate_torque_start(
     passage: tuple[ShiftKind, tuple[str, str], float],
     earliest: float,
     phase: tuple[Boundary, Boundary],
-) -> tuple[Boundary, tuple[str, ...]]:
+) -> tuple[Boundary, tuple[Finding, ...]]:
     """Onset of the on-coming element's torque in a `passage` (kind, elements, ratios' step).
 
-    The warnings report an implausible onset, and an onset not derived from the pressure.
+    The findings report an implausible onset, and an onset not derived from the pressure.
 
     Where the on-coming element takes hold only after break-away (power-off upshift, power-on
     downshift) the torque phase before it is empty and starts at break-away.
@@ -174,8 +175,8 @@ def _locate_torque_start(
     kind, (offgoing, oncoming), step = passage
     begin = phase[0]
     if is_shared_pressure(search.log, offgoing, oncoming):
-        reason = f"one clutch is {offgoing} and {oncoming} in turn: the torque phase is empty"
-        return begin, (reason,)
+        code = Code.TORQUE_PHASE_SHARED_CLUTCH
+        return begin, (report(code, offgoing=offgoing, oncoming=oncoming),)
     earliest = max(earliest, begin.time - search.settings.max_torque_phase)
     if make_pressure_role(oncoming) in search.log:
         return _locate_pressure_start(search, (offgoing, oncoming), earliest, phase)
@@ -183,18 +184,15 @@ def _locate_torque_start(
         torque = smooth_channel(search.log["output_torque"], (earliest, begin.time))
         dip = locate_torque_dip(torque, begin.time, step)
         if dip is not None:
-            return dip, (f"no pressure of {oncoming}: torque phase read from the output torque",)
+            return dip, (report(Code.TORQUE_PHASE_FROM_TORQUE, element=oncoming),)
     flag = find_flag_start(search.log, begin.time, begin.time - earliest)
     if flag is not None and kind is ShiftKind.POWER_ON_UP:
         half = 0.5 * (begin.time - flag)
-        reason = (
-            f"no channel tells when {oncoming} takes up torque: somewhere between the shift flag "
-            f"at {flag:.3f} s and break-away, of which the middle is given"
-        )
-        return Boundary(flag + half, half / float(np.sqrt(3.0))), (reason,)
+        boundary = Boundary(flag + half, half / float(np.sqrt(3.0)))
+        finding = report(Code.TORQUE_PHASE_FROM_FLAG, element=oncoming, flag=Number(flag, "s"))
+        return boundary, (finding,)
     sigma = float(np.hypot(begin.sigma, search.settings.unknown_torque_phase))
-    reason = f"no channel tells when {oncoming} takes up torque: torque phase set empty"
-    return Boundary(begin.time, sigma), (reason,)
+    return Boundary(begin.time, sigma), (report(Code.TORQUE_PHASE_UNKNOWN, element=oncoming),)
 
 
 def _locate_pressure_start(
@@ -202,7 +200,7 @@ def _locate_pressure_start(
     elements: tuple[str, str],
     earliest: float,
     phase: tuple[Boundary, Boundary],
-) -> tuple[Boundary, tuple[str, ...]]:
+) -> tuple[Boundary, tuple[Finding, ...]]:
     """Locate the torque start by the on-coming pressure; refuse a missing or contradictory one."""
     offgoing, oncoming = elements
     begin, lock = phase
@@ -229,8 +227,8 @@ def _locate_pressure_start(
         )
     if onset is not None and onset.time <= begin.time:
         return onset, ()
-    when = "never" if onset is None else f"at {onset.time:.3f} s, after break-away"
-    return begin, (f"{oncoming} exceeds P0 {when}: the torque phase is empty",)
+    when = "nowhere" if onset is None else f"at {onset.time:.3f} s, after break-away"
+    return begin, (report(Code.TORQUE_PHASE_EMPTY, element=oncoming, when=when),)
 
 
 def _check_rise_samples(pressure: Channel, oncoming: str, span: tuple[float, float]) -> None:
@@ -247,14 +245,13 @@ def _check_rise_samples(pressure: Channel, oncoming: str, span: tuple[float, flo
             )
 
 
-def _check_ratios(search: Search, *runs: Run) -> tuple[str, ...]:
-    """Return a warning if a measured ratio differs from the card (rounded ratio, scaled speed)."""
-    texts = []
+def _check_ratios(search: Search, *runs: Run) -> tuple[Finding, ...]:
+    """Return a finding if a measured ratio differs from the card (rounded ratio, scaled speed)."""
+    findings = []
     for run in runs:
         gear = run.gear or ""
         ratio = float(np.median(compute_ratio(search.speeds, run.first, run.last)))
         if abs(ratio / search.ratios[gear] - 1.0) > _RATIO_DRIFT:
-            texts.append(
-                f"ratio held in gear {gear} is {ratio:.5g}, the card says {search.ratios[gear]:.5g}"
-            )
-    return tuple(texts)
+            card = search.ratios[gear]
+            findings.append(report(Code.RATIO_DEVIATES, gear=gear, ratio=ratio, card=card))
+    return tuple(findings)

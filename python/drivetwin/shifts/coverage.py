@@ -19,6 +19,7 @@ import numpy as np
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.errors import DamagedChannelError, Where
+from drivetwin.findings import Code, report
 from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, find_open_spans
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
@@ -86,7 +87,7 @@ def trim_to_recorded(
     """Return `shift` with `before` and `after` cut to what its inputs were recorded for.
 
     `fills` is P0 [Pa] of both elements by name, `i_in` the ratio of the input gear. A cut is
-    reported in the warnings of the shift. Raises DamagedChannelError where a gap lies in the shift
+    reported in the findings of the shift. Raises DamagedChannelError where a gap lies in the shift
     itself or leaves less than LEAST of a gear.
     """
     gaps = _find_gaps(log, shift, fills)
@@ -103,17 +104,16 @@ def trim_to_recorded(
         last = max(earlier, key=lambda gap: gap.reach[1])
         if start - last.reach[1] < LEAST:
             raise _make_gap_error(log, last, f"less than {LEAST:g} s before the shift")
-        text = f"{last}: gear {shift.start_gear} counts from there on"
-        shift = replace(shift, before=(last.reach[1], start), warnings=(*shift.warnings, text))
+        cut = report(Code.BEFORE_CUT, gap=str(last), gear=shift.start_gear)
+        shift = replace(shift, before=(last.reach[1], start), findings=(*shift.findings, cut))
     later = [gap for gap in gaps if end <= gap.reach[0] < shift.after[1]]
     if later:
         first = min(later, key=lambda gap: gap.reach[0])
         if first.reach[0] - end < LEAST:
             raise _make_gap_error(log, first, f"less than {LEAST:g} s after the shift")
-        text = f"{first}: gear {shift.end_gear} counts up to there"
-        shift = replace(
-            shift, after=(shift.after[0], first.reach[0]), warnings=(*shift.warnings, text)
-        )
+        cut = report(Code.AFTER_CUT, gap=str(first), gear=shift.end_gear)
+        after = (shift.after[0], first.reach[0])
+        shift = replace(shift, after=after, findings=(*shift.findings, cut))
     return shift
 
 

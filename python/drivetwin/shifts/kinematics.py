@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, TimeError, Where
+from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.quality.outliers import detect_quantization
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -30,7 +31,7 @@ class GearboxSpeeds:
     time: FloatArray
     input: FloatArray
     output: FloatArray
-    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     stairs: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -68,15 +69,15 @@ def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
 
     Without an input speed the engine speed over i_in stands in (exact with lock-up engaged);
     without an output speed the wheel speed times the final drive, which differs by the twist rate
-    of the shaft. Both substitutions are listed in `warnings`. Raises MissingChannelError, and
+    of the shaft. Both substitutions are listed in `findings`. Raises MissingChannelError, and
     TimeError if the two speeds share no time.
     """
-    warnings: list[str] = []
+    findings: list[Finding] = []
     if "input_speed" in log:
         source, scale = log["input_speed"], 1.0
     elif "engine_speed" in log:
         source, scale = log["engine_speed"], 1.0 / card.i_in
-        warnings.append("input speed taken from the engine speed: right with lock-up engaged only")
+        findings.append(report(Code.INPUT_SPEED_SUBSTITUTED))
     else:
         raise _describe_substitute("input_speed", "engine_speed", log)
     inlet = _select_finite(source)
@@ -84,7 +85,7 @@ def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
         sink, factor = log["output_speed"], 1.0
     elif "wheel_speed" in log:
         sink, factor = log["wheel_speed"], card.final_drive
-        warnings.append("output speed taken from the wheel speed: shaft twist adds to the slip")
+        findings.append(report(Code.OUTPUT_SPEED_SUBSTITUTED))
     else:
         raise _describe_substitute("output_speed", "wheel_speed", log)
     slow = _select_finite(sink)
@@ -102,7 +103,7 @@ def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
         inlet.time[known],
         scale * inlet.values[known],
         factor * outlet[known],
-        tuple(warnings),
+        tuple(findings),
         (scale * detect_quantization(inlet.values), factor * detect_quantization(slow.values)),
     )
 

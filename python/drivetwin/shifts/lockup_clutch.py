@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from drivetwin._util.signal_processing import compute_moving_mean, find_true_runs
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError, Where
+from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.kinematics import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.tcu_flags import find_flag_spans
@@ -79,16 +80,12 @@ def compute_converter_slip(log: ShiftLog, card: VehicleCard, shift: Shift) -> fl
     return slip if slip is not None and abs(slip) > CLOSED else None
 
 
-def warn_unobserved_lockup(log: ShiftLog, card: VehicleCard) -> tuple[str, ...]:
-    """Return a warning if the card has a converter and no channel indicates whether it is open."""
+def check_lockup_observed(log: ShiftLog, card: VehicleCard) -> tuple[Finding, ...]:
+    """Return a finding if the card has a converter and no channel indicates whether it is open."""
     lacks = [role for role in ("engine_speed", "input_speed") if role not in log]
     if card.converter is None or not lacks or "lockup_engaged" in log:
         return ()
-    return (
-        f"nothing tells whether the converter is open, for the log has no {lacks[0]}: it counts as "
-        f"closed, and values are wrong where it is not; map `{lacks[0]}`, or the lock-up flag as "
-        "`lockup_engaged`",
-    )
+    return (report(Code.LOCKUP_UNKNOWN, channel=lacks[0]),)
 
 
 def refer_to_turbine(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.findings import Code, Finding, report
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 
@@ -33,7 +34,7 @@ class Shift:
     lockup_time: float
     sigma: dict[str, float] = field(default_factory=dict)
     quality: dict[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,14 +53,16 @@ _PEDAL = 0.05
 """Least accelerator position that counts as power on."""
 
 
-def classify_shift(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKind, tuple[str, ...]]:
-    """Kind of the shift, and a warning if no channel indicates the power state.
+def classify_shift(
+    log: ShiftLog, up: bool, break_away: float
+) -> tuple[ShiftKind, tuple[Finding, ...]]:
+    """Kind of the shift, and a finding if no channel indicates the power state.
 
     Power is on where the mean engine torque in the last 0.3 s before break-away [s] is positive;
     in its absence the output torque's sign or the accelerator (above 5 %) decides.
     """
     limits = {"engine_torque": 0.0, "output_torque": 0.0, "throttle": _PEDAL}
-    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     for role, limit in limits.items():
         if role in log:
             mean = _compute_mean(log, role, break_away)
@@ -68,8 +71,8 @@ def classify_shift(log: ShiftLog, up: bool, break_away: float) -> tuple[ShiftKin
                 break
     else:
         power_on = True
-        warnings = ("no torque or pedal channel tells the power state: taken as power on",)
-    return ShiftKind.from_direction(up=up, power_on=power_on), warnings
+        findings = (report(Code.POWER_STATE_UNKNOWN),)
+    return ShiftKind.from_direction(up=up, power_on=power_on), findings
 
 
 def _compute_mean(log: ShiftLog, role: str, end: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 Span = tuple[float, float]
@@ -48,8 +49,8 @@ def find_flag_start(log: ShiftLog, time: float, reach: float) -> float | None:
 def check_flags(
     log: ShiftLog, shifts: Sequence[Shift], rejected: Sequence[RejectedShift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
-    """The shifts with a warning where flag or gear contradict them, and flags without a shift."""
-    told = tuple(replace(s, warnings=(*s.warnings, *_find_contradictions(log, s))) for s in shifts)
+    """The shifts with a finding where flag or gear contradict them, and flags without a shift."""
+    told = tuple(replace(s, findings=(*s.findings, *_find_contradictions(log, s))) for s in shifts)
     if "shift_in_process" not in log:
         return told, tuple(rejected)
     seen = [(s.torque_phase[0], s.lockup_time) for s in shifts] + [r.time for r in rejected]
@@ -77,13 +78,13 @@ def _explain_missing_shift(log: ShiftLog, flag: Channel, span: Span) -> str:
     return "the shift flag is set, but the speeds show no change of gear"
 
 
-def _find_contradictions(log: ShiftLog, shift: Shift) -> list[str]:
-    texts = []
+def _find_contradictions(log: ShiftLog, shift: Shift) -> list[Finding]:
+    findings = []
     if "shift_in_process" in log:
         spans = find_flag_spans(log["shift_in_process"])
         start, end = shift.inertia_phase
         if not any(low <= start + _LATE and high >= end - _LATE for low, high in spans):
-            texts.append("the shift flag is not set during this shift")
+            findings.append(report(Code.SHIFT_FLAG_NOT_SET))
     if "gear" in log:
         gear = log["gear"]
         moments = (
@@ -93,7 +94,6 @@ def _find_contradictions(log: ShiftLog, shift: Shift) -> list[str]:
         for name, time in moments:
             value = float(gear.interpolate(np.array([time]))[0])
             if name.isdecimal() and np.isfinite(value) and value != float(name):
-                texts.append(
-                    f"the bus tells gear {value:g} at {time:.2f} s, the speeds show gear {name}"
-                )
-    return texts
+                shown = {"value": Number(value), "time": Number(time, "s")}
+                findings.append(report(Code.GEAR_SIGNAL_DIFFERS, gear=name, **shown))
+    return findings

@@ -11,7 +11,7 @@ from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
-from drivetwin.estimation.result.verdict import KNOWN, from_prior
+from drivetwin.estimation.result.verdict import from_prior
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
     parameters = dict(found.estimates)
     assumptions = list(found.assumptions)
     if "J_out" not in parameters and card.J_out is not None:
-        parameters["J_out"] = from_prior("J_out", card.J_out, KNOWN)
+        parameters["J_out"] = from_prior("J_out", card.J_out)
         assumptions.append("Jo′ is the vehicle card's value")
     assumptions += list_borrowed_friction(found)
     friction, load = _scale_absolute(found)

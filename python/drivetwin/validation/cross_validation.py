@@ -16,6 +16,7 @@ from drivetwin.estimation.multi_log.prediction_bounds import ShiftPrediction, pr
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.validation import HeldOut, PredictionInterval, Validation
 from drivetwin.estimation.result.verdict import assess
+from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine, require_locked_converter
@@ -54,14 +55,16 @@ def _predict_shift(
         shift = trim_to_window(trim_to_recorded(log, shift, fills, card.i_in))
         told = _predict_misfit(fit, card, log, shift, number)
         mine, own = _select_log_estimates(found, log, number, told)
-        mine, notes = _ensure_friction_law(mine, shift)
+        mine, findings = _ensure_friction_law(mine, shift)
         twin = build_twin(mine, card)
         start = None if told is None else (told.time, told.start)
         run = simulate_shift(twin, log, shift, start=start)
     except DrivetwinError as fault:
-        return HeldOut(log.source, shift, None, notes=(fault.what,))
+        return HeldOut(
+            log.source, shift, None, findings=(report(Code.NOT_PREDICTED, why=fault.what),)
+        )
     bounds = {} if told is None else _map_signal_bounds(told.bounds, run, log, card)
-    return HeldOut(log.source, shift, run, own, bounds, (*notes, *run.warnings))
+    return HeldOut(log.source, shift, run, own, bounds, (*findings, *run.findings))
 
 
 def _predict_misfit(
@@ -137,7 +140,7 @@ def _map_signal_bounds(
 
 def _ensure_friction_law(
     found: Identification, shift: Shift
-) -> tuple[Identification, tuple[str, ...]]:
+) -> tuple[Identification, tuple[Finding, ...]]:
     """The identification with a law for the on-coming element, and whose it is if another's.
 
     That of the off-going element if it has one, else that of any other: facings are alike.
@@ -146,8 +149,5 @@ def _ensure_friction_law(
         return found, ()
     other = shift.offgoing if shift.offgoing in found.friction else next(iter(found.friction))
     friction = {**found.friction, shift.oncoming: found.friction[other]}
-    note = (
-        f"{shift.oncoming} comes on in no shift that was fitted: the friction law of {other} "
-        "stands in for it, which may be off by more than the prediction shows"
-    )
-    return replace(found, friction=friction), (note,)
+    finding = report(Code.FRICTION_LAW_SUBSTITUTED, element=shift.oncoming, other=other)
+    return replace(found, friction=friction), (finding,)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
@@ -121,7 +122,7 @@ def _attach_simulations(
         return attach_validation(found, twin, logs[0]), {logs[0].source: twin}
     twins, views = {}, []
     for share, log in zip(several.logs, logs, strict=True):
-        mine = extract_log(replace(found, warnings=()), share)
+        mine = extract_log(replace(found, findings=()), share)
         twins[log.source] = build_twin(mine, card)
         views.append(attach_validation(mine, twins[log.source], log))
     shares = tuple(
@@ -129,12 +130,12 @@ def _attach_simulations(
     )
     runs = [run for view in views for run in view.evidence.validation]
     missing = [
-        f"log {share.number}: {text}"
+        one.set_file(Path(share.source).name)
         for share, view in zip(several.logs, views, strict=True)
         if not view.fit
-        for text in view.warnings
+        for one in view.findings
     ]
-    found = attach_fit(replace(found, warnings=(*found.warnings, *missing)), runs)
+    found = attach_fit(replace(found, findings=(*found.findings, *missing)), runs)
     evidence = replace(found.evidence, several=replace(several, logs=shares))
     return replace(found, evidence=evidence), twins
 

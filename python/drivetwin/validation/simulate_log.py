@@ -15,6 +15,7 @@ from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, SignalFit
 from drivetwin.estimation.result.validation import SignalTrace, Validation
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.pressures import get_shift_pressures
@@ -99,9 +100,9 @@ def _simulate_window(
         traces=traces,
         fit={name: _compute_phase_fits(trace, phases) for name, trace in traces.items()},
         status=trajectory.status,
-        warnings=(),
+        findings=(),
     )
-    return replace(validation, warnings=_collect_warnings(twin, validation))
+    return replace(validation, findings=_check_run(twin, validation))
 
 
 def replace_run(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> Validation:
@@ -114,23 +115,23 @@ def replace_run(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) 
         fit={name: _compute_phase_fits(trace, before.phases) for name, trace in traces.items()},
         status=run.status,
     )
-    return replace(made, warnings=_collect_warnings(twin, made))
+    return replace(made, findings=_check_run(twin, made))
 
 
 def attach_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
     """Identification with the fits of its validations entered: pooled over the shifts.
 
-    Of their warnings count runs that ended early and those that left the speeds of their own log:
+    Of their findings count runs that ended early and those that left the speeds of their own log:
     all other ranges are those of these logs.
     """
     if not validations:
         return found
-    warnings = tuple(text for one in validations for text in _describe_divergence(one))
+    findings = tuple(each for one in validations for each in _check_divergence(one))
     return replace(
         found,
         fit=_compute_pooled_fit(validations),
         evidence=replace(found.evidence, validation=tuple(validations)),
-        warnings=found.warnings + warnings,
+        findings=found.findings + findings,
     )
 
 
@@ -138,12 +139,13 @@ def attach_validation(found: Identification, twin: Twin, log: ShiftLog) -> Ident
     """Simulate all shifts of an identification and attach the comparison with the log.
 
     If the simulation lacks a parameter, or a compared channel does not cover a shift, the fit stays
-    empty and a warning names the cause; the estimates are unchanged. Raises MissingChannelError.
+    empty and a finding names the cause; the estimates are unchanged. Raises MissingChannelError.
     """
     try:
         return attach_fit(found, list(_simulate_shifts(twin, log, found)))
     except (MissingParameterError, DamagedChannelError) as incomplete:
-        return replace(found, warnings=(*found.warnings, f"no validation: {incomplete.what}"))
+        failed = report(Code.NOT_VALIDATED, why=incomplete.what)
+        return replace(found, findings=(*found.findings, failed))
 
 
 def _simulate_shifts(twin: Twin, log: ShiftLog, found: Identification) -> Iterator[Validation]:
@@ -279,10 +281,10 @@ def _clip_trace(
     return trace.measured[inside], trace.simulated[inside]
 
 
-def _collect_warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
-    """Collect warnings for a failed run and for signals outside the range of the twin's log."""
+def _check_run(twin: Twin, validation: Validation) -> tuple[Finding, ...]:
+    """Return findings on a failed run and for signals outside the range of the twin's log."""
     run = validation.trajectory
-    texts = _describe_early_end(run)
+    findings = _check_end(run)
     seen = {
         "slip": _collect_loaded_slip(run),
         "pressure": [signal.values for signal in validation.pressures.values()],
@@ -291,31 +293,36 @@ def _collect_warnings(twin: Twin, validation: Validation) -> tuple[str, ...]:
     }
     for name, arrays in seen.items():
         if name in twin.validity:
-            texts += _describe_outside(name, arrays, twin.validity[name])
-    return tuple(texts)
+            findings += _check_range(name, arrays, twin.validity[name])
+    return tuple(findings)
 
 
-def _describe_early_end(run: Trajectory) -> list[str]:
+def _check_end(run: Trajectory) -> list[Finding]:
     if run.status == "completed":
         return []
-    return [f"simulation of the validation ended early: {run.status}"]
+    return [report(Code.SIMULATION_ENDED_EARLY, status=run.status)]
 
 
-def _describe_divergence(one: Validation) -> list[str]:
-    """Words for a run of the log behind a twin that goes where that log does not."""
-    texts, speed = _describe_early_end(one.trajectory), one.traces.get("input_speed")
+def _check_divergence(one: Validation) -> list[Finding]:
+    """Return findings on a run that leaves the speeds of its own log."""
+    findings, speed = _check_end(one.trajectory), one.traces.get("input_speed")
     if speed is None or not np.isfinite(speed.measured).any():
-        return texts
+        return findings
     limits = (float(np.nanmin(speed.measured)), float(np.nanmax(speed.measured)))
     if (reached := _find_range_excess([speed.simulated], limits)) is None:
-        return texts
+        return findings
     shift = one.shift
-    return [
-        *texts,
-        f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s: the simulated "
-        f"input speed goes from {reached[0]:.4g} to {reached[1]:.4g} rad/s, the measured one from "
-        f"{limits[0]:.4g} to {limits[1]:.4g}",
-    ]
+    label = f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s"
+    ends = _name_ends(reached, limits, "rad/s")
+    return [*findings, report(Code.SIMULATION_DIVERGES, label, **ends)]
+
+
+def _name_ends(
+    reached: tuple[float, float], limits: tuple[float, float], unit: str
+) -> dict[str, Number]:
+    """Return the ends of the range reached by a run and of its limits, for a finding."""
+    names = ("low", "high", "limit_low", "limit_high")
+    return {n: Number(x, unit) for n, x in zip(names, (*reached, *limits), strict=True)}
 
 
 def _collect_loaded_slip(run: Trajectory) -> list[FloatArray]:
@@ -325,19 +332,15 @@ def _collect_loaded_slip(run: Trajectory) -> list[FloatArray]:
     return [np.abs(slip[torques[name] > least]) for name, slip in run.slip.items()]
 
 
-_RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N·m", "speed": "rad/s"}
+_RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N*m", "speed": "rad/s"}
 """Units of what a twin has a range of."""
 
 
-def _describe_outside(
-    name: str, arrays: list[FloatArray], limits: tuple[float, float]
-) -> list[str]:
+def _check_range(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -> list[Finding]:
     if (reached := _find_range_excess(arrays, limits)) is None:
         return []
-    return [
-        f"the simulation leaves the twin's range of {name}: {reached[0]:.4g} to {reached[1]:.4g}, "
-        f"identified for {limits[0]:.4g} to {limits[1]:.4g} {_RANGES[name]}"
-    ]
+    ends = _name_ends(reached, limits, _RANGES[name])
+    return [report(Code.OUTSIDE_IDENTIFIED_RANGE, name, **ends)]
 
 
 def _find_range_excess(

@@ -12,6 +12,7 @@ import plotly.graph_objects as go
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
+from drivetwin.findings import Code, report
 from drivetwin.report.figures.shift_phases import plot_shift_phases
 from drivetwin.report.style import ACCENT, MUTED
 from drivetwin.shifts.quality import compute_shift_quality
@@ -20,7 +21,6 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 
 LEAST_PHASE = 5e-3
 """Shortest phase [s] that can be set by hand; only the torque phase may be empty."""
-BY_HAND = "set by hand"
 _DECIMALS = 4
 """Decimals of a time [s] in its field: finer than the uncertainty of a boundary."""
 
@@ -91,7 +91,7 @@ def move_boundaries(
     _check_times(log, times)
     start, torque, inertia, lockup, end = (times[one] for one in Boundary)
     names = ", ".join(LABELS[one] for one in Boundary if one in changed)
-    warnings = [text for text in shift.warnings if not text.endswith(BY_HAND)]
+    kept = [one for one in shift.findings if one.code is not Code.SET_BY_HAND]
     fresh = replace(
         shift,
         before=(start, torque),
@@ -100,7 +100,7 @@ def move_boundaries(
         after=(lockup, end),
         lockup_time=lockup,
         sigma={key: value for key, value in shift.sigma.items() if Boundary(key) not in changed},
-        warnings=(*warnings, f"boundary {names}: {BY_HAND}"),
+        findings=(*kept, report(Code.SET_BY_HAND, boundaries=names)),
     )
     return replace(fresh, quality=compute_shift_quality(log, card, fresh))
 

@@ -20,6 +20,7 @@ from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.method import Method
+from drivetwin.findings import render
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
@@ -116,7 +117,7 @@ def test_the_samples_beside_a_gap_are_not_joined() -> None:
 def test_a_cut_is_told_and_the_validation_keeps_to_it() -> None:
     (shift,) = identified(without("engine_torque", STEP), Method.INTEGRAL).shifts
     assert shift.before[0] > STEP[1]
-    assert any("no samples from" in text for text in shift.warnings)
+    assert any("no samples from" in text for text in render(shift.findings))
 
 
 def test_a_gap_in_the_shift_refuses_the_only_one() -> None:

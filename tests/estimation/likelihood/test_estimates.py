@@ -12,6 +12,7 @@ from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.linear.multi_shift import apply_sensor_error
 from drivetwin.estimation.result.estimate import Estimate, Verdict
+from drivetwin.findings import Code
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 from tests.support.bench import Knowledge
@@ -71,11 +72,12 @@ def test_a_design_value_that_the_log_contradicts_is_told_with_what_rests_on_it()
     fit = fit_local(posed, start)
     assert fit is not None
     told = build_estimates(fit, [made.signals], [wrong], {}, {})
-    (text,) = [one for one in told.warnings if one.startswith("J_out: the vehicle card says")]
-    assert f"{2.0 * truth:.4g}" in text
+    (one,) = [each for each in told.findings if each.code is Code.CARD_CONTRADICTED]
+    assert one.subject == "J_out"
+    assert one.numbers["card"].value == pytest.approx(2.0 * truth)
     assert told.estimates["J_out"].verdict is Verdict.WEAK
-    assert "without the card's J_out" in told.estimates["k_o"].reason
+    assert "Without the design value of J_out" in told.estimates["k_o"].reason
     assert told.estimates["k_o"].verdict is Verdict.WEAK
     assert told.estimates["Tv_over_if"].verdict is Verdict.IDENTIFIED
     sound = build_estimates(fitted(), [made.signals], [made.driveline], {}, {})
-    assert not [one for one in sound.warnings if "the vehicle card says" in one]
+    assert Code.CARD_CONTRADICTED not in [one.code for one in sound.findings]

@@ -13,6 +13,7 @@ from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.likelihood.pipeline import DISAGREE, estimate_likelihood
 from drivetwin.estimation.linear.estimates import assess_shifts
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
+from drivetwin.findings import Code
 from drivetwin.simulation.dual_clutch import RoadLoad
 from tests.support.bench import Bench, Knowledge, record_bench
 
@@ -30,13 +31,13 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
     linear = assess_shifts(shifts, signals, drivelines, {})
     told, _ = estimate_likelihood(signals, drivelines, (linear, shifts), DESIGN)
     assert told.load is not None
-    assert sum("grows with the square of the speed" in text for text in told.warnings) == 1
+    assert [one.code for one in told.findings].count(Code.LOAD_GROWS) == 1
     linear_J, J = linear.estimates["J_vehicle"], told.estimates["J_vehicle"]
     assert linear_J.value is not None
     assert linear_J.std_noise is not None
     assert J.value is not None
     assert abs(linear_J.value - J.value) > DISAGREE * linear_J.std_noise
-    assert not any("the linear method" in text for text in told.warnings)
+    assert Code.METHODS_DIFFER not in [one.code for one in told.findings]
 
 
 @pytest.mark.parametrize("factor", [1.0, 1e3, -1.0])

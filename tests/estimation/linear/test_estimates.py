@@ -12,22 +12,23 @@ from drivetwin.estimation.linear.estimates import MISFIT, assess_shifts
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
-    collect_low_gear_notes,
+    check_excitation,
     collect_shift_labels,
 )
+from drivetwin.findings import render
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.asked import stepped, still
 
 
 def test_a_gear_with_still_torque_is_named() -> None:
-    notes = collect_low_gear_notes(still().evidence.signals)
+    notes = check_excitation(still().evidence.signals)
     assert set(notes) == {"eta", "J_prime_2", "J_prime_3"}
-    assert "gear 2 alone" in notes["eta"]
+    assert notes["eta"].names["gear"] == "2"
 
 
 def test_another_shift_from_that_gear_with_steps_tells_it() -> None:
     both = (*still().evidence.signals, *stepped().evidence.signals)
-    assert collect_low_gear_notes(both) == {}
+    assert check_excitation(both) == {}
 
 
 def test_the_same_shift_twice_is_told_apart_by_its_lock_up() -> None:
@@ -53,21 +54,23 @@ def _with_J_out(value: float, known: PriorValue | None, sensors: float = 0.0) ->
 def test_where_the_linear_fit_gives_the_impossible_the_card_stands() -> None:
     told = _with_J_out(-0.2, PriorValue(0.9, 0.09)).estimates["J_out"]
     assert (told.value, told.std_noise, told.verdict) == (0.9, 0.09, Verdict.DESIGN)
-    assert "−0.200 kg·m², which is impossible" in told.reason
+    assert "−0.200 kg·m², which is physically impossible" in told.reason
 
 
 def test_a_value_far_off_the_cards_is_no_design_value_however_wide() -> None:
     told = _with_J_out(29.9, PriorValue(1.35, 0.01))
     assert told.estimates["J_out"].verdict is Verdict.WEAK
     assert "contradicts" in told.estimates["J_out"].reason
-    assert any(text.startswith("J_out: the vehicle card says 1.35") for text in told.warnings)
+    assert any(
+        text.startswith("J_out: the vehicle card has 1.35") for text in render(told.findings)
+    )
 
 
 def test_sensors_that_tell_less_than_the_card_leave_its_value_alone() -> None:
     card = PriorValue(1.35, 0.1)
     told = _with_J_out(1.4, card, sensors=0.3).estimates["J_out"]
     assert (told.value, told.std_total, told.verdict) == (1.35, 0.1, Verdict.DESIGN)
-    assert "sensors' tolerances" in told.reason
+    assert "sensor tolerances" in told.reason
     assert _with_J_out(1.4, card, sensors=0.05).estimates["J_out"].value == 1.4
 
 
@@ -101,13 +104,13 @@ def test_what_many_shifts_have_in_common_is_told_once(count: int, named: str) ->
         load = replace(shift.load, fit=fit, speed_trend=10.0 + i)
         shifts.append(replace(shift, load=load))
         every.append(replace(signals, shift=replace(signals.shift, lockup_time=10.0 + i)))
-    told = assess_shifts(shifts, every, [driveline] * count, {}).warnings
-    noisy = [text for text in told if "times the noise power" in text]
+    told = render(assess_shifts(shifts, every, [driveline] * count, {}).findings)
+    noisy = [text for text in told if "Residual power" in text]
     trends = [text for text in told if "changes with speed" in text]
     power, trend = ("2.0", "10.0") if count == 1 else ("2.0 to 5.0", "10.0 to 13.0")
     assert len(noisy) == len(trends) == 1
-    assert noisy[0].startswith(f"{named}: the load leaves {power} times")
-    assert trends[0].startswith(f"{named}: the load torque changes with speed (t = {trend})")
+    assert noisy[0].startswith(f"{named}: Residual power of the load is {power} times")
+    assert trends[0].startswith(f"{named}: Load torque changes with speed (t = {trend})")
 
 
 def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:

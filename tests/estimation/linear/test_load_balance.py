@@ -17,6 +17,7 @@ from drivetwin.estimation.linear.load_balance import (
     select_load_spans,
 )
 from drivetwin.estimation.linear.pipeline import identify_shift
+from drivetwin.findings import Code
 from tests.estimation.synthetic import Run, Truth
 
 AERO = 30.0
@@ -69,4 +70,4 @@ def test_the_conclusions_have_the_law_and_an_inertia_that_holds(signals: ShiftSi
     assert J.std_noise is not None
     assert abs(J.value - Truth().J_vehicle) < 4.0 * J.std_noise
     assert "aero" not in told.correlation_ids
-    assert any("grows with the square of the speed" in text for text in told.warnings)
+    assert Code.LOAD_GROWS in [one.code for one in told.findings]

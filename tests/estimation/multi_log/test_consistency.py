@@ -17,6 +17,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import compute_variance_inflation
 from drivetwin.estimation.multi_log.consistency import LogScore, compute_homogeneity, find_shared
 from drivetwin.estimation.result.multi_log import Consistency
+from drivetwin.findings import Code
 from tests.estimation.multi_log.fixtures import loaded, together
 
 DRAWS = 1000
@@ -88,7 +89,7 @@ def test_a_payload_is_named_with_its_log_and_sign() -> None:
     assert first.parameter == "J_vehicle"
     assert (first.z > 0.0) == (first.log == 2)
     assert "J_vehicle" in tested.text
-    assert any("do not agree" in text for text in loaded().found.warnings)
+    assert Code.LOGS_DISAGREE in [one.code for one in loaded().found.findings]
 
 
 def test_friction_is_among_what_is_compared() -> None:

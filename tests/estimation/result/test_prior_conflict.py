@@ -20,7 +20,8 @@ from drivetwin.estimation.result.prior_conflict import (
     find_contradictions,
 )
 from drivetwin.estimation.result.prior_update import CONTRADICTS, remove_prior
-from drivetwin.estimation.result.verdict import ADDS_LITTLE, assess, from_prior
+from drivetwin.estimation.result.verdict import assess, from_prior
+from drivetwin.findings import Code, render
 from drivetwin.vehicle.spec import PriorValue
 
 IDS = ("J_out", "J_prime_2", "Tv_over_if")
@@ -60,8 +61,8 @@ def test_a_contradiction_is_the_distance_from_what_the_log_alone_tells(
         assert (one.log.value, one.log.std) == pytest.approx((LOG[0], STD), rel=1e-6)
         assert list(one.without) == list(IDS)
         assert list(one.without.values()) == pytest.approx(LOG, rel=1e-9)
-        assert f"says {format_with_unit(design.value, 'kg*m^2', design.std)}" in one.text
-        assert "1.2" in one.text
+        assert f"has {format_with_unit(design.value, 'kg*m^2', design.std)}" in one.finding.text
+        assert "1.2" in one.finding.text
 
 
 def test_sensors_that_may_be_off_explain_as_much() -> None:
@@ -76,7 +77,7 @@ def test_an_estimate_that_is_off_the_card_although_it_is_as_wide_is_told() -> No
     assert remove_prior(values, covariance, 0, design) is None
     (found,) = find_contradictions(("J_out",), values, covariance, {"J_out": design}, {})
     assert found.apart == pytest.approx((29.9 - 1.35) / 0.135)
-    estimates = {"J_out": from_prior("J_out", PriorValue(29.9, 0.2), ADDS_LITTLE)}
+    estimates = {"J_out": from_prior("J_out", PriorValue(29.9, 0.2), Code.CARD_DOMINATES)}
     told = apply_contradictions(estimates, [found], "integral")["J_out"]
     assert (told.verdict, told.value, told.method) == (Verdict.WEAK, 29.9, "integral")
     assert "contradicts" in told.reason
@@ -113,7 +114,8 @@ def test_an_inertia_whose_interval_lies_outside_the_design_range_is_told(
     design = DesignData("paper", 5.0, (3.0, 9.0), (1000.0, 2000.0))
     estimate = Estimate("J_prime_2", value, std, Verdict.IDENTIFIED, "likelihood")
     ratio = replace(estimate, id="J_prime_2_over_eta")
-    texts = check_design_ranges({"J_prime_2": estimate, "J_prime_2_over_eta": ratio}, design)
+    found = check_design_ranges({"J_prime_2": estimate, "J_prime_2_over_eta": ratio}, design)
+    texts = render(found)
     assert len(texts) == int(told)
     for text in texts:
         assert f"J_prime_2 = {value:#.4g} kg·m²" in text
@@ -126,10 +128,11 @@ def test_an_inertia_whose_interval_lies_outside_the_design_range_is_told(
 @pytest.mark.parametrize(("eta", "std", "told"), [(1.06, 2e-4, True), (1.01, 0.01, False)])
 def test_an_efficiency_above_one_is_not_identified(eta: float, std: float, told: bool) -> None:
     estimates = {"eta": Estimate("eta", eta, std, Verdict.IDENTIFIED, "likelihood")}
-    found, texts = check_efficiency_limit(estimates, "dissipative")
+    found, findings = check_efficiency_limit(estimates, "dissipative")
     assert found["eta"].verdict is (Verdict.WEAK if told else Verdict.IDENTIFIED)
-    assert [("1.06" in text, "overrun" in text) for text in texts] == [(True, False)] * told
-    assert ["overrun" in text for text in check_efficiency_limit(estimates, "paper")[1]] == [
-        True
+    assert [("1.06" in text, "overrun" in text) for text in render(findings)] == [
+        (True, False)
     ] * told
+    by_paper = check_efficiency_limit(estimates, "paper")[1]
+    assert ["overrun" in one.remedy for one in by_paper] == [True] * told
     assert check_efficiency_limit({}, "paper") == ({}, ())

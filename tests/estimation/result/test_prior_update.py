@@ -39,7 +39,7 @@ def test_a_prior_weighs_by_its_precision(value: float, std: float) -> None:
 def test_what_the_log_contradicts_is_told() -> None:
     _, _, warnings = add_priors(IDS, VALUES, COVARIANCE, {"eta": PriorValue(0.8)})
     assert len(warnings) == 1
-    assert "eta" in warnings[0]
+    assert warnings[0].subject == "eta"
     _, _, warnings = add_priors(IDS, VALUES, COVARIANCE, {"eta": PriorValue(0.9035)})
     assert len(warnings) == 1
 

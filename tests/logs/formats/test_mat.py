@@ -236,7 +236,7 @@ def test_a_recorded_log_without_torque_sensor() -> None:
     assert log["engine_torque"].step == pytest.approx(0.02)
     assert log.get_pressure("B3").values.max() == pytest.approx(12.23e5, rel=1e-3)
     assert log["input_speed"].values[0] == pytest.approx(1432.657 * np.pi / 30.0, rel=1e-6)
-    assert log.warnings == ()
+    assert log.findings == ()
 
 
 def test_a_matrix_of_time_and_values_is_a_signal(tmp_path: Path) -> None:

@@ -238,7 +238,7 @@ def test_a_recorded_log_with_german_names_and_three_time_bases() -> None:
         log["output_speed"].values[0] * 1.91, rel=5e-3
     )
     # Its torque is rounded to 12.5 N·m and rests for half a second, as its noise lets it.
-    assert log.warnings == ()
+    assert log.findings == ()
 
 
 LINEAR: dict[str, object] = {"a": 0.125, "b": 10.0}

@@ -13,6 +13,7 @@ import pytest
 from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import PlausibilityError, TimeError
+from drivetwin.findings import render
 from drivetwin.logs.quality.consistency_checks import (
     check_common_span,
     check_coverage,
@@ -162,6 +163,6 @@ def test_a_final_drive_that_is_not_the_cards_is_told(tmp_path: Path) -> None:
 def test_reading_a_log_tells_the_final_drive(tmp_path: Path) -> None:
     path = write(tmp_path)
     off = card(tmp_path, CARD.replace("final_drive = 5.0", "final_drive = 5.15"))
-    assert any("final_drive = 5.15" in one for one in read_log(path, off).warnings)
+    assert any("final_drive = 5.15" in one for one in render(read_log(path, off).findings))
     fits = read_log(path, card(tmp_path))
-    assert not any("final_drive" in one for one in fits.warnings)
+    assert not any("final_drive" in one for one in render(fits.findings))

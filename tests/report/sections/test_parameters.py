@@ -103,7 +103,7 @@ def test_the_question_is_answered_with_what_stands_against_it() -> None:
     sound = {
         name: one for name, one in found.estimates.items() if one.verdict is Verdict.IDENTIFIED
     }
-    clean = replace(found, estimates=sound, warnings=())
+    clean = replace(found, estimates=sound, findings=())
     assert build_parameters_section(clean).intro.startswith(
         "Yes, within the range that the log covered."
     )
@@ -116,7 +116,7 @@ def test_a_phase_that_the_simulation_misses_stands_against_a_good_fit_of_the_who
     whole = SignalFit(rmse=1.0, fit_percent=92.7)
     missed = {"all": whole, "before": whole, "inertia": SignalFit(3.7, 60.1)}
     still = {"all": whole, "before": SignalFit(1.1, 55.0), "inertia": whole}
-    told = replace(found, fit={"input_speed": missed, "output_speed": still}, warnings=())
+    told = replace(found, fit={"input_speed": missed, "output_speed": still}, findings=())
     section = build_parameters_section(told)
     first = section.blocks[0]
     assert isinstance(first, TilesBlock)
@@ -124,7 +124,7 @@ def test_a_phase_that_the_simulation_misses_stands_against_a_good_fit_of_the_who
     assert tiles["fit of input speed"].tone is Tone.DOUBTFUL
     assert tiles["fit of input speed"].note.endswith("; 3 inertia phase: 60.1 %")
     assert tiles["fit of output speed"].tone is Tone.GOOD
-    assert "leaves too much of an output" in section.intro
+    assert "the simulation does not match" in section.intro
     assert (
         "too much" not in build_parameters_section(replace(told, fit={"output_speed": still})).intro
     )

@@ -40,11 +40,11 @@ from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.suggestion import ExpectedPrecision, Experiment, ExperimentRanking
 from drivetwin.estimation.result.verdict import (
-    CALIBRATE,
     DELAY_IDENTIFIED,
     assess,
     is_sensor_limited,
 )
+from drivetwin.findings import Code, explain
 from drivetwin.parameters import get_parameter_spec
 
 AGE = "te_delay"
@@ -206,7 +206,7 @@ def _rank_for_parameter(
         return ExperimentRanking(one.id, one.verdict, half, (), NO_SCALE)
     systematic = one.std_systematic or 0.0
     if one.std_noise is not None and is_sensor_limited(one.std_noise, systematic):
-        return ExperimentRanking(one.id, one.verdict, half, (), CALIBRATE)
+        return ExperimentRanking(one.id, one.verdict, half, (), explain(Code.SENSOR_LIMITED))
     names = _add_delay(fit).names
     row = _compute_row(one.id, fit, signals, names)
     if not row.any():  # specific to another log

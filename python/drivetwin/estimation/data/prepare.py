@@ -31,9 +31,9 @@ from drivetwin.estimation.data.shift_data import (
 )
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import (
+    check_lockup_observed,
     refer_to_turbine,
     require_locked_converter,
-    warn_unobserved_lockup,
 )
 from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import RejectedShift, Shift
@@ -98,8 +98,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> Prepare
         source=log.source,
         sha256=log.sha256,
         inputs={**log.inputs, **card.inputs},
-        warnings=log.warnings,
-        notes=warn_unobserved_lockup(log, card),
+        findings=(*log.findings, *check_lockup_observed(log, card)),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.channels.shiftlog import find_pauses
+from drivetwin.findings import Finding
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import LossLaw
@@ -214,8 +215,7 @@ class PreparedLog:
     """Data of one log and one vehicle for the estimators.
 
     `candidates` are the shifts that were detected, `shifts` the data of those to be fitted and
-    `rejected` all others with the reason. `inputs` is the SHA-256 by name of every file, `notes`
-    are warnings that belong behind those of the estimation.
+    `rejected` all others with the reason. `inputs` is the SHA-256 by name of every file.
     """
 
     shifts: tuple[ShiftData, ...]
@@ -225,8 +225,7 @@ class PreparedLog:
     source: str
     sha256: str
     inputs: Mapping[str, str]
-    warnings: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     @property
     def signals(self) -> tuple[ShiftSignals, ...]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Conclusions of the likelihood method: estimates, verdicts, curves and warnings."""
+"""Conclusions of the likelihood method: estimates, verdicts, curves and findings."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.diagnostics.identifiability import (
-    describe_null_directions,
     find_at_bounds,
+    find_null_directions,
 )
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
-    describe_contradiction,
-    describe_unweighted,
-    run_residual_tests,
+    check_residuals,
+    check_weighting,
 )
-from drivetwin.estimation.likelihood.effects.causes import describe_cause, find_cause
+from drivetwin.estimation.likelihood.effects.causes import report_cause
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.effects.withdrawal import find_unreliable
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.selection.loss_law import describe_other_law
+from drivetwin.estimation.likelihood.selection.loss_law import check_other_law
 from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
@@ -33,16 +32,16 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     make_log_id,
 )
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, build_friction_curves
-from drivetwin.estimation.linear.load_balance import AERO, describe_different_loads
+from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
 from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
-    collect_low_gear_notes,
+    check_excitation,
     collect_shift_labels,
 )
 from drivetwin.estimation.result.verdict import (
-    KNOWN,
+    apply_errors,
     assess,
     assess_with_prior,
     compute_correlation,
@@ -50,15 +49,11 @@ from drivetwin.estimation.result.verdict import (
     refuse_parameter,
     reject_identified,
 )
+from drivetwin.findings import Code, explain
 from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue
 
-NO_SCALE = (
-    "without an output torque sensor all torques share one unknown scale; what is told is the "
-    "quantity over η; add an output-shaft torque sensor"
-)
 AGE = "te_delay"
-NO_AGE = "the engine torque moves too little for its age to show"
 WITH_ETA = "likelihood over η, times η from design"
 """Method of a torque-like parameter of a log without an output torque, where η is on the card."""
 WITH_PRIOR = "likelihood with design prior"
@@ -92,28 +87,24 @@ def build_estimates(
         std=noise,
         driveline=drivelines[0],
         systematic=dict(zip(values, np.sqrt(std**2 - noise**2).tolist(), strict=True)),
-        notes=collect_low_gear_notes(signals),
+        notes=check_excitation(signals),
         method=METHOD,
         prior_method=WITH_PRIOR,
     )
     ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
-    limits = {
-        name: text
-        for name, text in find_at_bounds(fit, ids, matrix).items()
-        if estimates[name].verdict is not Verdict.DESIGN
-    }
-    estimates |= {name: reject_identified(estimates[name], text) for name, text in limits.items()}
-    for name, why in zip(ids, find_unreliable(told, matrix, std), strict=True):
-        if why:
-            estimates[name] = reject_identified(estimates[name], why)
-    for why in (
-        describe_contradiction(fit, told.residuals),
-        describe_unweighted(fit, collect_shift_labels(signals)),
-    ):
-        if why:
-            estimates = {name: reject_identified(one, why) for name, one in estimates.items()}
+    limits = [
+        one
+        for one in find_at_bounds(fit, ids, matrix)
+        if estimates[one.subject].verdict is not Verdict.DESIGN
+    ]
+    labels = collect_shift_labels(signals)
+    disagreements = (
+        *check_residuals(fit, labels, told.residuals),
+        *check_weighting(fit, labels),
+        *find_unreliable(told, ids, matrix, std),
+    )
+    estimates = apply_errors(estimates, (*limits, *disagreements))
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
-    cause = find_cause(told, priors)
     return EstimateSet(
         estimates,
         build_friction_curves(fit, linear, told),
@@ -121,11 +112,13 @@ def build_estimates(
         compute_correlation(covariance),
         (
             *dict.fromkeys(fitted.notes.values()),
-            *(one.text for one in fitted.conflicts),
-            *(f"{name}: {text}" for name, text in limits.items()),
-            *(() if cause is None else (describe_cause(cause, estimates, told, matrix),)),
-            *_collect_warnings(fit, told, signals),
-            *describe_other_law(fit, values, matrix, std),
+            *(one.finding for one in fitted.conflicts),
+            *limits,
+            *report_cause(told, priors, values, matrix, std),
+            *(one for one in disagreements if one.subject not in estimates),
+            *find_null_directions(fit),
+            *report_different_loads(collect_loads(fit)),
+            *check_other_law(fit, values, matrix, std),
         ),
         _build_load_law(fit, told),
         collect_loads(fit),
@@ -149,7 +142,7 @@ def _estimate_fixed(
     for one in (part.structure for part in fit.problem.parts):
         if one.get_unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
             name = make_log_id(AGE, one.log)
-            found[name] = refuse_parameter(name, METHOD, NO_AGE)
+            found[name] = refuse_parameter(name, METHOD, explain(Code.DELAY_NOT_EXCITED))
     return found
 
 
@@ -172,9 +165,10 @@ def _estimate_without_scale(
     systematic part.
     """
     if eta is None:
-        return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=NO_SCALE)
+        reason = explain(Code.NO_TORQUE_SCALE)
+        return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=reason)
     if ratio is None:
-        return from_prior(name, eta, KNOWN)
+        return from_prior(name, eta)
     if ratio.value is None or ratio.std_noise is None:
         return replace(ratio, id=name)
     spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
@@ -192,18 +186,3 @@ def _compute_std(matrix: FloatArray, covariance: FloatArray) -> FloatArray:
     """Compute the standard deviations (q,) of parameters from the covariance of the unknowns."""
     variance = np.einsum("qp,pr,qr->q", matrix, covariance, matrix)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
-
-
-def _collect_warnings(
-    fit: LikelihoodFit, told: Correction, signals: Sequence[ShiftSignals]
-) -> tuple[str, ...]:
-    texts = []
-    labels = collect_shift_labels(signals)
-    for s, label, tests in zip(
-        signals, labels, run_residual_tests(fit, told.residuals).values(), strict=True
-    ):
-        texts += list(s.shift.warnings)
-        texts += [f"{label}: {text}" for test in tests for text in test.warnings]
-    if why := describe_unweighted(fit, labels):
-        texts.append(why)
-    return (*texts, *describe_null_directions(fit), *describe_different_loads(collect_loads(fit)))

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
@@ -22,6 +21,7 @@ from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.result.estimate_set import EstimateSet
+from drivetwin.findings import Code, Finding, Number, report
 
 DISAGREE = 5.0
 """Difference of the two methods in its standard deviations from which a warning is due."""
@@ -45,10 +45,9 @@ def estimate_without_linear(
     """
     guess = _compute_own_guess(signals, drivelines, design)
     best, notes = select_model(signals, drivelines, design.loss_law, guess)
-    told = build_estimates(
-        best, signals, drivelines, {}, EffectPriors(design.effects, design.sensors)
-    )
-    return replace(told, warnings=(*told.warnings, *notes)), best
+    priors = EffectPriors(design.effects, design.sensors)
+    told = build_estimates(best, signals, drivelines, {}, priors)
+    return replace(told, findings=(*told.findings, *notes)), best
 
 
 def _compute_own_guess(
@@ -98,33 +97,27 @@ def estimate_likelihood(
     found, shifts = linear
     guess = _compute_guess(signals, drivelines, shifts, design)
     best, notes = select_model(signals, drivelines, design.loss_law, guess)
-    told = build_estimates(
-        best, signals, drivelines, found.friction, EffectPriors(design.effects, design.sensors)
-    )
-    warnings = (*told.warnings, *notes, *_list_disagreements(told, found))
-    return replace(told, warnings=warnings), best
+    priors = EffectPriors(design.effects, design.sensors)
+    told = build_estimates(best, signals, drivelines, found.friction, priors)
+    findings = (*told.findings, *notes, *_find_disagreements(told, found))
+    return replace(told, findings=findings), best
 
 
-def _list_disagreements(told: EstimateSet, linear: EstimateSet) -> list[str]:
-    """Return a warning for each parameter on which both methods differ by more than their noise.
+def _find_disagreements(told: EstimateSet, linear: EstimateSet) -> list[Finding]:
+    """Return a finding for each parameter on which both methods differ by more than their noise.
 
     `OF_A_CONSTANT_LOAD` is not compared if only one method has a load that grows with speed: the
     difference is then expected, and the load is reported elsewhere.
     """
     alike = (told.load is None) == (linear.load is None)
     explained = frozenset() if alike else OF_A_CONSTANT_LOAD
-    texts = []
+    differ = []
     for name, estimate in told.estimates.items():
         other = linear.estimates.get(name)
         if other is None or other.value is None or estimate.value is None or name in explained:
             continue
         spread = float(np.hypot(estimate.std_noise or 0.0, other.std_noise or 0.0))
         if spread > 0.0 and abs(estimate.value - other.value) > DISAGREE * spread:
-            a, b = (
-                format_with_unit(value, estimate.unit) for value in (estimate.value, other.value)
-            )
-            texts.append(
-                f"{name}: the likelihood gives {a}, the linear method {b}; "
-                "their noise does not explain the difference"
-            )
-    return texts
+            a, b = (Number(value, estimate.unit) for value in (estimate.value, other.value))
+            differ.append(report(Code.METHODS_DIFFER, name, likelihood=a, linear=b))
+    return differ

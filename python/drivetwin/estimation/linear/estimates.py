@@ -8,28 +8,26 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.linear.combine_shifts import collect_different_loads, merge_shifts
-from drivetwin.estimation.linear.load_balance import AERO, LoadFit, describe_different_loads
+from drivetwin.estimation.linear.load_balance import AERO, LoadFit, report_different_loads
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.result.assessment import FittedParameters, collect_fill_pressures
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
-    collect_low_gear_notes,
+    check_excitation,
     collect_shift_labels,
-    describe_growth,
+    report_growth,
 )
 from drivetwin.estimation.result.prior_update import add_priors
 from drivetwin.estimation.result.verdict import (
-    KNOWN,
-    SENSORS_TELL_LESS,
     compute_correlation,
     from_prior,
     refuse_parameter,
     reject_identified,
 )
+from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.parameters import get_parameter_spec
 
 METHOD = "integral"
@@ -78,7 +76,7 @@ def assess_shifts(
         std=np.sqrt(np.diag(covariance)),
         driveline=drivelines[0],
         systematic=systematic,
-        notes=collect_low_gear_notes(signals),
+        notes=check_excitation(signals),
         method=METHOD,
         prior_method=METHOD,
     )
@@ -98,10 +96,10 @@ def assess_shifts(
         compute_correlation(covariance),
         (
             *doubts,
-            *(one.text for one in fit.conflicts),
-            *_collect_warnings(shifts, signals, fit.notes),
-            *(() if law is None else (describe_growth(law.aero, law.std, law.mean_speed),)),
-            *describe_different_loads(loads),
+            *(one.finding for one in fit.conflicts),
+            *_collect_findings(shifts, signals, fit.notes),
+            *(() if law is None else (report_growth(law.aero, law.std, law.mean_speed),)),
+            *report_different_loads(loads),
         ),
         law,
         loads,
@@ -133,7 +131,7 @@ def _select_design_values(
     """
     contradicted = {one.id for one in fit.conflicts}
     return {
-        name: from_prior(name, prior, SENSORS_TELL_LESS)
+        name: from_prior(name, prior, Code.CARD_MORE_CERTAIN)
         for name, prior in fit.priors.items()
         if name not in contradicted and (estimates[name].std_total or 0.0) > prior.std > 0.0
     }
@@ -149,12 +147,12 @@ def _replace_impossible(fit: FittedParameters) -> dict[str, Estimate]:
         spec, prior = get_parameter_spec(name), fit.priors.get(name)
         if spec.lower <= value <= spec.upper:
             continue
-        shown = format_with_unit(value, spec.unit, digits=3)
-        text = f"the linear fit gives {shown}, which is impossible"
+        shown = Number(value, spec.unit)
         if prior is None:
-            found[name] = refuse_parameter(name, METHOD, text)
+            why = explain(Code.IMPOSSIBLE_VALUE, value=shown)
+            found[name] = refuse_parameter(name, METHOD, why)
         else:
-            found[name] = from_prior(name, prior, f"design value of the card: {text}")
+            found[name] = from_prior(name, prior, Code.CARD_FOR_IMPOSSIBLE, value=shown)
     return found
 
 
@@ -162,9 +160,8 @@ def _collect_card_values(
     known: Mapping[str, Estimate], drivelines: Sequence[KnownDriveline]
 ) -> dict[str, Estimate]:
     """Return design values of parameters that no shift shows: P0 of elements that never engage."""
-    note = "design value of the card; the log does not show this element filling"
-    found = {name: from_prior(name, one, KNOWN) for name, one in drivelines[0].known.items()}
-    found |= collect_fill_pressures(drivelines, note)
+    found = {name: from_prior(name, one) for name, one in drivelines[0].known.items()}
+    found |= collect_fill_pressures(drivelines, Code.CARD_FILL_PRESSURE)
     return {name: one for name, one in found.items() if name not in known}
 
 
@@ -202,10 +199,7 @@ def _find_misfits(
     for shift, label in zip(shifts, collect_shift_labels(signals), strict=True):
         for name, chi2 in _compute_residual_powers(shift).items():
             if chi2 > MISFIT:
-                text = (
-                    f"the {name} of {label} leaves {chi2:.0f} times the noise power: some effect "
-                    "is not in the model"
-                )
+                text = explain(Code.REGRESSION_MISFIT, label, regression=name, power=chi2)
                 concerned = [
                     i
                     for i in ids
@@ -231,10 +225,10 @@ def _width(curve: FrictionCurve) -> float:
     return float(np.mean(curve.mu_hi - curve.mu_lo))
 
 
-def _collect_warnings(
-    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: Mapping[str, str]
-) -> tuple[str, ...]:
-    """Collect the warnings: general ones first, then those of each shift, then shared ones."""
+def _collect_findings(
+    shifts: Sequence[IntegralShift], signals: Sequence[ShiftSignals], notes: Mapping[str, Finding]
+) -> tuple[Finding, ...]:
+    """Collect the findings on excitation, and of each regression those that shifts share."""
     labels = collect_shift_labels(signals)
     noisy: dict[str, dict[str, float]] = {}
     trends: dict[str, LoadFit] = {}
@@ -248,25 +242,20 @@ def _collect_warnings(
         if "friction" in shift.refusals:
             refused.setdefault(shift.refusals["friction"], []).append(label)
 
-    texts = list(dict.fromkeys(notes.values()))
-    texts += [text for s in signals for text in s.shift.warnings]
-    texts += [
-        f"{_describe_shifts(found)}: the {name} leaves "
-        f"{_format_range(found.values(), '.1f')} times the noise "
-        "power; intervals are widened"
-        for name, found in noisy.items()
-    ]
+    result = list(dict.fromkeys(notes.values()))
+    for name, found in noisy.items():
+        powers = _format_range(found.values(), ".1f")
+        shown = _describe_shifts(found)
+        result.append(report(Code.REGRESSION_NOISY, shown, regression=name, powers=powers))
     if trends:
         significance = _format_range((load.speed_trend for load in trends.values()), ".1f")
         speeds = _format_range((load.mean_speed for load in trends.values()), ".3g")
-        texts.append(
-            f"{_describe_shifts(trends)}: the load torque changes with speed (t = {significance}); "
-            f"T_v/i_f holds at {speeds} rad/s of the wheel"
-        )
-    texts += [
-        f"{_describe_shifts(found)}: no friction curve, {why}" for why, found in refused.items()
-    ]
-    return tuple(texts)
+        shown = _describe_shifts(trends)
+        code = Code.LOAD_CHANGES_WITH_SPEED
+        result.append(report(code, shown, significance=significance, speeds=speeds))
+    for why, labelled in refused.items():
+        result.append(report(Code.NO_FRICTION_CURVE, _describe_shifts(labelled), why=why))
+    return tuple(result)
 
 
 def _describe_shifts(labels: Collection[str]) -> str:

@@ -26,6 +26,7 @@ from drivetwin.estimation.data.vehicle_balance import (
     build_recorded_windows,
 )
 from drivetwin.estimation.regression.errors_in_variables import Fit, Prior
+from drivetwin.findings import Code, Finding, Number, report
 
 ONE_LOAD = 0.05
 """Probability under one load below which the shifts of a log have a load each. High: a load too
@@ -77,14 +78,12 @@ def is_common_load(differences: FloatArray, covariance: FloatArray) -> bool:
     return bool(unit @ inverse @ unit < chi2.isf(ONE_LOAD, differences.size))
 
 
-def describe_different_loads(loads: Sequence[float]) -> list[str]:
-    """Describe the loads of the shifts [N m]; an empty text for a single common load."""
+def report_different_loads(loads: Sequence[float]) -> list[Finding]:
+    """Report different loads of the shifts [N m]; empty for a single common load."""
     if not loads:
         return []
-    return [
-        "the load differs from shift to shift, as on hills: each has its own, "
-        f"{min(loads):.0f} to {max(loads):.0f} N·m; T_v/i_f is their mean"
-    ]
+    low, high = (Number(load, "N*m") for load in (min(loads), max(loads)))
+    return [report(Code.LOADS_DIFFER, low=low, high=high)]
 
 
 def select_load_spans(signals: ShiftSignals) -> tuple[Span, ...]:

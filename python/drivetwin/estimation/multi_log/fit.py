@@ -41,7 +41,7 @@ from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.multi_log.consistency import check_consistency
 from drivetwin.estimation.multi_log.verdicts import apply_consistency, pool_curves
-from drivetwin.estimation.result.estimate_set import EstimateSet
+from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.multi_log import FAR, LogShare, Several
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
@@ -87,12 +87,13 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
         _build_log_share(k, log, one, fit)
         for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)
     )
-    read = [f"{Path(log.source).name}: {text}" for log in logs for text in log.warnings]
+    read = [one.set_file(Path(log.source).name) for log in logs for one in log.findings]
     is_open = any(s.torque_of_speeds is not None for s in signals)
     ranges = () if is_open else check_design_ranges(told.estimates, design)
     estimates, gains = check_efficiency_limit(told.estimates, design.loss_law)
-    warnings = (*read, *told.warnings, *notes, *gains, *ranges)
-    told = replace(told, estimates=estimates, warnings=warnings)
+    shown = collect_shift_findings(signals)
+    findings = (*read, *shown, *told.findings, *notes, *gains, *ranges)
+    told = replace(told, estimates=estimates, findings=findings)
     several = Several(shares, tested)
     evidence = StageResults(
         signals=tuple(signals),
@@ -120,7 +121,7 @@ def _identify_single(log: PreparedLog) -> Identification:
     found = identify(log)
     if found.method is not Method.LIKELIHOOD:
         raise IdentificationError(
-            f"the likelihood does not explain this log by itself: {found.warnings[0]}",
+            f"the likelihood does not explain this log by itself: {found.evidence.gave_up}",
             "leave it out, or look at what `drivetwin identify` says of it alone",
             Where(file=log.source),
         )
@@ -230,7 +231,7 @@ def _join_results(
         rejected=tuple(one for each in alone for one in each.rejected),
         validity=_merge_ranges(alone),
         inputs={name: digest for one in alone for name, digest in one.inputs.items()},
-        warnings=told.warnings,
+        findings=told.findings,
         assumptions=(
             f"{', '.join(names)} are of one vehicle in one state: they share all parameters but "
             "load and age of the engine torque",

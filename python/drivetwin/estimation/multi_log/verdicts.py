@@ -12,6 +12,8 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.estimation.result.multi_log import Consistency, LogPull
+from drivetwin.estimation.result.verdict import join_reasons
+from drivetwin.findings import Code, explain
 
 
 def apply_consistency(told: EstimateSet, tested: Consistency) -> EstimateSet:
@@ -28,8 +30,8 @@ def apply_consistency(told: EstimateSet, tested: Consistency) -> EstimateSet:
     friction = {
         name: _widen(curve, doubtful.get(f"mu.{name}")) for name, curve in told.friction.items()
     }
-    warnings = told.warnings if tested.agree else (tested.text, *told.warnings)
-    return replace(told, estimates=estimates, friction=friction, warnings=warnings)
+    findings = told.findings if tested.agree else (tested.finding, *told.findings)
+    return replace(told, estimates=estimates, friction=friction, findings=findings)
 
 
 def _downgrade(one: Estimate, move: LogPull) -> Estimate:
@@ -37,11 +39,8 @@ def _downgrade(one: Estimate, move: LogPull) -> Estimate:
     if one.value is None or one.std_noise is None or one.verdict is Verdict.DESIGN:
         return one
     factor = abs(move.z)
-    reason = (
-        f"the logs do not agree on it: log {move.log} is {factor:.1f} standard deviations off the "
-        "others; the interval is widened by that"
-    )
-    text = "; ".join(part for part in (reason, one.reason) if part)
+    reason = explain(Code.DISAGREEING_LOG, log=str(move.log), size=factor)
+    text = join_reasons(reason, one.reason)
     return replace(one, std_noise=factor * one.std_noise, verdict=Verdict.WEAK, reason=text)
 
 

@@ -19,8 +19,14 @@ from drivetwin.estimation.paper.wlse import GridFit, Weighting
 from drivetwin.estimation.result.assessment import collect_fill_pressures
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.estimate_set import EstimateSet
-from drivetwin.estimation.result.prior_conflict import describe_range_violation
-from drivetwin.estimation.result.verdict import from_prior, get_experiment, refuse_parameter
+from drivetwin.estimation.result.prior_conflict import check_range
+from drivetwin.estimation.result.verdict import (
+    from_prior,
+    get_experiment,
+    join_reasons,
+    refuse_parameter,
+)
+from drivetwin.findings import Code, Finding, explain, report
 from drivetwin.parameters import get_parameter_spec
 
 EXCITATION = 0.03
@@ -41,33 +47,26 @@ class PaperShift:
     ring: RingDown | None
     friction: PaperFriction | None
     values: dict[str, float]
-    doubts: dict[str, str]
+    doubts: dict[str, tuple[Finding, ...]]
     refusals: dict[str, str]
 
 
-def _collect_inertia_warnings(
+def _check_inertia(
     signals: ShiftSignals, fit: GridFit, bounds: tuple[float, float], gear: str
-) -> dict[str, str]:
-    """Why η and J′ of the grid search deserve little trust, by parameter id."""
+) -> dict[str, tuple[Finding, ...]]:
+    """Return findings against η and J′ of the grid search, by parameter id."""
     torque = signals.engine_torque.select_span(signals.shift.before).values
     moving = float(np.std(torque)) / max(abs(float(np.mean(torque))), 1e-9)
-    reasons = [
-        describe_range_violation("J′", fit.best.inertia, bounds),
-        _describe_grid_end("η", fit),
-    ]
+    found = [*check_range("J′", fit.best.inertia, bounds), *_check_grid_end("η", fit)]
     if moving < EXCITATION:
-        reasons.append(
-            f"the engine torque moves by {100 * moving:.1f} % only while gear {gear} is held, so "
-            "eq. 10 cannot tell η from J′"
-        )
-    text = "; ".join(reason for reason in reasons if reason)
-    return dict.fromkeys(("eta", f"J_prime_{gear}"), text) if text else {}
+        found.append(report(Code.PAPER_POORLY_EXCITED, variation=100.0 * moving, gear=gear))
+    return dict.fromkeys(("eta", f"J_prime_{gear}"), tuple(found)) if found else {}
 
 
-def _describe_grid_end(symbol: str, fit: GridFit) -> str:
+def _check_grid_end(symbol: str, fit: GridFit) -> list[Finding]:
     if fit.best not in (fit.rows[0], fit.rows[-1]):
-        return ""
-    return f"the least error lies at the end of the grid of {symbol}"
+        return []
+    return [report(Code.PAPER_GRID_END, symbol=symbol)]
 
 
 def identify_paper_shift(
@@ -112,26 +111,21 @@ def identify_paper_shift(
         friction = estimate_paper_friction(signals, driveline)
     except IdentificationError as error:
         refusals["friction"] = error.what
-    doubts = _collect_inertia_warnings(signals, inertia, J_prime_range, shift.start_gear)
-    reasons = [
-        describe_range_violation("J3", load.best.inertia, J_vehicle_range),
-        _describe_grid_end("T_v/i_f", load),
-    ]
-    if text := "; ".join(reason for reason in reasons if reason):
-        doubts |= dict.fromkeys(("Tv_over_if", "J_vehicle"), text)
-    if text := describe_range_violation("J′", after.best.inertia, J_prime_range):
-        doubts[f"J_prime_{shift.end_gear}"] = text
-    doubts |= {k: "it rests on doubtful inertias" for k in ("k_o", "c_o") if doubts and k in values}
+    doubts = _check_inertia(signals, inertia, J_prime_range, shift.start_gear)
+    found = (
+        *check_range("J3", load.best.inertia, J_vehicle_range),
+        *_check_grid_end("T_v/i_f", load),
+    )
+    if found:
+        doubts |= dict.fromkeys(("Tv_over_if", "J_vehicle"), found)
+    if outside := check_range("J′", after.best.inertia, J_prime_range):
+        doubts[f"J_prime_{shift.end_gear}"] = tuple(outside)
+    rests = (report(Code.PAPER_DOUBTFUL_INERTIA),)
+    doubts |= {k: rests for k in ("k_o", "c_o") if doubts and k in values}
     return PaperShift(inertia, after, load, ring, friction, values, doubts, refusals)
 
 
 METHOD = "paper"
-
-
-_NO_INTERVAL = "the paper's procedure gives no interval"
-
-
-_TAKEN = "the paper's procedure takes the card's value"
 
 
 def assess_paper_shifts(
@@ -149,11 +143,13 @@ def assess_paper_shifts(
         for name, value in shift.values.items():
             if name in estimates and estimates[name].value is not None:
                 continue
-            doubt = shift.doubts.get(name, "")
+            doubt = join_reasons(*(one.cause for one in shift.doubts.get(name, ())))
             if not get_parameter_spec(name).lower <= value <= get_parameter_spec(name).upper:
                 estimates[name] = refuse_parameter(name, METHOD, doubt)
                 continue
-            reason = f"{doubt}; {get_experiment(name)}" if doubt else _NO_INTERVAL
+            reason = explain(Code.PAPER_NO_INTERVAL)
+            if doubt:
+                reason = join_reasons(doubt, get_experiment(name))
             estimates[name] = Estimate(name, value, None, Verdict.WEAK, METHOD, reason=reason)
     for shift, s in zip(shifts, signals, strict=True):
         gear = s.shift.end_gear
@@ -162,13 +158,11 @@ def assess_paper_shifts(
                 estimates[name] = refuse_parameter(name, METHOD, shift.refusals["shaft"])
     for driveline in drivelines:
         if driveline.J_out is not None:
-            estimates["J_out"] = from_prior("J_out", driveline.J_out, _TAKEN)
-    estimates |= collect_fill_pressures(drivelines, _TAKEN)
+            estimates["J_out"] = from_prior("J_out", driveline.J_out, Code.PAPER_CARD_VALUE)
+    estimates |= collect_fill_pressures(drivelines, Code.PAPER_CARD_VALUE)
     friction = {s.friction.element: s.friction.curve for s in shifts if s.friction is not None}
-    doubts = dict.fromkeys(text for shift in shifts for text in shift.doubts.values())
-    warnings = (
-        "the paper's procedure is biased by speed noise: its slope enters the regression as if "
-        "it were exact (errors in variables)",
-        *doubts,
+    doubts = dict.fromkeys(
+        one for shift in shifts for found in shift.doubts.values() for one in found
     )
-    return EstimateSet(estimates, friction, (), np.empty((0, 0)), warnings)
+    findings = (report(Code.PAPER_BIASED), *doubts)
+    return EstimateSet(estimates, friction, (), np.empty((0, 0)), findings)

@@ -16,6 +16,7 @@ from drivetwin.estimation.result.prior_conflict import (
     find_contradictions,
 )
 from drivetwin.estimation.result.verdict import assess, assess_with_prior, from_prior
+from drivetwin.findings import Code, Finding
 from drivetwin.vehicle.spec import PriorValue
 
 
@@ -23,7 +24,7 @@ from drivetwin.vehicle.spec import PriorValue
 class FittedParameters:
     """Parameters of a fit: `values` (q,) by id with `covariance` (q, q) and `std` (q,) from noise.
 
-    `systematic` are the standard deviations from sensor tolerances by id, `notes` remarks by id.
+    `systematic` are the standard deviations from sensor tolerances by id, `notes` findings by id.
     `method` names the estimator, `prior_method` that of parameters whose design value took part.
     """
 
@@ -33,7 +34,7 @@ class FittedParameters:
     std: FloatArray
     driveline: KnownDriveline
     systematic: Mapping[str, float]
-    notes: Mapping[str, str]
+    notes: Mapping[str, Finding]
     method: str
     prior_method: str
 
@@ -61,15 +62,15 @@ class FittedParameters:
 
     def _assess_parameter(self, name: str, value: float, std: float) -> Estimate:
         prior, systematic = self.priors.get(name), self.systematic.get(name)
-        note = self.notes.get(name, "")
+        note = self.notes[name].reason if name in self.notes else ""
         if prior is None:
             return assess(name, value, std, self.method, systematic, note)
         told = name, value, std
         return assess_with_prior(told, prior, self.prior_method, systematic, note)
 
 
-def collect_fill_pressures(drivelines: Sequence[KnownDriveline], note: str) -> dict[str, Estimate]:
-    """Return the card's P0 of the elements of all shifts."""
+def collect_fill_pressures(drivelines: Sequence[KnownDriveline], code: Code) -> dict[str, Estimate]:
+    """Return the card's P0 of the elements of all shifts, with the reason `code`."""
     elements = (element for one in drivelines for element in (one.offgoing, one.oncoming))
     fills = {f"P0.{element.name}": element.P0 for element in elements}
-    return {name: from_prior(name, prior, note) for name, prior in fills.items()}
+    return {name: from_prior(name, prior, code) for name, prior in fills.items()}

@@ -10,15 +10,15 @@ from itertools import groupby
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import make_shift_labels
 
 
 @dataclass(frozen=True, eq=False)
 class EstimateSet:
-    """Estimates and notes that the pipeline adds to the Identification.
+    """Estimates and findings that the pipeline adds to the Identification.
 
     `loads` are the loads of the shifts at the output shaft [N m] if they differ, else empty.
     """
@@ -27,31 +27,35 @@ class EstimateSet:
     friction: dict[str, FrictionCurve]
     correlation_ids: tuple[str, ...]
     correlation: FloatArray
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     load: LoadLaw | None = None
     loads: tuple[float, ...] = ()
 
 
-def _describe_low_gear(signals: ShiftSignals, gear: str) -> str:
-    """Return a note if the engine torque is constant in the lower gear; empty otherwise."""
+def _check_excitation(signals: ShiftSignals) -> Finding | None:
+    """Return a finding if the engine torque is constant in the lower gear."""
     torque = signals.engine_torque.select_span(signals.shift.before).values
     moving, level = float(np.std(torque)), abs(float(np.mean(torque)))
     if moving > 0.03 * level:
-        return ""
-    return (
-        f"gear {gear} alone determines η and J′ poorly: the engine torque moves by "
-        f"{100 * moving / max(level, 1e-9):.1f} % only while it is held, which cannot tell η from "
-        "J′; the values rest on the inertia phase of the shift"
-    )
+        return None
+    variation = 100.0 * moving / max(level, 1e-9)
+    return report(Code.GEAR_POORLY_EXCITED, variation=variation, gear=signals.shift.start_gear)
 
 
-def describe_growth(aero: float, std: float, mean_speed: float) -> str:
-    """Describe a load that grows with speed, from AERO and its standard deviation."""
-    return (
-        "the load grows with the square of the speed "
-        f"({format_with_unit(aero, 'N*m*s^2/rad^2', Z95 * std)} at the wheel); "
-        f"T_v/i_f holds at {mean_speed:.3g} rad/s of the wheel"
-    )
+def report_growth(aero: float, std: float, mean_speed: float) -> Finding:
+    """Report a load that grows with speed, from AERO and its standard deviation."""
+    growth = Number(aero, "N*m*s^2/rad^2", Z95 * std)
+    return report(Code.LOAD_GROWS, aero=growth, speed=Number(mean_speed, "rad/s"))
+
+
+def collect_shift_findings(signals: Sequence[ShiftSignals]) -> list[Finding]:
+    """Collect the findings of the shifts, each with the label of its shift."""
+    labels = collect_shift_labels(signals)
+    return [
+        finding.set_subject(label)
+        for s, label in zip(signals, labels, strict=True)
+        for finding in s.shift.findings
+    ]
 
 
 def collect_shift_labels(signals: Sequence[ShiftSignals]) -> list[str]:
@@ -63,16 +67,16 @@ def collect_shift_labels(signals: Sequence[ShiftSignals]) -> list[str]:
     return labels
 
 
-def collect_low_gear_notes(signals: Sequence[ShiftSignals]) -> dict[str, str]:
-    """Collect notes on parameters affected by a constant engine torque in the lower gear, by id.
+def check_excitation(signals: Sequence[ShiftSignals]) -> dict[str, Finding]:
+    """Return findings on a constant engine torque in the lower gear by id of affected parameters.
 
-    A gear gets no note if the torque varies in it before at least one of the shifts.
+    A gear has none if the torque varies in it before at least one of the shifts.
     """
-    notes: dict[str, str] = {}
-    found = [(s, _describe_low_gear(s, s.shift.start_gear)) for s in signals]
-    moved = {s.shift.start_gear for s, note in found if not note}
+    notes: dict[str, Finding] = {}
+    found = [(s, _check_excitation(s)) for s in signals]
+    moved = {s.shift.start_gear for s, note in found if note is None}
     for s, note in found:
-        if note and s.shift.start_gear not in moved:
+        if note is not None and s.shift.start_gear not in moved:
             notes |= {"eta": note}
             notes |= {f"J_prime_{g}": note for g in (s.shift.start_gear, s.shift.end_gear)}
     return notes

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from drivetwin.estimation.result.estimate import Estimate, SignalFit
+from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.shift import Shift
 
 
@@ -79,12 +80,19 @@ class Consistency:
         return {} if self.agree else far
 
     @property
-    def text(self) -> str:
-        """Outcome as a sentence."""
-        figures = f"χ² {self.chi2:.1f} on {self.freedom}, p = {self.p:.2g}"
-        if self.agree:
-            return f"the logs agree on what they share ({figures})"
+    def finding(self) -> Finding:
+        """Outcome with its figures."""
         far = sorted(self.doubtful.values(), key=lambda one: -abs(one.z))
         named = ", ".join(f"{one.parameter} (log {one.log}, {one.z:+.1f} σ)" for one in far)
-        tail = f"; most apart: {named}" if named else ""
-        return f"the logs do not agree on what they share ({figures}){tail}"
+        return report(
+            Code.LOGS_AGREE if self.agree else Code.LOGS_DISAGREE,
+            chi2=self.chi2,
+            freedom=self.freedom,
+            p=self.p,
+            apart=f"; largest differences: {named}" if named else "",
+        )
+
+    @property
+    def text(self) -> str:
+        """Outcome as a sentence."""
+        return self.finding.text

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.prior_update import CONTRADICTS, remove_prior
 from drivetwin.estimation.result.verdict import reject_identified
+from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
@@ -40,15 +40,11 @@ class Contradiction:
     without: Mapping[str, float]
 
     @property
-    def text(self) -> str:
-        """Warning with both values and their difference."""
+    def finding(self) -> Finding:
+        """Finding with both values (1 sigma) and their difference."""
         unit = get_parameter_spec(self.id).unit
-        card, log = (format_with_unit(one.value, unit, one.std) for one in (self.design, self.log))
-        return (
-            f"{self.id}: the vehicle card says {card}, the log {log} (1 sigma), "
-            f"{self.apart:.1f} standard deviations apart: correct the card, or find what the "
-            "model or a sensor lacks"
-        )
+        card, log = (Number(one.value, unit, one.std) for one in (self.design, self.log))
+        return report(Code.CARD_CONTRADICTED, self.id, card=card, log=log, apart=self.apart)
 
 
 def find_contradictions(
@@ -95,39 +91,39 @@ def apply_contradictions(
     """
     told = dict(estimates)
     for one in found:
-        told[one.id] = replace(
-            told[one.id], verdict=Verdict.WEAK, method=method, reason="the log contradicts the card"
-        )
+        reason = explain(Code.LOG_CONTRADICTS_CARD)
+        told[one.id] = replace(told[one.id], verdict=Verdict.WEAK, method=method, reason=reason)
         for name, free in one.without.items():
             other = told[name]
             if name == one.id or other.value is None or other.std_total is None:
                 continue
             if abs(free - other.value) > Z95 * other.std_total:
-                value = format_with_unit(free, other.unit, digits=5)
-                why = f"without the card's {one.id} the log gives {value}"
+                value = Number(free, other.unit)
+                why = explain(Code.DEPENDS_ON_PRIOR, prior=one.id, value=value)
                 told[name] = reject_identified(other, why)
     return told
 
 
-def check_design_ranges(estimates: Mapping[str, Estimate], design: DesignData) -> tuple[str, ...]:
-    """Return a warning for each inertia whose whole interval lies outside the design range."""
+def check_design_ranges(
+    estimates: Mapping[str, Estimate], design: DesignData
+) -> tuple[Finding, ...]:
+    """Return a finding for each inertia whose whole interval lies outside the design range."""
     ranges = {"J_prime": design.J_prime_range, "J_vehicle": design.J_vehicle_range}
-    texts = []
+    found: list[Finding] = []
     for name, one in estimates.items():
         limits = None if name.endswith(OVER_ETA) else ranges.get(get_parameter_spec(name).stem)
         if limits is None or one.value is None or one.verdict is Verdict.DESIGN:
             continue
         low, high = one.ci95_total or (one.value, one.value)
         if high < limits[0] or low > limits[1]:
-            text = describe_range_violation(name, one.value, limits)
-            texts.append(f"{text}: correct the range, or check ratios, gains and units of the log")
-    return tuple(texts)
+            found += check_range(name, one.value, limits)
+    return tuple(found)
 
 
 def check_efficiency_limit(
     estimates: Mapping[str, Estimate], law: LossLaw
-) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-    """Downgrade an η whose whole interval lies above 1; return the estimates and the warnings.
+) -> tuple[dict[str, Estimate], tuple[Finding, ...]]:
+    """Downgrade an η whose whole interval lies above 1; return the estimates and the findings.
 
     With such an η more power would leave the gears than enters. In overrun the law `paper` has an
     η above 1 by definition, because the power flow is reversed.
@@ -138,22 +134,15 @@ def check_efficiency_limit(
     low, _ = one.ci95_total or (one.value, one.value)
     if low <= 1.0:
         return dict(estimates), ()
-    text = (
-        f"η = {format_with_unit(one.value, one.unit)}: more power would leave the gears than "
-        f"enters; the "
-        "engine torque, or the map of an open converter, gives too little, or the output torque "
-        "reads too much"
-    )
-    if law == "paper":
-        text += '; of a shift in overrun loss_law = "dissipative" tells η'
-    return {**estimates, "eta": reject_identified(one, "an efficiency above 1")}, (text,)
+    code = Code.EFFICIENCY_ABOVE_ONE_BY_PAPER if law == "paper" else Code.EFFICIENCY_ABOVE_ONE
+    finding = report(code, "eta", value=Number(one.value, one.unit))
+    return {**estimates, "eta": reject_identified(one, finding.cause)}, (finding,)
 
 
-def describe_range_violation(symbol: str, value: float, design: tuple[float, float]) -> str:
-    """Describe an inertia [kg m^2] outside its design range; empty if it lies within."""
+def check_range(symbol: str, value: float, design: tuple[float, float]) -> list[Finding]:
+    """Return a finding for an inertia [kg m^2] outside its design range."""
     if design[0] <= value <= design[1]:
-        return ""
-    return (
-        f"{symbol} = {format_with_unit(value, 'kg*m^2')} lies outside its design range "
-        f"{design[0]:g} to {design[1]:g} kg·m²"
-    )
+        return []
+    low, high = (Number(limit, "kg*m^2") for limit in design)
+    shown = Number(value, "kg*m^2")
+    return [report(Code.OUTSIDE_DESIGN_RANGE, symbol, value=shown, low=low, high=high)]

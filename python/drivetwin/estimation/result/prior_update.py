@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue
 
 CONTRADICTS = 3.0
@@ -25,15 +27,15 @@ def add_priors(
     values: FloatArray,
     covariance: FloatArray,
     known: Mapping[str, PriorValue],
-) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """Update values (q,) and covariance (q, q) with the known values; return warnings too.
+) -> tuple[FloatArray, FloatArray, tuple[Finding, ...]]:
+    """Update values (q,) and covariance (q, q) with the known values; return findings too.
 
-    A warning is issued for each exactly known value that the log contradicts; prior_conflict.py
+    A finding is returned for each exactly known value that the log contradicts; prior_conflict.py
     checks the others.
     Known values of parameters that are not among `ids` change nothing.
     """
     values, covariance = values.copy(), covariance.copy()
-    warnings: list[str] = []
+    found: list[Finding] = []
     for name, prior in known.items():
         if name not in ids:
             continue
@@ -43,14 +45,13 @@ def add_priors(
             continue
         miss = prior.value - values[k]
         if prior.std == 0.0 and abs(miss) > CONTRADICTS * np.sqrt(spread):
-            warnings.append(
-                f"{name}: known beforehand as {prior.value:.4g}, the log tells {values[k]:.4g}; "
-                "the noise does not explain the difference"
-            )
+            unit = get_parameter_spec(name).unit
+            card, log = Number(prior.value, unit), Number(float(values[k]), unit)
+            found.append(report(Code.FIXED_VALUE_CONTRADICTED, name, card=card, log=log))
         values = values + column * (miss / spread)
         covariance -= np.outer(column, column) / spread
         covariance[np.diag_indices_from(covariance)] = np.maximum(np.diag(covariance), 0.0)
-    return values, covariance, tuple(warnings)
+    return values, covariance, tuple(found)
 
 
 def remove_prior(

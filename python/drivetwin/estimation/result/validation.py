@@ -10,6 +10,7 @@ from pathlib import Path
 
 from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, SignalFit
+from drivetwin.findings import Finding
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 
@@ -42,7 +43,7 @@ class Validation(DisplayMixin):
     traces: Mapping[str, SignalTrace]
     fit: Mapping[str, Mapping[str, SignalFit]]
     status: str
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
 ALLOWED = 1.1
@@ -65,7 +66,7 @@ class HeldOut:
 
     `own` are the estimates of the log-specific parameters if the log was not fitted. `bounds` are
     by compared signal, empty without a likelihood fit. `validation` is None if the shift could not
-    be predicted; `notes` contain the reason and any substitutes for missing parameters.
+    be predicted; `findings` contain the reason and any substitutes for missing parameters.
     """
 
     source: str
@@ -73,7 +74,7 @@ class HeldOut:
     validation: Validation | None
     own: Mapping[str, Estimate] = field(default_factory=dict)
     bounds: Mapping[str, PredictionInterval] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     def get_signal_outcome(self, signal: str) -> Outcome:
         """Verdict on one compared signal."""

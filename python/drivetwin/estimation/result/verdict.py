@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
+from drivetwin.findings import Code, Finding, Number, Severity, explain
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue
 
@@ -21,28 +21,22 @@ PRIOR_SHARE = 0.8
 """Share of the prior's standard deviation above which a posterior's is dominated by the prior."""
 SENSORS = 0.8
 """Share of the total standard deviation from which the sensors' tolerances decide an interval."""
-CALIBRATE = (
-    "the sensors' tolerances, or values shown late, decide its interval: calibrate them and state "
-    "less on the card, or record each message with its own stamp"
-)
-KNOWN = "known from design, as the card says"
-ADDS_LITTLE = "design value of the card, to which the log adds little"
-SENSORS_TELL_LESS = "design value of the card; the sensors' tolerances leave the log less certain"
 
+_HOLD_STILL = "Hold the pedal still for a second after a firm lock-up."
 _EXPERIMENT = {
-    "eta": "step the pedal in the lower gear: engine torque must change while the gear is held",
-    "J_prime": "step the pedal in the lower gear, or record a shift with a longer inertia phase",
-    "J_out": "state J_out on the vehicle card from design, or add a shift at another torque",
-    "J_vehicle": "let the vehicle speed up and slow down in gear, or add a coast-down",
-    "Tv_over_if": "record a longer stretch in gear, or add a coast-down",
-    "k_o": "hold the pedal still for a second after a firm lock-up",
-    "c_o": "hold the pedal still for a second after a firm lock-up",
-    "f_d": "hold the pedal still for a second after a firm lock-up",
-    "zeta": "hold the pedal still for a second after a firm lock-up",
-    "P0": "record a shift with a slower pressure ramp, or shifts at two torque levels",
-    "mu": "record shifts whose inertia phase passes the slip asked for",
-    "drum": "state the drum inertias on the vehicle card more narrowly, from design",
-    "te_delay": "step the pedal in gear: a constant torque has no visible age",
+    "eta": "Step the pedal in the lower gear.",
+    "J_prime": "Step the pedal in the lower gear, or record a shift with a longer inertia phase.",
+    "J_out": "Enter J_out in the vehicle card, or add a shift at another torque.",
+    "J_vehicle": "Speed up and slow down in gear, or add a coast-down.",
+    "Tv_over_if": "Record more time in gear, or add a coast-down.",
+    "k_o": _HOLD_STILL,
+    "c_o": _HOLD_STILL,
+    "f_d": _HOLD_STILL,
+    "zeta": _HOLD_STILL,
+    "P0": "Record a shift with a slower pressure ramp, or shifts at two torque levels.",
+    "mu": "Record shifts whose inertia phase covers this slip.",
+    "drum": "Enter narrower drum inertias in the vehicle card.",
+    "te_delay": "Step the pedal in gear.",
 }
 
 
@@ -60,7 +54,7 @@ def is_sensor_limited(std_noise: float, std_systematic: float | None) -> bool:
 def get_advice(parameter_id: str, std_noise: float, std_systematic: float | None) -> str:
     """Return advice on narrowing an interval: an experiment or better sensors."""
     if is_sensor_limited(std_noise, std_systematic):
-        return CALIBRATE
+        return explain(Code.SENSOR_LIMITED)
     return get_experiment(parameter_id)
 
 
@@ -87,22 +81,14 @@ def assess(
     inside = spec.lower <= value <= spec.upper
     advice = get_advice(parameter_id, std_noise, std_systematic)
     if not np.isfinite(width) or width > end or not inside:
-        shown = f"the 95 % interval {format_with_unit(value, spec.unit, half)} says nothing"
-        return Estimate(
-            parameter_id,
-            None,
-            None,
-            Verdict.NOT_IDENTIFIABLE,
-            method,
-            reason=f"{shown}; {advice}",
-        )
+        shown = Number(value, spec.unit, half)
+        reason = join_reasons(explain(Code.INTERVAL_WIDER_THAN_VALUE, value=shown), advice)
+        return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
+    reason, verdict = note, Verdict.IDENTIFIED
     if width > limit:
-        reason = f"the 95 % interval is ± {format_with_unit(half, spec.unit, digits=2)}; {advice}"
-        verdict = Verdict.WEAK
-    else:
-        reason, verdict = "", Verdict.IDENTIFIED
-    text = "; ".join(part for part in (note, reason) if part)
-    return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, text)
+        wide = explain(Code.INTERVAL_WIDE, half=Number(half, spec.unit))
+        reason, verdict = join_reasons(note, wide, advice), Verdict.WEAK
+    return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, reason)
 
 
 def assess_with_prior(
@@ -120,34 +106,37 @@ def assess_with_prior(
     """
     name, value, std = told
     if design.std == 0.0:
-        return from_prior(name, PriorValue(value), KNOWN)
+        return from_prior(name, PriorValue(value), Code.FIXED_BY_CARD)
     if std >= PRIOR_SHARE * design.std:
-        return from_prior(name, PriorValue(value, std), ADDS_LITTLE, std_systematic)
+        return from_prior(name, PriorValue(value, std), Code.CARD_DOMINATES, std_systematic)
     one, spec = assess(name, value, std, method, std_systematic, note), get_parameter_spec(name)
     if one.value is not None or not spec.lower <= value <= spec.upper:
         return one
     half = Z95 * float(np.hypot(std, std_systematic or 0.0))
-    width = format_with_unit(half, spec.unit, digits=2)
-    wide = f"the 95 % interval is ± {width}, with the card's design value in it"
-    text = "; ".join(part for part in (note, wide, get_advice(name, std, std_systematic)) if part)
-    return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, text)
+    wide = explain(Code.INTERVAL_WIDE_WITH_PRIOR, half=Number(half, spec.unit))
+    reason = join_reasons(note, wide, get_advice(name, std, std_systematic))
+    return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, reason)
 
 
 def from_prior(
-    parameter_id: str, prior: PriorValue, note: str, std_systematic: float | None = None
+    parameter_id: str,
+    prior: PriorValue,
+    code: Code = Code.FIXED_BY_CARD,
+    std_systematic: float | None = None,
+    **values: Number,
 ) -> Estimate:
     """Return the estimate of a value that the card states and the log adds little to.
 
     The part that the log adds is as wrong as its sensors: `std_systematic` if their tolerances are
     stated.
     """
-    value, std = prior.value, prior.std
-    return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", std_systematic, note)
+    value, std, reason = prior.value, prior.std, explain(code, **values)
+    return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", std_systematic, reason)
 
 
 def refuse_parameter(parameter_id: str, method: str, why: str) -> Estimate:
     """Return a `not identifiable` estimate with the reason and a suitable experiment."""
-    reason = f"{why}; {get_experiment(parameter_id)}"
+    reason = join_reasons(why, get_experiment(parameter_id))
     return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
 
 
@@ -158,8 +147,31 @@ def reject_identified(one: Estimate, why: str) -> Estimate:
     """
     if one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
         return one
-    reason = "; ".join(part for part in (why, one.reason) if part)
-    return replace(one, verdict=Verdict.WEAK, reason=reason)
+    return replace(one, verdict=Verdict.WEAK, reason=join_reasons(why, one.reason))
+
+
+def apply_errors(
+    estimates: Mapping[str, Estimate], findings: Iterable[Finding]
+) -> dict[str, Estimate]:
+    """Downgrade the estimates that an error is about: its subject, or all if that is no parameter.
+
+    Of several errors of one code without a parameter the first is the reason.
+    """
+    told, seen = dict(estimates), set[Code]()
+    for one in findings:
+        if one.severity is not Severity.ERROR:
+            continue
+        if one.subject in told:
+            told[one.subject] = reject_identified(told[one.subject], one.cause)
+        elif one.code not in seen:
+            seen.add(one.code)
+            told = {name: reject_identified(each, one.cause) for name, each in told.items()}
+    return told
+
+
+def join_reasons(*reasons: str) -> str:
+    """Join the reasons of a verdict, sentence after sentence."""
+    return " ".join(part for part in reasons if part)
 
 
 def propagate(

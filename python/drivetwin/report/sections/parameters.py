@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from drivetwin._util.display_units import (
     NM,
@@ -18,6 +18,7 @@ from drivetwin._util.display_units import (
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import run_residual_tests
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
+from drivetwin.findings import Finding, render, select_warnings
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.figures.parameters import plot_intervals
 from drivetwin.report.labels import get_parameter_label
@@ -61,8 +62,7 @@ UNEVEN = 1.5
 def build_parameters_section(found: Identification) -> Section:
     """Verdicts, agreement and warnings at a glance, then the parameter table."""
     blocks: list[Block] = [TilesBlock(_build_tiles(found))]
-    if found.warnings:
-        blocks.append(NotesBlock("Warnings", found.warnings, Tone.DOUBTFUL))
+    blocks += _build_findings(found.findings)
     blocks.append(build_parameter_table(found))
     if found.fit:
         blocks.append(build_fit_table(found))
@@ -74,6 +74,14 @@ def build_parameters_section(found: Identification) -> Section:
         )
     )
     return Section("trust", "Can I trust this model?", _write_headline(found), blocks)
+
+
+def _build_findings(findings: Sequence[Finding]) -> list[Block]:
+    """Build the lists of warnings and of remarks."""
+    warnings = select_warnings(findings)
+    remarks = [one for one in findings if one not in warnings]
+    named = (("Warnings", warnings, Tone.DOUBTFUL), ("Remarks", remarks, Tone.PLAIN))
+    return [NotesBlock(head, render(those), tone) for head, those, tone in named if those]
 
 
 def _write_headline(found: Identification) -> str:
@@ -103,12 +111,12 @@ def _write_answer(found: Identification) -> str:
     if not found.fit:
         against.append("the model could not be simulated over the log")
     elif any(_find_missed_phase(fits) for fits in found.fit.values()):
-        against.append("the simulation leaves too much of an output")
+        against.append("the simulation does not match the measurement")
     if passed < tests:
         against.append("the residuals show an effect that the model lacks")
     if count[Verdict.WEAK] or count[Verdict.NOT_IDENTIFIABLE]:
         against.append("not every parameter is known well")
-    if found.warnings:
+    if select_warnings(found.findings):
         against.append("there are warnings")
     if not against:
         return "Yes, within the range that the log covered."
@@ -122,7 +130,7 @@ def count_consistent_residuals(found: Identification) -> tuple[int, int]:
         return 0, 0
     tests = [test for group in run_residual_tests(fit).values() for test in group]
     total = sum(1 + len(test.correlation) for test in tests)
-    return total - sum(len(test.warnings) for test in tests), total
+    return total - sum(len(test.findings) for test in tests), total
 
 
 def _count_verdicts(found: Identification) -> Counter[Verdict]:
@@ -154,8 +162,9 @@ def _build_tiles(found: Identification) -> list[Tile]:
             "parameters",
         )
     )
-    tone = Tone.DOUBTFUL if found.warnings else Tone.GOOD
-    tiles.append(Tile("warnings", str(len(found.warnings)), tone))
+    warnings = select_warnings(found.findings)
+    tone = Tone.DOUBTFUL if warnings else Tone.GOOD
+    tiles.append(Tile("warnings", str(len(warnings)), tone))
     return tiles
 
 

@@ -12,6 +12,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.paper.wlse import GridFit
+from drivetwin.findings import render
 from drivetwin.report.figures.load import plot_load
 from drivetwin.report.figures.momentum import plot_momentum
 from drivetwin.report.figures.ringdown import build_ringdown_panels, plot_ringdown
@@ -146,7 +147,7 @@ def _build_grid_blocks(
 ) -> list[Block]:
     """Build figure and table of a grid search, with any doubt about it between the two."""
     fit: GridFit = getattr(one.stages, stage)
-    doubt = one.stages.doubts.get(parameter)
+    doubt = render(one.stages.doubts.get(parameter, ()))
     text = (
         f"{one.by}, weighted least squares (Fig. 6): samples whose own quotient lies in the "
         "plausible range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise "
@@ -154,7 +155,7 @@ def _build_grid_blocks(
     )
     blocks: list[Block] = [FigureBlock(plot_wlse(fit, labels), text)]
     if doubt:
-        blocks.append(NotesBlock("Not to be relied on", [doubt], Tone.DOUBTFUL))
+        blocks.append(NotesBlock("Not to be relied on", doubt, Tone.DOUBTFUL))
     return [*blocks, build_grid_table(fit, labels, Tone.DOUBTFUL if doubt else Tone.GOOD)]
 
 

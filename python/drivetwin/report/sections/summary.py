@@ -8,6 +8,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
+from drivetwin.findings import render
 from drivetwin.report.figures.friction import plot_friction
 from drivetwin.report.figures.recording import build_log_panels, plot_log
 from drivetwin.report.figures.shift_phases import build_shift_panels, plot_shift_phases
@@ -71,8 +72,8 @@ def build_shift_section(found: Identification, log: ShiftLog) -> Section:
             )
         )
         blocks.append(_build_phase_table(name, shift))
-        if shift.warnings:
-            blocks.append(NotesBlock("About this shift", shift.warnings, Tone.DOUBTFUL))
+        if shift.findings:
+            blocks.append(NotesBlock("About this shift", render(shift.findings), Tone.DOUBTFUL))
     if found.rejected:
         texts = [f"{r.time[0]:.2f} to {r.time[1]:.2f} s: {r.reason}" for r in found.rejected]
         blocks.append(NotesBlock("Not used", texts))

@@ -12,6 +12,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.multi_log import FAR, Consistency, LogShare, Several
 from drivetwin.estimation.result.validation import HeldOut, Outcome, Validation
+from drivetwin.findings import render
 from drivetwin.parameters import split_log_number
 from drivetwin.report.figures.comparison import plot_agreement
 from drivetwin.report.figures.validation import build_validation_panels, plot_validation
@@ -74,7 +75,7 @@ def build_joint_section(found: Identification, several: Several) -> Section:
     return Section(
         "logs",
         "The logs together",
-        f"{tested.text[:1].upper()}{tested.text[1:]}. The driveline is one for all logs; load and "
+        f"{tested.text} The driveline is one for all logs; load and "
         "age of the engine torque are each log's own. A design value counts once.",
         blocks,
     )
@@ -172,7 +173,7 @@ def build_holdout_section(found: Identification, held: Sequence[HeldOut]) -> Sec
         )
         text = "What these logs have of their own, told by the gear held before the shift alone."
         blocks.append(TableBlock(text, head, own))
-    notes = [f"{one.name}: {text}" for one in held for text in one.notes]
+    notes = [f"{one.name}: {text}" for one in held for text in render(one.findings)]
     if notes:
         blocks.append(NotesBlock("About the predictions", notes, Tone.DOUBTFUL))
     for one in held:

@@ -8,6 +8,7 @@ from typing import Any
 from dash import Input, Output, State, dcc, html
 from dash.development.base_component import Component
 
+from drivetwin.findings import render
 from drivetwin.logs.formats.detect import SUFFIXES
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
@@ -141,7 +142,7 @@ def _build_content(opened: Opened) -> list[Component]:
     return [
         build_facts_line(facts),
         *([ui.make_table(_SHIFT_HEAD, shifts, "Shifts of the log")] if shifts else []),
-        ui.make_notes("About the log", log.warnings),
+        ui.make_notes("About the log", render(log.findings)),
         ui.make_notes(
             "Not used" if shifts else "No usable shift", refused, "plain" if shifts else "doubtful"
         ),

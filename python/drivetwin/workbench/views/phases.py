@@ -10,6 +10,7 @@ from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import format_significant, get_display_unit
+from drivetwin.findings import render
 from drivetwin.report.sections.summary import describe_phases
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift, make_shift_labels
@@ -119,7 +120,7 @@ def _build_content(work: SessionState) -> list[Component]:
             edits={"shapePosition": True},
         ),
         ui.make_hint(describe_phases(shift.kind)),
-        ui.make_notes("About this shift", shift.warnings),
+        ui.make_notes("About this shift", render(shift.findings)),
         _build_quality(shift),
     ]
 

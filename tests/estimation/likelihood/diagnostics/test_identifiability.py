@@ -16,6 +16,7 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_parameters,
 )
 from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.findings import Code
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 
 SHORT = 0.003
@@ -27,20 +28,20 @@ def test_an_age_at_the_limit_of_the_search_is_not_identified(side: float, word: 
     made = bench()
     posed, start = problem(made)
     limit = made.truth["te_delay"] + side * SHORT
-    bounds = {"more": posed.upper.copy(), "less": posed.lower.copy()}
+    bounds = {"larger": posed.upper.copy(), "smaller": posed.lower.copy()}
     bounds[word][start.names.index("te_delay")] = limit
-    fit = fit_local(replace(posed, upper=bounds["more"], lower=bounds["less"]), start)
+    fit = fit_local(replace(posed, upper=bounds["larger"], lower=bounds["smaller"]), start)
     assert fit is not None
     told = build_estimates(fit, [made.signals], [made.driveline], {}, {})
     age = told.estimates["te_delay"]
     assert age.value == pytest.approx(limit)
     assert age.verdict is Verdict.WEAK
-    assert f"the limit of the search: the log speaks for {word}" in age.reason
-    assert any(text.startswith("te_delay: ") for text in told.warnings)
+    assert f"the bound of the search; the log indicates a {word} value" in age.reason
+    assert Code.AT_BOUND in [one.code for one in told.findings if one.subject == "te_delay"]
 
 
 def test_within_the_limits_nothing_is_said() -> None:
     fit, signals = fitted(), [bench().signals]
     std = np.sqrt(np.diag(fit.covariance))
     ids = tuple(compute_parameters(fit.problem, fit.mean, signals))
-    assert find_at_bounds(fit, ids, compute_jacobian(fit.problem, fit.mean, std, signals)) == {}
+    assert find_at_bounds(fit, ids, compute_jacobian(fit.problem, fit.mean, std, signals)) == []

@@ -15,6 +15,7 @@ from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection import loss_law
+from drivetwin.findings import render
 from drivetwin.simulation.dual_clutch import LossLaw
 from tests.estimation.likelihood.fixtures import bench, fitted, truth_of
 from tests.support.bench import Bench, Knowledge, record_bench
@@ -40,7 +41,7 @@ def _fit(true: LossLaw, card: LossLaw) -> LikelihoodFit:
 
 def _said(made: Bench, fit: LikelihoodFit) -> list[str]:
     told = build_estimates(fit, [made.signals], [made.driveline], {}, {})
-    return [text for text in told.warnings if "loss_law" in text]
+    return [text for text in render(told.findings) if "loss_law" in text]
 
 
 @pytest.mark.parametrize("true", LAWS)
@@ -48,13 +49,13 @@ def test_a_wrong_law_is_told_with_what_the_right_one_gives(true: LossLaw) -> Non
     wrong, right = _fit(true, loss_law.OTHER[true]), _fit(true, true)
     (text,) = _said(_made(true), wrong)
     assert f"loss_law = '{true}'" in text
-    assert "speaks for it" in text
+    assert "supports it" in text
     told = float(text.split("k_o = ")[1].split(" Nm")[0].replace("\u202f", ""))
     k = right.point.names.index("k_o")
     std = float(np.sqrt(right.covariance[k, k]))
     assert abs(told - right.point["k_o"]) < 0.5 * std
     assert abs(told - wrong.point["k_o"]) > 3.0 * std
-    fall = float(text.split("(Q ")[1].rstrip(")"))
+    fall = float(text.split("(Q ")[1].rstrip(")."))
     # The expansion stops at second order, and weighs by the wrong law's response.
     assert fall == pytest.approx(right.normal.cost - wrong.normal.cost, rel=0.1)
 

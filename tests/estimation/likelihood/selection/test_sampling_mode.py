@@ -68,7 +68,7 @@ def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> N
     truth = record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH).truth["te_delay"]
     assert abs(truth - value) < 1.96 * std
     assert len(doubts) == 1
-    assert doubts[0].endswith("output torque")
+    assert doubts[0].names["channels"] == "output torque"
 
 
 def test_it_does_not_matter_from_which_kind_one_comes() -> None:
@@ -204,7 +204,7 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     far = abs(other.point["te_delay"] - best.point["te_delay"])
     assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
     assert far < 1.96 * _age(wide)[1]
-    assert "engine speed" in doubts[0]
+    assert "engine speed" in doubts[0].text
     monkeypatch.setattr(of_signals, "EITHER_KIND", -np.inf)
     assert widen_over_modes(posed, best) == (best, [])
 

@@ -22,6 +22,7 @@ from drivetwin.estimation.likelihood.selection import select_model as selection_
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS
 from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
+from drivetwin.findings import Code, Finding
 from drivetwin.simulation.dual_clutch import RoadLoad
 from tests.estimation.likelihood.fixtures import truth_of
 from tests.support.bench import Bench, Knowledge, record_bench
@@ -38,7 +39,7 @@ def _sent(scenario: Scenario, rate: float, means: bool) -> Scenario:
     return replace(scenario, sensors=tuple(sensors))
 
 
-def _chosen(made: Bench) -> tuple[LikelihoodFit, tuple[str, ...]]:
+def _chosen(made: Bench) -> tuple[LikelihoodFit, tuple[Finding, ...]]:
     law = made.run.scenario.model.loss_law
     return select_model([made.signals], [made.driveline], law, truth_of(made))
 
@@ -53,7 +54,7 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     fit, notes = _chosen(made)
-    assert any("grows with the square of the speed" in note for note in notes)
+    assert any(note.code is Code.LOAD_GROWS for note in notes)
     speed = fit.problem.parts[0].structure.mean_speed
     assert _deviation(fit, AERO, GROWTH) < 3.5
     assert _deviation(fit, "Tv_over_if", load.evaluate(speed) / base.model.i_f) < 3.5
@@ -67,7 +68,7 @@ def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.Monk
     monkeypatch.setattr(aero_load, "is_significant", lambda *_: False)
     fit, notes = _chosen(made)
     assert AERO not in fit.point.names
-    assert not any("grows" in note for note in notes)
+    assert Code.LOAD_GROWS not in [note.code for note in notes]
     k = fit.point.names.index("J_vehicle")
     far = abs(fit.point["J_vehicle"] - base.model.J_v)
     assert far > 5.0 * np.sqrt(compute_covariance(fit.problem, fit.normal, fit.chi2)[k, k])
@@ -99,7 +100,7 @@ def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search
 def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
     made = record_bench(_sent(load_scenario("paper_steps"), rate, means), 0, Knowledge())
     fit, notes = _chosen(made)
-    assert any("means over their period" in note for note in notes) == means
+    assert (Code.MEAN_SAMPLES in [note.code for note in notes]) == means
     assert fit.problem.kinds == (frozenset(SPEEDS) if means else frozenset())
     assert AERO not in fit.point.names
     assert fit.chi2 == pytest.approx(1.0, abs=0.05)

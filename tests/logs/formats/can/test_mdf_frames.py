@@ -60,7 +60,7 @@ def test_the_same_log_as_from_the_bus(tmp_path: Path) -> None:
     for role, channel in expected.channels.items():
         assert np.array_equal(found[role].values, channel.values)
         assert found[role].time == pytest.approx(channel.time, abs=1e-6)
-    assert found.warnings == expected.warnings
+    assert found.findings == expected.findings
 
 
 def test_groups_of_one_bus_are_put_in_order(tmp_path: Path) -> None:
@@ -118,4 +118,4 @@ def test_frames_from_1970_count_from_the_first_of_the_file(tmp_path: Path) -> No
     start = min(time for time, _, _ in frames())
     for role, channel in expected.channels.items():
         assert found[role].time == pytest.approx(channel.time - start, abs=2e-6)
-    assert "time counts from the first stamp" in found.warnings[0]
+    assert "time counts from the first stamp" in found.findings[0].text

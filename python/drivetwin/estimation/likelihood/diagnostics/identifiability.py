@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.parametrization import LAW
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.parameters import get_parameter_spec
 
 MAX_RELATIVE_STD = 0.2
@@ -27,26 +27,24 @@ NAMED = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "mu_c",
 SHOWN = {"eta": "η", "J_e": "J′", "J_out": "Jo′", "J_vehicle": "J3", "Tv_over_if": "T_v"}
 
 
-def describe_null_directions(fit: LikelihoodFit) -> tuple[str, ...]:
-    """Return one sentence for each direction that is not identifiable without the priors."""
+def find_null_directions(fit: LikelihoodFit) -> list[Finding]:
+    """Return a finding for each direction that is not identifiable without the priors."""
     names = fit.point.names
     keep = [k for k, name in enumerate(names) if _is_reported(name, names)]
     rest = [k for k in range(len(names)) if k not in keep]
     size = np.abs(fit.point.values[keep])
     relative = reduce_information(fit.normal.data, keep, rest) * np.outer(size, size)
     power, directions = np.linalg.eigh(relative)
-    texts = []
+    found = []
     for value, direction in zip(power, directions.T, strict=True):
         std = 1.0 / np.sqrt(max(float(value), 1e-12))
         if std < MAX_RELATIVE_STD:
             break
         strong = [k for k in np.argsort(-np.abs(direction)) if abs(direction[k]) > SHARE]
         shown = " and ".join(_format_unknown(names[keep[k]]) for k in strong)
-        texts.append(
-            f"without the card's design values the log leaves {shown} open "
-            + ("together: only their combination is told" if len(strong) > 1 else "")
-        )
-    return tuple(text.strip() for text in texts)
+        code = Code.NULL_DIRECTIONS if len(strong) > 1 else Code.NULL_DIRECTION
+        found.append(report(code, parameters=shown))
+    return found
 
 
 def _is_reported(name: str, names: Sequence[str]) -> bool:
@@ -72,19 +70,19 @@ def _format_unknown(name: str) -> str:
     return f"{symbol} of {element}" if element else symbol
 
 
-def find_at_bounds(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -> dict[str, str]:
-    """Return a warning by id for each parameter that is an unknown on one of its bounds.
+def find_at_bounds(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -> list[Finding]:
+    """Return a finding for each parameter that is an unknown on one of its bounds.
 
     `slopes` (q, p) is the derivative of the parameters `ids` by the unknowns of the fit.
     """
     values, near = fit.point.values, BOUND_STD * np.sqrt(np.diag(fit.covariance))
     below, above = values <= fit.problem.lower + near, values >= fit.problem.upper - near
-    found = {}
+    found = []
     for name, row in zip(ids, slopes, strict=True):
         (acting,) = np.nonzero(row)
         if acting.size != 1 or not (below | above)[acting[0]]:
             continue
-        side = "more" if above[acting[0]] else "less"
-        limit = format_with_unit(float(values[acting[0]]), get_parameter_spec(name).unit)
-        found[name] = f"{limit} is the limit of the search: the log speaks for {side}"
+        side = "larger" if above[acting[0]] else "smaller"
+        limit = Number(float(values[acting[0]]), get_parameter_spec(name).unit)
+        found.append(report(Code.AT_BOUND, name, limit=limit, side=side))
     return found

@@ -21,6 +21,7 @@ from drivetwin.estimation.likelihood.coloured_noise import (
 )
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.simulation.dual_clutch import Signal
 
 MAX_EXCESS_POWER = 1.6
@@ -41,22 +42,20 @@ class ResidualTest:
     correlation: dict[str, float]
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings of the test, as sentences."""
-        name = self.output.replace("_", " ")
-        texts = []
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings of the test, without the label of the shift."""
+        name, found = self.output.replace("_", " "), []
         if self.excess > MAX_EXCESS_POWER:
-            texts.append(
-                f"the residual of the {name} is not white: over {1e3 * BLOCK:.0f} ms it has "
-                f"{self.excess:.1f} times the power of noise, which widens intervals; the noise of "
-                "the sensor is slow, as behind a filter, or some effect is not in the model"
+            code = Code.RESIDUAL_COLOURED
+            found.append(report(code, channel=name, block=Number(BLOCK, "s"), power=self.excess))
+        found += [
+            report(
+                Code.RESIDUAL_CORRELATED, channel=name, source=source.replace("_", " "), size=size
             )
-        texts += [
-            f"the residual of the {name} goes with the {source} ({size:+.0f} standard deviations)"
             for source, size in self.correlation.items()
             if abs(size) > SIGNIFICANT
         ]
-        return tuple(texts)
+        return tuple(found)
 
 
 def compute_white_residuals(
@@ -92,45 +91,35 @@ def run_residual_tests(
     return found
 
 
-def describe_contradiction(fit: LikelihoodFit, residuals: Sequence[FloatArray]) -> str:
-    """Return why the residuals contradict every value of the fit; empty if they do not.
+def check_residuals(
+    fit: LikelihoodFit, labels: Sequence[str], residuals: Sequence[FloatArray] | None = None
+) -> list[Finding]:
+    """Return the findings of all tests; `labels` are those of the shifts, `residuals` as in
+    `compute_white_residuals`.
 
     Noise is correlated with no input, unless it is as slow as the log is long. A correlated
     residual shows a missing effect or a drift, whose influence on the parameters no interval
     covers.
     """
-    found = {
-        (test.output, source): abs(size)
-        for tests in run_residual_tests(fit, residuals).values()
+    tested = run_residual_tests(fit, residuals).values()
+    return [
+        finding.set_subject(label)
+        for tests, label in zip(tested, labels, strict=True)
         for test in tests
-        for source, size in test.correlation.items()
-    }
-    (output, source), size = max(found.items(), key=lambda one: one[1])
-    if size <= SIGNIFICANT:
-        return ""
-    name = output.replace("_", " ")
-    return (
-        f"the residual of the {name} goes with the {source}: some effect is not in the model, or a "
-        "sensor drifts"
-    )
+        for finding in test.findings
+    ]
 
 
-def describe_unweighted(fit: LikelihoodFit, labels: Sequence[str]) -> str:
-    """Return a warning if the weighting of a part omits the noise of the inputs; else empty.
+def check_weighting(fit: LikelihoodFit, labels: Sequence[str]) -> list[Finding]:
+    """Return a finding for each shift whose weighting omits the noise of the inputs.
 
     That is the case if a run has no finite response to the noise. `labels` are those of the shifts.
     """
-    left = [
-        label
+    return [
+        report(Code.INPUT_NOISE_OMITTED, label)
         for part, label in zip(fit.problem.parts, labels, strict=True)
         if part.weighting.path is None
     ]
-    if not left:
-        return ""
-    return (
-        f"{', '.join(left)}: the noise of engine torque and pressures is not counted, for the "
-        "simulation has no finite response to it: intervals are too narrow"
-    )
 
 
 def _run_test(

@@ -15,7 +15,9 @@ from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.effect import Group
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS, describe_group
-from drivetwin.estimation.result.estimate import Z95, Estimate
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.findings import Code, Finding, report
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.effects import EffectId
 
 
@@ -116,24 +118,37 @@ def _estimate_size(
     return size, float(one.std[0]) * unit
 
 
-def describe_cause(
-    cause: Cause, estimates: Mapping[str, Estimate], correction: Correction, jacobian: FloatArray
-) -> str:
-    """Describe a cause: what it is, how large, what it changes, what to do."""
-    names = " or ".join(describe_group(one) for one in (cause.group, *cause.equivalent))
-    effect = EFFECTS[cause.group.effect]
-    verb = "the log shows" if cause.is_certain else "the log may show"
+def report_cause(
+    correction: Correction,
+    priors: EffectPriors,
+    values: Mapping[str, float],
+    jacobian: FloatArray,
+    std: FloatArray,
+) -> list[Finding]:
+    """Report the cause that the log shows: how large it is, what it moves, what to do.
+
+    `values` are the parameters by id, `jacobian` (k, p) their derivatives by the unknowns, `std`
+    (k,) their total standard deviations.
+    """
+    cause = find_cause(correction, priors)
+    if cause is None:
+        return []
     moves = jacobian @ correction.evidence[cause.group].moves
     changes = [
-        f"{name} by {format_with_unit(float(move), one.unit, digits=2)}"
-        for (name, one), move in zip(estimates.items(), moves, strict=False)
-        if one.std_total and abs(move) > one.std_total
+        f"{name} by {format_with_unit(float(move), get_parameter_spec(name).unit, digits=2)}"
+        for name, move, one in zip(values, moves, std, strict=True)
+        if abs(move) > one
     ]
-    moved = f"; the values allow for it: it moves {', '.join(changes)}" if changes else ""
-    return (
-        f"{verb} {names}: {_format_size(cause)} (log evidence {cause.evidence:.0f}){moved}; "
-        f"{effect.remedy}"
-    )
+    return [
+        report(
+            Code.EFFECT_FOUND if cause.is_certain else Code.EFFECT_POSSIBLE,
+            effect=" or ".join(describe_group(one) for one in (cause.group, *cause.equivalent)),
+            size=_format_size(cause),
+            evidence=cause.evidence,
+            changes=", ".join(changes) or "no value by more than its interval",
+            advice=EFFECTS[cause.group.effect].remedy,
+        )
+    ]
 
 
 def _format_size(cause: Cause) -> str:

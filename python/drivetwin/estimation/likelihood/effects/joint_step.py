@@ -26,6 +26,7 @@ from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.effects.effect import Group
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.score import compute_score
 from drivetwin.estimation.optimize.objective import NormalEquations
 from drivetwin.vehicle.effects import EffectId
 
@@ -141,24 +142,14 @@ def weight_columns(
     problem: LikelihoodObjective, normal: NormalEquations, columns: EffectColumns
 ) -> WeightedColumns:
     """Form the weighted sums of `columns` at the point of the expansion `normal`."""
-    count, size = len(columns.groups), normal.gradient.size
-    own, cross, pull = np.zeros((count, count)), np.zeros((size, count)), np.zeros(count)
-    gradient, weighted = normal.gradient.copy(), []
-    for part, z, known, residual, regressors in zip(
-        problem.parts,
-        columns.matrices,
-        columns.known,
-        normal.residuals,
-        normal.regressors,
-        strict=True,
+    score = compute_score(problem, normal, columns.matrices)
+    pull, gradient = score.pull.copy(), normal.gradient.copy()
+    for known, weighted, regressors in zip(
+        columns.known, score.weighted, normal.regressors, strict=True
     ):
-        one = part.weighting.apply_inverse(z)
-        own += z.T @ one
-        cross += regressors.T @ z
-        pull += one.T @ (residual - known)
+        pull -= weighted.T @ known
         gradient += regressors.T @ known
-        weighted.append(one)
-    return WeightedColumns(columns, own, cross, pull, gradient, tuple(weighted))
+    return WeightedColumns(columns, score.own, score.cross, pull, gradient, score.weighted)
 
 
 def scale_by_evidence(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.effect import Group
 from drivetwin.estimation.likelihood.effects.table import describe_group
+from drivetwin.findings import Code, Finding, report
 from drivetwin.vehicle.effects import EffectId
 
 
@@ -36,28 +38,31 @@ EXEMPT = (EffectId.FRICTION_SHAPE, EffectId.SENSOR_TOLERANCE)
 """Effects whose amounts may be large: shapes have no usual size, tolerances are the card's."""
 
 
-def find_unreliable(correction: Correction, jacobian: FloatArray, std: FloatArray) -> list[str]:
-    """Return the reason why each value is not to be relied on; empty where it is.
+def find_unreliable(
+    correction: Correction, ids: Sequence[str], jacobian: FloatArray, std: FloatArray
+) -> list[Finding]:
+    """Find the values that the correction does not make reliable, each with the reason as an error.
 
     Parameters
     ----------
+    ids : parameter ids (k,) of the values
     jacobian : derivatives (k, p) of the values by the unknowns of the fit
     std : total standard deviations (k,) of the values
     """
-    if correction.step.chi2 > WITHDRAWAL.chi2:
-        why = f"the residual is {correction.step.chi2:.2g} times the noise with all known effects"
-        return [why] * std.size
-    second = np.abs(jacobian @ np.nan_to_num(correction.second, posinf=np.inf))
-    if not np.all(np.isfinite(correction.second)):
-        second = np.full(std.size, np.inf)
-    reasons = ["" for _ in std]
-    for k in np.flatnonzero(second > WITHDRAWAL.second_step * std):
-        reasons[k] = "the effects that the log shows are too large for a linear correction"
+    chi2 = correction.step.chi2
+    if chi2 > WITHDRAWAL.chi2:
+        return [report(Code.RESIDUAL_UNEXPLAINED, chi2=chi2)]
+    found = []
+    second = np.abs(jacobian @ correction.second)
+    for k in np.flatnonzero(~(second <= WITHDRAWAL.second_step * std)):
+        found.append(report(Code.EFFECT_NOT_LINEAR, ids[int(k)]))
     for group in find_large_groups(correction):
         moves = np.abs(jacobian @ correction.step.contributions[group])
-        for k in np.flatnonzero(moves > WITHDRAWAL.moves * std):
-            reasons[k] = f"it depends on an effect larger than usual: {describe_group(group)}"
-    return reasons
+        found += [
+            report(Code.EFFECT_LARGE, ids[int(k)], effect=describe_group(group))
+            for k in np.flatnonzero(moves > WITHDRAWAL.moves * std)
+        ]
+    return found
 
 
 def find_large_groups(correction: Correction) -> list[Group]:

@@ -16,7 +16,8 @@ from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covarianc
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.linear.load_balance import AERO, SIGNIFICANT
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.result.estimate_set import describe_growth
+from drivetwin.estimation.result.estimate_set import report_growth
+from drivetwin.findings import Finding
 
 
 def is_significant(point: ParameterVector, covariance: FloatArray) -> bool:
@@ -25,13 +26,13 @@ def is_significant(point: ParameterVector, covariance: FloatArray) -> bool:
     return bool(point[AERO] > SIGNIFICANT * np.sqrt(covariance[k, k]))
 
 
-def describe(best: LikelihoodFit) -> list[str]:
-    """Describe a load that grows with speed; empty if it does not."""
+def report_aero_load(best: LikelihoodFit) -> list[Finding]:
+    """Report a load that grows with speed; empty if it does not."""
     if AERO not in best.point.names:
         return []
     k = best.point.names.index(AERO)
     std = float(np.sqrt(best.covariance[k, k]))
-    return [describe_growth(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
+    return [report_growth(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
 
 
 def drop_growth(best: LikelihoodFit, narrower: LikelihoodObjective) -> LikelihoodFit:

@@ -15,6 +15,7 @@ from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.result.estimate import Z95
+from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import LossLaw
 
@@ -23,10 +24,10 @@ RULED_OUT = 10.0
 """Rise of Q from which a model has no support beside another (Burnham and Anderson 2002)."""
 
 
-def describe_other_law(
+def check_other_law(
     fit: LikelihoodFit, values: dict[str, float], slopes: FloatArray, std: FloatArray
-) -> list[str]:
-    """Return warnings if the other law, which the log does not exclude, gives other parameters.
+) -> list[Finding]:
+    """Return a finding if the other law, which the log does not exclude, gives other parameters.
 
     Others are those whose intervals under the two laws do not meet. `values` are the parameters by
     id, `slopes` (q, p) their derivatives by the unknowns, `std` (q,) their standard deviations.
@@ -49,8 +50,6 @@ def describe_other_law(
     ]
     if not apart or rise > RULED_OUT:
         return []
-    spoken = "speaks for it" if rise < -RULED_OUT else "does not tell which of the two holds"
-    return [
-        f"with loss_law = '{OTHER[law]}' on the card the log gives {', '.join(apart)}, apart "
-        f"from what stands here by more than the intervals; it {spoken} (Q {rise:+.1f})"
-    ]
+    support = "supports it" if rise < -RULED_OUT else "does not decide between the laws"
+    shown = ", ".join(apart)
+    return [report(Code.OTHER_LOSS_LAW, law=OTHER[law], values=shown, support=support, rise=rise)]

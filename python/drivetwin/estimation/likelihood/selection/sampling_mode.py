@@ -33,14 +33,15 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
-from drivetwin.estimation.likelihood.diagnostics.misspecification import compute_score
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.optimize.staged_start import fit_lower_gear_only
+from drivetwin.estimation.likelihood.score import compute_score
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95
+from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.shift import Shift
 
 SIGNALS = (*OUTPUTS, TORQUE)
@@ -63,10 +64,6 @@ UNLIKELY = 0.01
 """Weight of a kind below which it is not fitted."""
 MATTERS = 0.5
 """Spread of an unknown over the kinds of a signal, in its standard deviations, worth a word."""
-UNSURE = (
-    "the log hardly tells whether samples show an instant or the time since the sample before, "
-    "values and intervals allow for both: {}"
-)
 WORSE = 1.1
 """Q per sample, as a factor, from which on other kinds are surely no better."""
 SLOW = 4e-3
@@ -165,9 +162,9 @@ def refit_slow_outputs(problem: LikelihoodObjective, best: LikelihoodFit) -> Lik
 
 def average_modes(
     problem: LikelihoodObjective, best: LikelihoodFit
-) -> tuple[LikelihoodFit, list[str]]:
-    """The fit with mean and covariance over all kinds, weighted by their likelihood, and which
-    kinds the log hardly tells, in words.
+) -> tuple[LikelihoodFit, list[Finding]]:
+    """The fit with mean and covariance over all kinds, weighted by their likelihood, and findings
+    on kinds that the log hardly tells.
 
     The minima of two kinds may lie six standard deviations apart and one sample in twenty thousand
     decide between them; an interval about one of them would be wrong as often as that is the wrong
@@ -187,9 +184,9 @@ def average_modes(
 
 def widen_over_modes(
     problem: LikelihoodObjective, best: LikelihoodFit
-) -> tuple[LikelihoodFit, list[str]]:
+) -> tuple[LikelihoodFit, list[Finding]]:
     """The fit with its covariance widened up to the minimum that has the outputs which lie
-    `_far_apart` of the other kind, and that in words; as it is where the deviance rises much to
+    `_far_apart` of the other kind, and a finding; as it is where the deviance rises much to
     there."""
     outputs = _far_apart(problem) & _shown(problem)
     if not outputs:
@@ -207,7 +204,7 @@ def widen_over_modes(
         far = other.point.values - best.point.values
     names = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in outputs)
     widened = replace(best, covariance=best.covariance + np.outer(far, far) / Z95**2)
-    return widened, [UNSURE.format(names)]
+    return widened, [report(Code.SAMPLING_UNCERTAIN, channels=names)]
 
 
 def _start_of_other_outputs(best: LikelihoodFit) -> ParameterVector:
@@ -275,21 +272,21 @@ def _rise(problem: LikelihoodObjective, one: LikelihoodFit, other: LikelihoodFit
     return other.normal.cost - one.normal.cost + prices
 
 
-def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[str]:
-    """Return warnings for signals whose mode is uncertain and moves an unknown against its `std`
+def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[Finding]:
+    """Return a finding for signals whose mode is uncertain and moves an unknown against its `std`
     (p,); `weight` (q,) is that of each choice."""
     single = np.sum(choices.flips, axis=1) == 1.0
     moves = choices.flips[single].T @ np.abs(choices.steps[single]) / std
     share = weight @ choices.flips
     spread = np.sqrt(share * (1.0 - share)) * np.max(moves, axis=1)
     names = [n.replace("_", " ") for n, k in zip(SIGNALS, spread, strict=True) if k > MATTERS]
-    return [UNSURE.format(", ".join(names))] if names else []
+    return [report(Code.SAMPLING_UNCERTAIN, channels=", ".join(names))] if names else []
 
 
-def describe_modes(kinds: frozenset[str]) -> list[str]:
-    """Describe the signals that are not as read."""
+def report_modes(kinds: frozenset[str]) -> list[Finding]:
+    """Report the signals that are not as read."""
     means = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in kinds)
-    return [f"samples are means over their period, which fits better: {means}"] if means else []
+    return [report(Code.MEAN_SAMPLES, channels=means)] if means else []
 
 
 def _promising(

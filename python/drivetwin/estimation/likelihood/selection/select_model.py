@@ -32,15 +32,16 @@ from drivetwin.estimation.likelihood.selection import aero_load
 from drivetwin.estimation.likelihood.selection.per_shift_load import fit_common_load
 from drivetwin.estimation.likelihood.selection.sampling_mode import (
     average_modes,
-    describe_modes,
     refit_best_mode,
     refit_slow_outputs,
+    report_modes,
     select_sampling_mode,
     widen_over_modes,
 )
 from drivetwin.estimation.likelihood.selection.touch_point_minima import find_best_minimum
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.findings import Finding
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import LossLaw
 
@@ -72,8 +73,8 @@ def select_model(
     drivelines: Sequence[KnownDriveline],
     loss_law: LossLaw,
     guess: Mapping[str, float],
-) -> tuple[LikelihoodFit, tuple[str, ...]]:
-    """Fit the variant that the log supports; return the decisions as sentences.
+) -> tuple[LikelihoodFit, tuple[Finding, ...]]:
+    """Fit the variant that the log supports; return the decisions as findings.
 
     Raises IdentificationError where no variant converges.
     """
@@ -94,7 +95,7 @@ def select_model(
         guess = growing if aero_load.is_significant(point, covariance) else constant
         narrower = build_problem(signals, drivelines, loss_law, guess, hilly=level is None)
         best, problem = _restrict(best, point, narrower, shifts) or (best, problem)
-    notes = aero_load.describe(best)
+    notes = aero_load.report_aero_load(best)
     with (
         scale_progress(0.65, 0.85, "other minima"),
         limit_evaluations(min(SELECTION.max_touch_point_work, search.left)),
@@ -107,7 +108,7 @@ def select_model(
         best, doubts = average_modes(problem, best)
     with limit_evaluations(SELECTION.max_sampling_mode_work):
         best, either = widen_over_modes(problem, best)
-    return best, (*notes, *describe_modes(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
+    return best, (*notes, *report_modes(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
 
 def _restrict(

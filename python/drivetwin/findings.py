@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: MIT
+"""Findings: remarks on a log, a fit or a run as data; `findings.toml` has their sentences."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum, auto
+from functools import cache
+from pathlib import Path
+
+from drivetwin._util.display_units import format_with_unit
+from drivetwin.errors import Where
+
+
+class Severity(StrEnum):
+    """Severity of a finding; an error means that its subject does not count as identified."""
+
+    INFO = auto()
+    WARNING = auto()
+    ERROR = auto()
+
+
+class Code(StrEnum):
+    """Kind of a finding, the key of its entry in the catalogue."""
+
+    RECORDING = auto()
+    SHIFTS_NOT_FITTED = auto()
+    LOCKUP_UNKNOWN = auto()
+    CONVERTER_MAP_EXACT = auto()
+    INPUT_SPEED_SUBSTITUTED = auto()
+    OUTPUT_SPEED_SUBSTITUTED = auto()
+    POWER_STATE_UNKNOWN = auto()
+    RATIO_DEVIATES = auto()
+    TORQUE_PHASE_EMPTY = auto()
+    TORQUE_PHASE_SHARED_CLUTCH = auto()
+    TORQUE_PHASE_FROM_TORQUE = auto()
+    TORQUE_PHASE_FROM_FLAG = auto()
+    TORQUE_PHASE_UNKNOWN = auto()
+    SHIFT_FLAG_NOT_SET = auto()
+    GEAR_SIGNAL_DIFFERS = auto()
+    BEFORE_CUT = auto()
+    AFTER_CUT = auto()
+    SET_BY_HAND = auto()
+    GEAR_POORLY_EXCITED = auto()
+    LOAD_GROWS = auto()
+    LOADS_DIFFER = auto()
+    LOAD_CHANGES_WITH_SPEED = auto()
+    REGRESSION_NOISY = auto()
+    REGRESSION_MISFIT = auto()
+    NO_FRICTION_CURVE = auto()
+    MEAN_SAMPLES = auto()
+    SAMPLING_UNCERTAIN = auto()
+    NULL_DIRECTION = auto()
+    NULL_DIRECTIONS = auto()
+    AT_BOUND = auto()
+    RESIDUAL_COLOURED = auto()
+    RESIDUAL_CORRELATED = auto()
+    INPUT_NOISE_OMITTED = auto()
+    RESIDUAL_UNEXPLAINED = auto()
+    EFFECT_FOUND = auto()
+    EFFECT_POSSIBLE = auto()
+    EFFECT_LARGE = auto()
+    EFFECT_NOT_LINEAR = auto()
+    OTHER_LOSS_LAW = auto()
+    METHODS_DIFFER = auto()
+    LIKELIHOOD_FAILED = auto()
+    LINEAR_METHOD_FAILED = auto()
+    PAPER_METHOD_FAILED = auto()
+    PAPER_BIASED = auto()
+    PAPER_POORLY_EXCITED = auto()
+    CARD_CONTRADICTED = auto()
+    FIXED_VALUE_CONTRADICTED = auto()
+    OUTSIDE_DESIGN_RANGE = auto()
+    EFFICIENCY_ABOVE_ONE = auto()
+    EFFICIENCY_ABOVE_ONE_BY_PAPER = auto()
+    LOGS_AGREE = auto()
+    LOGS_DISAGREE = auto()
+    SIMULATION_ENDED_EARLY = auto()
+    SIMULATION_DIVERGES = auto()
+    OUTSIDE_IDENTIFIED_RANGE = auto()
+    NOT_VALIDATED = auto()
+    NOT_PREDICTED = auto()
+    FRICTION_LAW_SUBSTITUTED = auto()
+    NO_TORQUE_SCALE = auto()
+    DELAY_NOT_EXCITED = auto()
+    FIXED_BY_CARD = auto()
+    CARD_DOMINATES = auto()
+    CARD_MORE_CERTAIN = auto()
+    CARD_FILL_PRESSURE = auto()
+    PAPER_CARD_VALUE = auto()
+    PAPER_NO_INTERVAL = auto()
+    PAPER_DOUBTFUL_INERTIA = auto()
+    PAPER_GRID_END = auto()
+    IMPOSSIBLE_VALUE = auto()
+    CARD_FOR_IMPOSSIBLE = auto()
+    INTERVAL_WIDER_THAN_VALUE = auto()
+    INTERVAL_WIDE = auto()
+    INTERVAL_WIDE_WITH_PRIOR = auto()
+    LOG_CONTRADICTS_CARD = auto()
+    DEPENDS_ON_PRIOR = auto()
+    DEPENDS_ON_EFFECT = auto()
+    DISAGREEING_LOG = auto()
+    SENSOR_LIMITED = auto()
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Entry of the catalogue: sentence, remedy and severity of a code.
+
+    The texts contain the numbers and names of a finding in braces. The subject leads the sentence
+    unless `text` contains it.
+    """
+
+    text: str
+    remedy: str = ""
+    severity: Severity = Severity.WARNING
+
+
+@cache
+def load_catalogue() -> dict[Code, Entry]:
+    """Load the catalogue; raises ValueError for an unknown code or severity."""
+    tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    return {
+        Code(code): Entry(**table | {"severity": Severity(table.get("severity", "warning"))})
+        for code, table in tables.items()
+    }
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of a finding: `value` and `half_width` of its interval in the SI `unit`.
+
+    In a template `{x}` is the number in its display unit, `{x:2}` the same with two digits and
+    `{x:.1f}` the SI value alone.
+    """
+
+    value: float
+    unit: str = "1"
+    half_width: float | None = None
+
+    def __format__(self, spec: str) -> str:
+        if spec and not spec.isdecimal():
+            return format(self.value, spec)
+        return format_with_unit(self.value, self.unit, self.half_width, int(spec or 4))
+
+
+Value = str | float | Number
+"""What fills a template: a name, a number without unit, or a number."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Remark on `subject` (parameter id, channel or shift label; empty for the whole) at `place`.
+
+    `numbers` (SI) and `names` fill the texts of `code`.
+    """
+
+    code: Code
+    subject: str = ""
+    place: Where = field(default_factory=Where)
+    numbers: Mapping[str, Number] = field(default_factory=dict, hash=False)
+    names: Mapping[str, str] = field(default_factory=dict, hash=False)
+
+    @property
+    def severity(self) -> Severity:
+        """Severity of the code."""
+        return load_catalogue()[self.code].severity
+
+    @property
+    def cause(self) -> str:
+        """Cause with its numbers, as a sentence without the subject."""
+        return self._fill(load_catalogue()[self.code].text)
+
+    @property
+    def remedy(self) -> str:
+        """What to do, as a sentence; empty where nothing helps."""
+        return self._fill(load_catalogue()[self.code].remedy)
+
+    @property
+    def reason(self) -> str:
+        """Cause and remedy."""
+        return " ".join(part for part in (self.cause, self.remedy) if part)
+
+    @property
+    def text(self) -> str:
+        """Place, subject, cause and remedy."""
+        told = "{subject}" in load_catalogue()[self.code].text
+        heads = (str(self.place), "" if told else self.subject)
+        return ": ".join(part for part in (*heads, self.reason) if part)
+
+    def set_subject(self, subject: str) -> Finding:
+        """Return the finding with a subject; unchanged if it has one."""
+        return self if self.subject else replace(self, subject=subject)
+
+    def set_file(self, file: str) -> Finding:
+        """Return the finding with the file of its place."""
+        return replace(self, place=replace(self.place, file=file))
+
+    def _fill(self, template: str) -> str:
+        """Fill a template; its sentence ends in a period."""
+        text = template.format(subject=self.subject, **self.numbers, **self.names)
+        return f"{text}." if text and text[-1] not in ".?!" else text
+
+
+def report(
+    code: Code, subject: str = "", place: Where | None = None, /, **values: Value
+) -> Finding:
+    """Build a finding; texts among `values` are names, all others numbers."""
+    names = {key: one for key, one in values.items() if isinstance(one, str)}
+    numbers = {
+        key: one if isinstance(one, Number) else Number(float(one))
+        for key, one in values.items()
+        if not isinstance(one, str)
+    }
+    return Finding(code, subject, place or Where(), numbers, names)
+
+
+def explain(code: Code, subject: str = "", /, **values: Value) -> str:
+    """Return cause and remedy of a code as text, for the reason of an estimate."""
+    return report(code, subject, **values).reason
+
+
+def select_warnings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings that are more than information."""
+    return tuple(one for one in findings if one.severity is not Severity.INFO)
+
+
+def render(findings: Iterable[Finding]) -> tuple[str, ...]:
+    """Return the texts of findings, each once."""
+    return tuple(dict.fromkeys(one.text for one in findings))

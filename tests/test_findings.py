@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""Findings and their catalogue: one entry for each code, texts from the numbers."""
+
+from __future__ import annotations
+
+from string import Formatter
+
+import pytest
+
+from drivetwin.errors import Where
+from drivetwin.files.records import FindingRecord
+from drivetwin.findings import Code, Number, Severity, load_catalogue, report, select_warnings
+
+
+def test_every_code_has_an_entry_and_each_entry_a_code() -> None:
+    assert list(load_catalogue()) == list(Code)
+
+
+@pytest.mark.parametrize("code", Code)
+def test_texts_are_sentences(code: Code) -> None:
+    entry = load_catalogue()[code]
+    for text in (entry.text, entry.remedy):
+        assert not text.endswith((".", " "))
+        assert text[:1] == text[:1].upper()
+    fields = [name for _, name, _, _ in Formatter().parse(entry.text + entry.remedy) if name]
+    assert all(name.isidentifier() for name in fields)
+
+
+def test_a_finding_shows_place_subject_numbers_and_remedy() -> None:
+    place = Where(file="a.csv")
+    limit = Number(2e5, "Pa")
+    one = report(Code.AT_BOUND, "P0.B3", place, limit=limit, side="larger")
+    assert one.text == (
+        "a.csv: P0.B3: 2.000 bar is the bound of the search; the log indicates a larger value."
+    )
+    assert one.severity is Severity.ERROR
+    assert one.names == {"side": "larger"}
+    assert one.numbers == {"limit": limit}
+    assert one.set_subject("other") == one
+    assert report(Code.LOCKUP_UNKNOWN, channel="x").text.endswith("`lockup_engaged`.")
+
+
+def test_the_subject_is_not_repeated() -> None:
+    values = {"card": Number(1.0, "kg*m^2", 0.1), "log": Number(2.0, "kg*m^2", 0.1)}
+    text = report(Code.CARD_CONTRADICTED, "J_out", **values, apart=7.1).text
+    assert text.startswith("J_out: the vehicle card has 1.00 ± 0.10 kg·m², the log gives 2.00 ±")
+
+
+def test_information_is_no_warning() -> None:
+    told = report(Code.MEAN_SAMPLES, channels="engine speed")
+    assert select_warnings([told]) == ()
+
+
+def test_a_record_holds_all_of_a_finding() -> None:
+    one = report(Code.LOADS_DIFFER, "", Where(channel="x", time=1.5), low=1.0, high=2.5)
+    record = FindingRecord.model_validate_json(FindingRecord.from_result(one).model_dump_json())
+    assert (record.code, record.severity) == (Code.LOADS_DIFFER, Severity.INFO)
+    assert record.text == one.text
+    assert record.to_finding() == one
