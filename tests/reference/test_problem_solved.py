@@ -10,7 +10,14 @@ from reference import tables
 from reference.__main__ import solved
 from reference.problem import ROOT, load
 
-QUICK = ("coupled_clutches", "lossy_gear_with_bearing", "backlash", "redundant_locks", "tie_up")
+QUICK = (
+    "coupled_clutches",
+    "lossy_gear_with_bearing",
+    "backlash",
+    "redundant_locks",
+    "tie_up",
+    "tyre",
+)
 
 
 @pytest.mark.parametrize("name", QUICK)

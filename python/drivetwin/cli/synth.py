@@ -10,7 +10,7 @@ import typer
 
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.names import EffectName, ScenarioName
 
 if TYPE_CHECKING:
     from drivetwin.dyno.dyno import DynoRun
@@ -54,6 +54,14 @@ def synth(
             metavar="KGM2", help="Inertia of each brake drum in the gearbox scenarios, 0.05 if not."
         ),
     ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=SIZE",
+            help="A departure from the dual-clutch model, repeatable; in units and shares of "
+            f"docs/howto/synthetic-log.md: {', '.join(EffectName)}.",
+        ),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Make a shift log with known truth on the virtual dynamometer.
@@ -61,11 +69,13 @@ def synth(
     Beside the log NAME.csv stand NAME.truth.json and the vehicle card NAME.card.toml.
     """
     from drivetwin.dyno.dyno import run
+    from drivetwin.dyno.effects import parse_effects
     from drivetwin.dyno.scenario_file import load_scenario
 
     with show_step(f"running {scenario}"):
         setup = load_scenario(scenario, drum).set_torque_reduction(torque_reduction)
-        log, card, truth = write_run(output, run(setup, seed, noise=noise))
+        bench = run(setup, seed, noise=noise, effects=parse_effects(effect or []))
+        log, card, truth = write_run(output, bench)
     if as_json:
         print_json({"log": log, "card": card, "truth": truth})
         return

@@ -15,6 +15,18 @@ from drivetwin.errors import InputError, Where
 FloatArray = NDArray[np.float64]
 
 
+def apply_lag(values: FloatArray, step: float, time_constant: float) -> FloatArray:
+    """Apply a first-order lag [s] to `values` (n,), sampled every `step` [s], at rest before them.
+
+    The lag is solved exactly for an input that is linear between the samples.
+    """
+    decay = np.exp(-step / time_constant)
+    mean = time_constant / step * (1.0 - decay)
+    b, a = np.array([1.0 - mean, mean - decay]), np.array([1.0, -decay])
+    lagged, _ = signal.lfilter(b, a, values, zi=signal.lfilter_zi(b, a) * values[0])
+    return np.asarray(lagged, dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class Program:
     """A quantity over time, linear between `knots` (time [s], value SI), constant outside.
@@ -110,18 +122,12 @@ class Actuator:
             )
 
     def compute_pressure(self, time: FloatArray) -> FloatArray:
-        """Pressure at evenly spaced `time` (n,) [s], in Pa; at rest before `time[0]`.
-
-        The lag is solved exactly for a command that is linear between the samples.
-        """
+        """Pressure at evenly spaced `time` (n,) [s], in Pa; at rest before `time[0]`."""
         command = self.command.evaluate(time - self.dead_time)
         step = float(time[1] - time[0])
         if self.fill is not None:
             command = self.fill.apply_fill(command, step)
-        decay = np.exp(-step / self.lag)
-        mean = self.lag / step * (1.0 - decay)
-        b, a = np.array([1.0 - mean, mean - decay]), np.array([1.0, -decay])
-        pressure, _ = signal.lfilter(b, a, command, zi=signal.lfilter_zi(b, a) * command[0])
+        pressure = apply_lag(command, step, self.lag)
         if self.vibration is not None:
             pressure = pressure + self.vibration.evaluate(time)
         return np.asarray(pressure, dtype=np.float64)

@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from drivetwin.dyno.shift_path import build_path, get_side_nodes
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
-    ShiftElement,
     Signal,
     State,
     Trajectory,
@@ -101,7 +101,7 @@ class OpenConverter:
             build_element("inertia", "J1", node=_TURBINE, inertia=model.J1),
             build_element("gear", "input gear", a=_TURBINE, b=_INPUT, ratio=model.i_in, loss=loss),
             build_element("inertia", "J2e", node=_INPUT, inertia=model.J2e * model.i_in**2),
-            *(part for each in model.elements for part in _build_clutch(each)),
+            *(part for each in model.elements for part in build_path(each, _INPUT, _OUTPUT)),
             build_element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
             build_element(
                 "spring_damper",
@@ -117,32 +117,6 @@ class OpenConverter:
         ]
 
 
-def _get_side_nodes(name: str) -> tuple[str, str]:
-    """Nodes on both sides of a shift element."""
-    return f"{name} driving", f"{name} driven"
-
-
-def _build_clutch(one: ShiftElement) -> list[Element]:
-    """A shift element between its two ratios (eq. 15)."""
-    driving, driven = _get_side_nodes(one.name)
-    return [
-        build_element("gear", f"{one.name} i_c", a=_INPUT, b=driving, ratio=one.i_c),
-        build_element("gear", f"{one.name} i_out", a=driven, b=_OUTPUT, ratio=one.i_out),
-        build_element(
-            "clutch",
-            one.name,
-            a=driving,
-            b=driven,
-            friction=asdict(one.friction),
-            gain=one.gain,
-            p0=one.P0,
-            peak=one.peak,
-            pressure=one.name,
-            drum_inertia=one.drum_inertia,
-        ),
-    ]
-
-
 def _start(model: DualClutch, start: State, crank: float) -> Start:
     inlet = start.engine_speed / model.i_in
     speeds = {
@@ -154,7 +128,7 @@ def _start(model: DualClutch, start: State, crank: float) -> Start:
         _WHEEL: start.wheel_speed,
     }
     for one in model.elements:
-        driving, driven = _get_side_nodes(one.name)
+        driving, driven = get_side_nodes(one.name)
         speeds |= {driving: inlet / one.i_c, driven: one.i_out * start.output_speed}
     return Start(speeds, {_SHAFT: start.twist}, start.locked)
 

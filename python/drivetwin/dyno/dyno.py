@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,11 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel
+from drivetwin.dyno.departed_run import is_departed, simulate_departed
+from drivetwin.dyno.effects import Effects, check_effects
+from drivetwin.dyno.nominal import NominalRun
 from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.sensor_effects import TorqueError, apply_delay, compute_torque_error
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.dyno.truth import Truth, compute_truth
 from drivetwin.errors import InputError, SimulationError, Where
@@ -35,12 +40,21 @@ class DynoRun:
     trajectory: Trajectory
 
 
-def run(scenario: Scenario, seed: int = 0, *, noise: float = 1.0) -> DynoRun:
+def run(
+    scenario: Scenario,
+    seed: int = 0,
+    *,
+    noise: float = 1.0,
+    effects: Mapping[str, float] | None = None,
+) -> DynoRun:
     """Simulate the scenario and record it.
 
     `noise` scales the white noise of all sensors; 0 makes them ideal (no noise, no rounding) while
-    their rates and delays stay. The same arguments give the same log, bit for bit.
-    Raises SimulationError where the run does not complete, InputError for a negative noise.
+    their rates and delays stay. `effects` are the sizes, by `EffectName`, of departures from the
+    dual-clutch model; the truth stays that of the model. The same arguments give the same log, bit
+    for bit.
+    Raises SimulationError where the run does not complete, InputError for a negative noise and for
+    impossible effects.
     """
     if not noise >= 0.0:
         raise InputError(
@@ -48,26 +62,46 @@ def run(scenario: Scenario, seed: int = 0, *, noise: float = 1.0) -> DynoRun:
             "give 0 for ideal sensors, 1 for the scenario's, or another positive factor",
             Where(key="noise"),
         )
-    stamps = {sensor.role: sensor.compute_stamps(scenario.duration) for sensor in scenario.sensors}
+    sizes = check_effects(effects or {})
+    sensors = apply_delay(scenario.sensors, sizes)
+    stamps = {sensor.role: sensor.compute_stamps(scenario.duration) for sensor in sensors}
     looks = {
-        sensor.role: _compute_sampling_instants(sensor, stamps[sensor.role])
-        for sensor in scenario.sensors
+        sensor.role: _compute_sampling_instants(sensor, stamps[sensor.role]) for sensor in sensors
     }
     seen = np.unique(np.concatenate([instants.ravel() for instants in looks.values()]))
-    trajectory, inputs = _simulate(scenario, seen)
-    generators = np.random.SeedSequence(seed).spawn(len(scenario.sensors))
+    trajectory, inputs, error = _simulate_effects(scenario, sizes, seed, seen)
+    generators = np.random.SeedSequence(seed).spawn(len(sensors))
     channels = tuple(
         sensor.read(
             stamps[sensor.role],
-            _compute_quantity(
-                sensor, looks[sensor.role], (trajectory, scenario.model.i_in), inputs
-            ),
+            _compute_quantity(sensor, looks[sensor.role], (trajectory, scenario.model.i_in), inputs)
+            + error.compute(sensor.role, stamps[sensor.role]),
             noise,
             np.random.default_rng(generator),
         )
-        for sensor, generator in zip(scenario.sensors, generators, strict=True)
+        for sensor, generator in zip(sensors, generators, strict=True)
     )
-    return DynoRun(scenario, seed, noise, channels, compute_truth(scenario, trajectory), trajectory)
+    truth = compute_truth(scenario, trajectory, sizes)
+    return DynoRun(scenario, seed, noise, channels, truth, trajectory)
+
+
+def _simulate_effects(
+    scenario: Scenario, effects: Effects, seed: int, time: FloatArray
+) -> tuple[Trajectory, dict[str, Signal], TorqueError]:
+    """The motion at `time`, the quantities that it does not hold, and the torque sensor's error."""
+    given = _build_inputs(scenario)
+    if not effects:
+        return *_simulate(scenario, given, time), compute_torque_error({}, 0.0, seed, 0.0)
+    departed = is_departed(scenario, effects)
+    grid = given.engine_torque.time
+    reference, _ = _simulate(scenario, given, grid[grid <= scenario.duration])
+    nominal = NominalRun(scenario.model, reference, given.engine_torque, given.pressures)
+    error = compute_torque_error(effects, nominal.largest_shaft_torque, seed, scenario.duration)
+    if not departed:
+        return *_simulate(scenario, given, time), error
+    trajectory = simulate_departed(scenario, nominal, effects, seed, time)
+    _check_completed(scenario, trajectory)
+    return trajectory, given.list_by_role(scenario), error
 
 
 def _compute_sampling_instants(sensor: Sensor, stamps: FloatArray) -> FloatArray:
@@ -75,15 +109,38 @@ def _compute_sampling_instants(sensor: Sensor, stamps: FloatArray) -> FloatArray
     return np.asarray(np.round(sensor.compute_instants(stamps), 9), dtype=np.float64)
 
 
-def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[str, Signal]]:
-    """The exact motion at `time`, and by role what it does not hold: inputs, engine speed."""
+@dataclass(frozen=True, eq=False)
+class _Inputs:
+    """Engine torque [N m] and pressures [Pa] of a scenario, as they are logged."""
+
+    engine_torque: Signal
+    pressures: Mapping[str, Signal]
+
+    def list_by_role(self, scenario: Scenario) -> dict[str, Signal]:
+        """The inputs by the role of their channel."""
+        pressures = self.pressures
+        if scenario.one_clutch:
+            total = np.sum([each.values for each in pressures.values()], axis=0)
+            both = Signal(self.engine_torque.time, np.asarray(total, dtype=np.float64))
+            pressures = dict.fromkeys(pressures, both)
+        roles = {make_pressure_role(name): pressure for name, pressure in pressures.items()}
+        return {"engine_torque": self.engine_torque, **roles}
+
+
+def _build_inputs(scenario: Scenario) -> _Inputs:
     grid = np.arange(int(np.ceil(scenario.duration * scenario.rate)) + 1) / scenario.rate
     pressures = {
         name: Signal(grid, actuator.compute_pressure(grid))
         for name, actuator in scenario.actuators.items()
     }
-    torque = Signal(grid, scenario.compute_torque(grid))
-    given = (scenario.model, torque, pressures, scenario.start(), time)
+    return _Inputs(Signal(grid, scenario.compute_torque(grid)), pressures)
+
+
+def _simulate(
+    scenario: Scenario, inputs: _Inputs, time: FloatArray
+) -> tuple[Trajectory, dict[str, Signal]]:
+    """The exact motion at `time`, and by role what it does not hold: inputs, engine speed."""
+    given = (scenario.model, inputs.engine_torque, inputs.pressures, scenario.start(), time)
     speeds = {}
     if scenario.converter is not None:
         trajectory, crank = scenario.converter.simulate(*given)
@@ -91,17 +148,16 @@ def _simulate(scenario: Scenario, time: FloatArray) -> tuple[Trajectory, dict[st
     else:
         run = dual_clutch.simulate if scenario.plant is None else scenario.plant.simulate
         trajectory = run(*given)
+    _check_completed(scenario, trajectory)
+    return trajectory, {**inputs.list_by_role(scenario), **speeds}
+
+
+def _check_completed(scenario: Scenario, trajectory: Trajectory) -> None:
     if trajectory.status != "completed":
         raise SimulationError(
             f"scenario {scenario.name!r} ended with status {trajectory.status!r}",
             "change its pressure commands or parameters so that the elements can hold the load",
         )
-    if scenario.one_clutch:
-        total = np.sum([each.values for each in pressures.values()], axis=0)
-        both = Signal(grid, np.asarray(total, dtype=np.float64))
-        pressures = dict.fromkeys(pressures, both)
-    inputs = {make_pressure_role(name): pressure for name, pressure in pressures.items()}
-    return trajectory, {"engine_torque": torque, **inputs, **speeds}
 
 
 def _compute_quantity(

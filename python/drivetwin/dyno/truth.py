@@ -8,6 +8,7 @@ from itertools import pairwise
 from math import inf, pi, sqrt
 from typing import Any
 
+from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import (
@@ -38,11 +39,15 @@ class Instants:
 
 @dataclass(frozen=True)
 class Truth:
-    """Parameters by id (SI), friction law by element, and the instants of all shifts."""
+    """Parameters by id (SI), friction law by element, the instants of all shifts, and effects.
+
+    Parameters and laws are those of the dual-clutch model, without the `effects` of the run.
+    """
 
     parameters: dict[str, float]
     friction: dict[str, Stribeck | FrictionTable]
     shifts: tuple[Instants, ...]
+    effects: Effects
 
     @property
     def torque_start(self) -> float | None:
@@ -69,6 +74,7 @@ class Truth:
             },
             "friction": {name: asdict(law) for name, law in self.friction.items()},
             "shifts": [asdict(each) for each in self.shifts],
+            "effects": {name.value: size for name, size in self.effects.items()},
         }
 
 
@@ -85,7 +91,7 @@ def compute_lockup_oscillation(model: DualClutch, ratio: float) -> tuple[float, 
     return sqrt(model.k_o / J * (1.0 - zeta**2)) / (2.0 * pi), zeta
 
 
-def compute_truth(scenario: Scenario, trajectory: Trajectory) -> Truth:
+def compute_truth(scenario: Scenario, trajectory: Trajectory, effects: Effects) -> Truth:
     """Compute the true parameters and instants of a run.
 
     J' and Jo' are without the drums of open elements; a member of the whole gearbox that is no such
@@ -113,7 +119,7 @@ def compute_truth(scenario: Scenario, trajectory: Trajectory) -> Truth:
         "te_delay": delays["engine_torque"],
     }
     friction = {element.name: element.friction for element in model.elements}
-    return Truth(parameters, friction, _collect_shifts(scenario, trajectory))
+    return Truth(parameters, friction, _collect_shifts(scenario, trajectory), effects)
 
 
 def _collect_shifts(scenario: Scenario, trajectory: Trajectory) -> tuple[Instants, ...]:

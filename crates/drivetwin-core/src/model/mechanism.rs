@@ -162,7 +162,7 @@ pub enum Account {
     Source,
     /// Taken by the load.
     Load,
-    /// Turned into heat in a torque converter.
+    /// Turned into heat by the slip of a torque converter or tyre.
     Converter,
 }
 
@@ -199,6 +199,17 @@ pub enum ForceLaw<T> {
         map: ConverterMap,
         /// True for the torque of the turbine.
         at_turbine: bool,
+    },
+    /// `stiffness · (ω_wheel - ω_road) / max(|ω_road|, least_speed)`.
+    Slip {
+        /// Node of the rim.
+        wheel: usize,
+        /// Node that moves with the road.
+        road: usize,
+        /// N·m.
+        stiffness: T,
+        /// rad/s.
+        least_speed: f64,
     },
 }
 

@@ -39,6 +39,11 @@ pub enum Cell {
         /// Sign of the pump speed: turning backwards, its torques are those of a mirror.
         sign: f64,
     },
+    /// Direction of the road below a tyre.
+    Slip {
+        /// Its sign; 0 below the least speed.
+        sign: f64,
+    },
     /// Region of a piecewise linear compliance.
     Region {
         /// Its index.
@@ -67,6 +72,10 @@ impl<T: Number> Channel<T> {
                     map.cell_index(if s == 0.0 && r == 0.0 { 0.0 } else { r / s.abs() * sign })
                 };
                 Cell::Converter { index: s.decide_with(r, index), sign }
+            }
+            Law::Slip { least_speed, .. } => {
+                let sign = |r: f64| if r.abs() < *least_speed { 0.0 } else { r.signum() };
+                Cell::Slip { sign: r.decide(sign) }
             }
             Law::Regions(regions) => {
                 let (s, r) = (T::promote(s), T::promote(r));
@@ -126,6 +135,17 @@ impl<T: Number> Channel<T> {
                 };
                 let back = Cell::Converter { index: mirrored, sign: -sign };
                 ends.chain([(scaled(s, sign), back)]).collect()
+            }
+            (Law::Slip { least_speed, .. }, Cell::Slip { sign }) => {
+                let next = |sign| Cell::Slip { sign };
+                if sign == 0.0 {
+                    let ends = between(r, (-least_speed, *least_speed));
+                    ends.map(|(border, step)| (border, next(step as f64))).collect()
+                } else {
+                    let mut border = scaled(r, sign);
+                    border[0] -= T::of(*least_speed);
+                    vec![(border, next(0.0))]
+                }
             }
             (Law::Regions(regions), Cell::Region { index }) => {
                 let border = |&(form, next): &(TwistForm<T>, usize)| {

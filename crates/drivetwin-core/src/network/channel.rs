@@ -40,6 +40,13 @@ pub enum Law<T> {
         /// Torque given at the turbine, else taken at the pump.
         at_turbine: bool,
     },
+    /// Tyre over the difference of speeds and the speed of the road.
+    Slip {
+        /// Torque over slip, N·m.
+        stiffness: T,
+        /// Least speed of the road that a slip is related to, rad/s.
+        least_speed: f64,
+    },
     /// Piecewise linear compliance over twist and its rate.
     Regions(Vec<Region<T>>),
 }
@@ -195,6 +202,18 @@ impl<T: Number> Channel<T> {
                     + product_term(s, r, k) * q[1]
                     + product_term(r, r, k) * q[2];
                 sum * sign
+            }
+            (Law::Slip { stiffness, least_speed }, Cell::Slip { sign }) => {
+                if sign == 0.0 {
+                    *stiffness * s[k] / *least_speed
+                } else {
+                    // torque · |ω_road| = stiffness · (ω_wheel - ω_road), solved for coefficient k
+                    let mut rest = *stiffness * s[k] * sign;
+                    for i in 0..k {
+                        rest -= c.torque[i] * r[k - i];
+                    }
+                    rest / r[0]
+                }
             }
             (Law::Regions(regions), Cell::Region { index }) => {
                 let TwistForm { constant, per_twist, per_rate } = regions[index].torque;

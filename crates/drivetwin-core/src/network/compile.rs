@@ -361,6 +361,12 @@ impl<T: Number> Network<T> {
                 law: Law::Converter { map: map.clone(), at_turbine: *at_turbine },
                 arguments: vec![over(*pump), over(*turbine)],
             },
+            ForceLaw::Slip { wheel, road, stiffness, least_speed } => {
+                let (wheel, road) = (over(*wheel), over(*road));
+                let slip = wheel.iter().zip(&road).map(|(&w, &r)| w - r).collect();
+                let law = Law::Slip { stiffness: *stiffness, least_speed: *least_speed };
+                Channel { law, arguments: vec![slip, road] }
+            }
         })
     }
 

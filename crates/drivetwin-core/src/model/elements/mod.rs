@@ -12,8 +12,10 @@ mod planetary;
 mod prescribed_speed;
 mod road_load;
 mod spring_damper;
+mod spring_table;
 mod torque;
 mod torque_converter;
+mod tyre;
 
 pub use backlash::Backlash;
 pub use bearing::Bearing;
@@ -26,8 +28,10 @@ pub use planetary::Planetary;
 pub use prescribed_speed::PrescribedSpeed;
 pub use road_load::RoadLoad;
 pub use spring_damper::SpringDamper;
+pub use spring_table::SpringTable;
 pub use torque::Torque;
 pub use torque_converter::TorqueConverter;
+pub use tyre::Tyre;
 
 use super::Name;
 use super::error::ModelError;
@@ -71,8 +75,10 @@ elements!(
     OneWayClutch,
     Bearing,
     SpringDamper,
+    SpringTable,
     Backlash,
     TorqueConverter,
+    Tyre,
     RoadLoad,
     Torque,
     EngineMap,

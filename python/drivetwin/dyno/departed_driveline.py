@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: MIT
+"""The dual clutch as a network with parts that the estimated model does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from drivetwin.dyno.departed_start import compute_quasi_steady_state
+from drivetwin.dyno.departure import Departure
+from drivetwin.dyno.shift_path import build_path, get_side_nodes
+from drivetwin.simulation.dual_clutch import (
+    DualClutch,
+    FloatArray,
+    Signal,
+    State,
+    Trajectory,
+)
+from drivetwin.simulation.network import Element, Output, Start, build_element, simulate
+
+_CRANK, _ENGINE, _INPUT, _OUTPUT = "crankshaft", "engine", "input", "output"
+_AXLE, _WHEEL, _VEHICLE = "axle", "wheel", "vehicle"
+_INPUT_SHAFT, _SHAFT = "input shaft", "output shaft"
+_TORQUE, _WALK = "engine torque", "load walk"
+_LEAST_SPEED = 0.5
+"""Speed of the vehicle at the wheel [rad/s] below which a tyre is a damper."""
+
+
+@dataclass(frozen=True, eq=False)
+class DepartedDriveline:
+    """A dual clutch with added parts; `gears` are the shift elements in the order of the gears."""
+
+    model: DualClutch
+    departure: Departure
+    gears: Sequence[str]
+
+    def simulate(
+        self,
+        engine_torque: Signal,
+        pressures: Mapping[str, Signal],
+        start: State,
+        time: FloatArray,
+    ) -> Trajectory:
+        """Run the network on `time` (n,) [s] from quasi-steady acceleration.
+
+        `engine_torque` and `pressures` are the acting ones. Of `start` the engine speed and the
+        locked element hold. A failed run returns its status.
+        Raises InputError where the description is inconsistent.
+        """
+        walk = self.departure.walk
+        walks = {} if walk is None else {_WALK: Signal(walk.time, -walk.values)}
+        torque = float(np.interp(time[0], engine_torque.arrival, engine_torque.values))
+        names = [each.name for each in self.model.elements]
+        run = simulate(
+            self._build_elements(),
+            {**pressures, **walks, _TORQUE: engine_torque},
+            self._build_start(start, torque),
+            time,
+            _list_outputs(names),
+        )
+        motion = run.columns
+        return Trajectory(
+            time=time,
+            engine_speed=motion["speed", _ENGINE],
+            output_speed=motion["speed", _OUTPUT],
+            wheel_speed=motion["speed", _WHEEL],
+            twist=motion["twist", _SHAFT],
+            shaft_torque=motion["shaft_torque", _SHAFT],
+            clutch_torque={name: motion["friction_torque", name] for name in names},
+            slip={name: motion["slip", name] for name in names},
+            events=run.events,
+            status=run.status,
+            audit=run.audit,
+        )
+
+    def _build_elements(self) -> list[Element]:
+        model = self.model
+        loss = {"law": model.loss_law, "eta": model.eta}
+        return [
+            *self._build_engine(),
+            *_build_drag("input drag", _ENGINE, self.departure.input_drag),
+            build_element("gear", "input gear", a=_ENGINE, b=_INPUT, ratio=model.i_in, loss=loss),
+            build_element("inertia", "J2e", node=_INPUT, inertia=model.J2e * model.i_in**2),
+            *(part for name in self.gears for part in self._build_gear(name)),
+            build_element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
+            self._build_shaft(),
+            build_element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
+            *_build_drag("brake drag", _WHEEL, self.departure.brake_drag),
+            *self._build_vehicle(),
+        ]
+
+    def _build_engine(self) -> list[Element]:
+        """J1 with the engine torque, in halves on either side of an input shaft."""
+        J1, shaft = self.model.J1, self.departure.input_shaft
+        if shaft is None:
+            return [
+                build_element("torque", _TORQUE, node=_ENGINE, input=_TORQUE),
+                build_element("inertia", "J1", node=_ENGINE, inertia=J1),
+            ]
+        return [
+            build_element("torque", _TORQUE, node=_CRANK, input=_TORQUE),
+            build_element("inertia", "J1 at the engine", node=_CRANK, inertia=0.5 * J1),
+            build_element("spring_damper", _INPUT_SHAFT, a=_CRANK, b=_ENGINE, **asdict(shaft)),
+            build_element("inertia", "J1 at the gearbox", node=_ENGINE, inertia=0.5 * J1),
+        ]
+
+    def _build_gear(self, name: str) -> list[Element]:
+        """Path of a shift element; the loss of the input gear is that of the first gear."""
+        steps = list(self.gears).index(name)
+        factor = 1.0 + steps * self.departure.efficiency / self.model.eta
+        loss = {"law": self.model.loss_law, "eta": factor} if factor != 1.0 else None
+        (element,) = (each for each in self.departure.elements if each.name == name)
+        return build_path(element, _INPUT, _OUTPUT, loss)
+
+    def _build_shaft(self) -> Element:
+        model, table, gap = self.model, self.departure.shaft_table, self.departure.gap
+        fields = {"a": _OUTPUT, "b": _AXLE, "damping": model.c_o}
+        if table is not None:
+            curve = {"twist": table.twist.tolist(), "torque": table.torque.tolist()}
+            return build_element("spring_table", _SHAFT, **fields, **curve)
+        fields |= {"stiffness": model.k_o}
+        if gap > 0.0:
+            return build_element("backlash", _SHAFT, **fields, gap=gap)
+        return build_element("spring_damper", _SHAFT, **fields)
+
+    def _build_vehicle(self) -> list[Element]:
+        """Vehicle and load at the wheel, or behind a tyre."""
+        inertia, tyre, body = self.model.J_v, self.departure.tyre, _WHEEL
+        parts = []
+        if tyre is not None:
+            body, inertia = _VEHICLE, inertia - tyre.rim_inertia
+            fields = {"slip_stiffness": tyre.slip_stiffness, "least_speed": _LEAST_SPEED}
+            parts = [
+                build_element("inertia", "rim", node=_WHEEL, inertia=tyre.rim_inertia),
+                build_element("tyre", "tyre", a=_WHEEL, b=_VEHICLE, **fields),
+            ]
+        parts += [
+            build_element("inertia", "vehicle", node=body, inertia=inertia),
+            build_element("road_load", "load", node=body, **asdict(self.departure.load)),
+        ]
+        if self.departure.walk is not None:
+            parts.append(build_element("torque", _WALK, node=body, input=_WALK))
+        return parts
+
+    def _build_start(self, start: State, engine_torque: float) -> Start:
+        state = compute_quasi_steady_state(self.model, self.departure, start, engine_torque)
+        engine, output = start.engine_speed, start.output_speed
+        inlet = engine / self.model.i_in
+        speeds = {_ENGINE: engine, _INPUT: inlet, _OUTPUT: output}
+        speeds |= {_AXLE: self.model.i_f * start.wheel_speed, _WHEEL: start.wheel_speed}
+        twists = {_SHAFT: state.twist}
+        if self.departure.input_shaft is not None:
+            speeds[_CRANK], twists[_INPUT_SHAFT] = engine, state.input_twist
+        if self.departure.tyre is not None:
+            speeds[_VEHICLE] = state.vehicle_speed
+        for each in self.model.elements:
+            driving, driven = get_side_nodes(each.name)
+            speeds |= {driving: inlet / each.i_c, driven: each.i_out * output}
+        return Start(speeds, twists, start.locked)
+
+
+def _build_drag(name: str, node: str, torque: float) -> list[Element]:
+    """A Coulomb torque [N m] between a node and the ground; nothing without torque."""
+    if torque == 0.0:
+        return []
+    table = {"speed": [0.0, 1.0], "torque": [torque, torque], "peak": 1.0}
+    return [build_element("bearing", name, a=node, b="ground", **table)]
+
+
+def _list_outputs(elements: Sequence[str]) -> list[Output]:
+    return [
+        *(("speed", node) for node in (_ENGINE, _OUTPUT, _WHEEL)),
+        ("twist", _SHAFT),
+        ("shaft_torque", _SHAFT),
+        *(("slip", name) for name in elements),
+        *(("friction_torque", name) for name in elements),
+    ]

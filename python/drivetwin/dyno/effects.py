@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Sizes of the effects by which a run departs from the dual-clutch model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from drivetwin.dyno.names import EffectName
+from drivetwin.errors import InputError, Where
+
+Effects = Mapping[EffectName, float]
+"""Sizes by effect, in the units of `EffectName`; an effect of size 0 changes nothing."""
+
+SENSOR_EFFECTS = frozenset(
+    {
+        EffectName.OUTPUT_TORQUE_OFFSET,
+        EffectName.OUTPUT_TORQUE_DRIFT,
+        EffectName.OUTPUT_TORQUE_DELAY,
+    }
+)
+"""Effects that change the recorded output torque and leave the motion as it is."""
+_LIMITS = {
+    EffectName.AERO_LOAD: 1.0,
+    EffectName.TYRE_SLIP: 1.0,
+    EffectName.PROGRESSIVE_SHAFT: 2.0,
+    EffectName.FRICTION_PRESSURE: 2.0,
+    EffectName.FRICTION_HEAT: 1.0,
+}
+"""Sizes from which a torque would reverse or a share exceed the whole."""
+_KEY = Where(key="effect")
+
+
+def parse_effects(texts: Sequence[str]) -> dict[EffectName, float]:
+    """Parse texts `NAME=SIZE`, such as `tyre_slip=0.004`.
+
+    Raises InputError for another form, a repeated or unknown name, or an impossible size.
+    """
+    sizes: dict[str, float] = {}
+    for text in texts:
+        name, separator, size = text.partition("=")
+        try:
+            value = float(size)
+        except ValueError:
+            separator = ""
+        if not separator:
+            raise InputError(
+                f"{text!r} is no effect with a size", "write NAME=SIZE, as tyre_slip=0.004", _KEY
+            )
+        if name in sizes:
+            raise InputError(f"effect {name!r} is stated twice", "state each effect once", _KEY)
+        sizes[name] = value
+    return check_effects(sizes)
+
+
+def check_effects(sizes: Mapping[str, float]) -> dict[EffectName, float]:
+    """Check names and sizes of effects.
+
+    Raises InputError for unknown names, sizes that are negative, not finite or too large, and for
+    `backlash` together with `progressive_shaft`, which are two laws of one shaft.
+    """
+    unknown = [name for name in sizes if name not in list(EffectName)]
+    if unknown:
+        raise InputError(
+            f"no effect {', '.join(map(repr, unknown))}",
+            f"give any of {', '.join(EffectName)}",
+            _KEY,
+        )
+    effects = {EffectName(name): float(size) for name, size in sizes.items()}
+    bad = [
+        f"{name} = {size:g}"
+        for name, size in effects.items()
+        if not (math.isfinite(size) and 0.0 <= size < _LIMITS.get(name, math.inf))
+    ]
+    if bad:
+        limits = ", ".join(f"{name} below {limit:g}" for name, limit in _LIMITS.items())
+        raise InputError(
+            f"impossible sizes of effects: {', '.join(bad)}",
+            f"give finite sizes from 0 on, {limits}",
+            _KEY,
+        )
+    both = (EffectName.BACKLASH, EffectName.PROGRESSIVE_SHAFT)
+    if all(effects.get(name, 0.0) > 0.0 for name in both):
+        raise InputError(f"{' and '.join(both)} in one shaft", "give one of them", _KEY)
+    return effects
