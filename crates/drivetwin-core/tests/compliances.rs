@@ -43,11 +43,13 @@ fn drive(network: &Network<f64>, from: f64, value: f64) -> Trajectory<f64> {
     simulate(network, &signals, &begin, &grid(END, 201), &speeds())
 }
 
+/// The error of the balance is that of the quadrature over steps of many milliseconds; energies are
+/// 1 J and more.
 fn assert_balanced(run: &Trajectory<f64>) {
     assert_eq!(run.status, Status::Completed);
     let audit = run.audit.as_ref().expect("an audited run");
     let size = audit.source.abs() + audit.stored.abs() + audit.load.abs();
-    assert!(audit.error.abs() < 1e-9 * size, "{audit:?}");
+    assert!(audit.error.abs() < 1e-8 * size.max(1.0), "{audit:?}");
 }
 
 #[test]

@@ -17,6 +17,7 @@ from drivetwin.simulation.dual_clutch import (
     RoadLoad,
     ShiftElement,
     Signal,
+    Stribeck,
 )
 
 _MODE_DAMPING = 0.06
@@ -105,7 +106,9 @@ def compute_departure(nominal: NominalRun, effects: Effects, seed: int) -> Depar
     )
 
 
-def _build_friction(element: ShiftElement, nominal: NominalRun, amplitude: float) -> object:
+def _build_friction(
+    element: ShiftElement, nominal: NominalRun, amplitude: float
+) -> Stribeck | FrictionTable:
     largest = nominal.get_largest_slip(element.name)
     if amplitude == 0.0 or largest == 0.0:
         return element.friction
@@ -146,6 +149,7 @@ def _compute_tyre(nominal: NominalRun, slip: float) -> TyreSlip | None:
 def _compute_shaft_table(full: float, stiffness: float, factor: float) -> ShaftTable | None:
     if factor == 0.0:
         return None
-    count = round(_TABLE_END / _TABLE_STEP)
-    share = np.arange(-count, count + 1) * _TABLE_STEP
-    return ShaftTable(full * share / stiffness, full * share * (1.0 + factor * (share**2 - 0.5)))
+    count = 2 * round(_TABLE_END / _TABLE_STEP) + 1
+    share = np.linspace(-_TABLE_END, _TABLE_END, count)
+    torque = full * share * (1.0 + factor * (share**2 - 0.5))
+    return ShaftTable(full / stiffness * share, torque)

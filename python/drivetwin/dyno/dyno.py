@@ -45,7 +45,7 @@ def run(
     seed: int = 0,
     *,
     noise: float = 1.0,
-    effects: Mapping[str, float] | None = None,
+    effects: Mapping[str, float] | Effects | None = None,
 ) -> DynoRun:
     """Simulate the scenario and record it.
 

@@ -53,7 +53,7 @@ def parse_effects(texts: Sequence[str]) -> dict[EffectName, float]:
     return check_effects(sizes)
 
 
-def check_effects(sizes: Mapping[str, float]) -> dict[EffectName, float]:
+def check_effects(sizes: Mapping[str, float] | Effects) -> dict[EffectName, float]:
     """Check names and sizes of effects.
 
     Raises InputError for unknown names, sizes that are negative, not finite or too large, and for

@@ -7,9 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, Trajectory
+
+
+_LEAST_SLIP = 1e-6
+"""Slip [rad/s] above the round-off of a locked element."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +59,13 @@ class NominalRun:
         pressure = np.interp(self.trajectory.time, signal.arrival, signal.values)
         return float(np.max(pressure[self._find_slipping(element)] - P0, initial=0.0))
 
-    def _find_slipping(self, element: str) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def _find_slipping(self, element: str) -> NDArray[np.bool_]:
         run = self.trajectory
-        return (run.slip[element] != 0.0) & (run.clutch_torque[element] != 0.0)
+        moving = np.abs(run.slip[element]) > _LEAST_SLIP
+        return np.asarray(moving & (run.clutch_torque[element] != 0.0))
 
 
 def compute_friction_work(run: Trajectory, element: str) -> FloatArray:
     """Friction work of an element from the start on (n,) [J]."""
-    power = np.abs(run.clutch_torque[element] * run.slip[element])
-    return np.asarray(cumulative_trapezoid(power, run.time, initial=0.0), dtype=np.float64)
+    power: FloatArray = np.abs(run.clutch_torque[element] * run.slip[element])
+    return cumulative_trapezoid(power, run.time, initial=0)
