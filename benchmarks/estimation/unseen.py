@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.estimation.bound import compute_bound
 from benchmarks.estimation.study import build_guess, build_point, propagate
-from benchmarks.estimation.vehicles import add_tolerances, draw_errors, draw_vehicle
+from benchmarks.estimation.vehicles import add_tolerances, draw_vehicle, misread
 from drivetwin._util.arrays import FloatArray
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run
@@ -76,17 +76,17 @@ def identify_vehicle(seed: int) -> Log:
     try:
         found = _identify(recorded, made.card)
         card = add_tolerances(made.card, made.scenario)
-        misread = _identify(_misread(recorded, seed), card)
+        wrong = _identify(misread(recorded, seed), card)
     except DrivetwinError as fault:
         return Log({}, {}, {}, (), (), fault.what)
-    for one in (found, misread):
+    for one in (found, wrong):
         if one.method is not DEFAULT_METHOD:
             return Log({}, {}, {}, (), (), one.findings[0].text)
     least = compute_widths(found, recorded)
     refused = [one.id for one in found.estimates.values() if one.value is None]
     return Log(
         _compute_deviates(found, recorded),
-        _compute_deviates(misread, recorded),
+        _compute_deviates(wrong, recorded),
         {
             _strip_eta(name): stated / bound
             for name, (stated, bound) in least.items()
@@ -104,16 +104,6 @@ def _identify(recorded: DynoRun, card_text: str) -> Identification:
         card = load_card(card_file)
         log = read_log(file, card)
         return identify(log, card, detect_shifts(log, card))
-
-
-def _misread(recorded: DynoRun, seed: int) -> DynoRun:
-    """Return the run as sensors with errors of gain and offset read it."""
-    errors = draw_errors(seed, recorded.scenario)
-    channels = []
-    for channel in recorded.channels:
-        gain, offset = errors.get(channel.role, (0.0, 0.0))
-        channels.append(replace(channel, values=(1.0 + gain) * channel.values + offset))
-    return replace(recorded, channels=tuple(channels))
 
 
 def _is_needless(

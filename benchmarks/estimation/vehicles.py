@@ -7,7 +7,7 @@ over 10 ms on a bus. The card has design values drawn about the truth.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import tomlkit
@@ -15,6 +15,7 @@ import tomlkit
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import Actuator, Program, Vibration
+from drivetwin.dyno.dyno import DynoRun
 from drivetwin.dyno.files import format_card
 from drivetwin.dyno.scenario import HeldGear, Scenario
 from drivetwin.dyno.sensors import Sensor
@@ -84,6 +85,16 @@ def draw_errors(seed: int, scenario: Scenario) -> dict[str, tuple[float, float]]
         role: (gain * float(rng.standard_normal()), offset * float(rng.standard_normal()))
         for role, (gain, offset) in stated.items()
     }
+
+
+def misread(recorded: DynoRun, seed: int) -> DynoRun:
+    """Return the run as sensors with errors of gain and offset read it."""
+    errors = draw_errors(seed, recorded.scenario)
+    channels = []
+    for channel in recorded.channels:
+        gain, offset = errors.get(channel.role, (0.0, 0.0))
+        channels.append(replace(channel, values=(1.0 + gain) * channel.values + offset))
+    return replace(recorded, channels=tuple(channels))
 
 
 def add_tolerances(text: str, scenario: Scenario) -> str:

@@ -37,7 +37,14 @@ def test_same_arguments_write_the_same_bytes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "option", [("--noise", "-1"), ("--torque-reduction", "1.5"), ("--drum", "0.1")]
+    "option",
+    [
+        ("--noise", "-1"),
+        ("--torque-reduction", "1.5"),
+        ("--drum", "0.1"),
+        ("--effect", "tyre_slip=-0.1"),
+        ("--effect", "slip=0.1"),
+    ],
 )
 def test_impossible_options_leave_nothing(
     option: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -84,3 +91,20 @@ def test_an_unknown_format_leaves_nothing(
     assert main(["synth", "-o", str(tmp_path / "out" / "x.xlsx")]) == 2
     assert ".parquet" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_effects_change_the_log_and_are_listed_in_the_truth(tmp_path: Path) -> None:
+    plain, departing = tmp_path / "plain.csv", tmp_path / "departing.csv"
+    assert main(["synth", "-o", str(plain)]) == 0
+    chosen = ["--effect", "tyre_slip=0.004", "--effect", "input_drag=0.01"]
+    assert main(["synth", "-o", str(departing), *chosen]) == 0
+    assert plain.read_bytes() != departing.read_bytes()
+    cards = [path.with_suffix(".card.toml").read_bytes() for path in (plain, departing)]
+    assert cards[0] == cards[1]
+    truths = [
+        json.loads(path.with_suffix(".truth.json").read_text(encoding="utf-8"))
+        for path in (plain, departing)
+    ]
+    assert truths[0]["effects"] == {}
+    assert truths[1]["effects"] == {"tyre_slip": 0.004, "input_drag": 0.01}
+    assert truths[0]["parameters"] == truths[1]["parameters"]

@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.effects import SENSOR_EFFECTS
+from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects
 from drivetwin.dyno.names import EffectName
 from drivetwin.dyno.nominal import compute_friction_work
 from drivetwin.dyno.random_walk import WalkStream, draw_walk
@@ -45,7 +45,7 @@ GRADUAL = [name for name in SIZES if name.value not in ("input_shaft_mode", "bac
 """Effects whose size may go to zero."""
 
 
-def move(effects: Mapping[str, float], scenario: Scenario = SCENARIO) -> Trajectory:
+def move(effects: Mapping[str, float] | Effects, scenario: Scenario = SCENARIO) -> Trajectory:
     return run(scenario, 1, noise=0.0, effects=effects).trajectory
 
 
@@ -278,7 +278,7 @@ def test_walks_follow_the_seed_and_leave_the_noise() -> None:
         next(c.values for c in bench.channels if c.role == "pressure.B3")
         for bench in (first, record(1, 0.0))
     ]
-    assert np.array_equal(*pressures)
+    assert np.array_equal(pressures[0], pressures[1])
 
 
 @pytest.mark.parametrize("scenario", ["gearbox", "open_converter"])
@@ -289,7 +289,8 @@ def test_other_plants_are_refused(scenario: str) -> None:
 
 @pytest.mark.parametrize("scenario", ["input_gear", "dual_clutch", "manual", "power_off_up"])
 def test_other_dual_clutches_take_all_effects(scenario: str) -> None:
-    sizes = {name: size for name, size in SIZES.items() if name is not EffectName.BACKLASH}
+    sizes = dict(SIZES)
+    del sizes[EffectName.BACKLASH]
     nominal, zero = (
         move(effects, load_scenario(scenario)) for effects in ({}, {"input_drag": 0.0})
     )

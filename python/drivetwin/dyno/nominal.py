@@ -12,7 +12,6 @@ from scipy.integrate import cumulative_trapezoid
 
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, Trajectory
 
-
 _LEAST_SLIP = 1e-6
 """Slip [rad/s] above the round-off of a locked element."""
 

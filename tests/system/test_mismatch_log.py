@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Logs of vehicles that depart from the model, as studies of validity use them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.estimation.mismatch_log import Rates, make_mismatch_log
+from drivetwin.dyno.names import EffectName
+from drivetwin.shifts.detect import detect_shifts
+
+SIZES = {EffectName.INPUT_SHAFT_MODE: 60.0, EffectName.AERO_LOAD: 0.1}
+
+
+@pytest.mark.parametrize("effect", EffectName)
+def test_every_effect_leaves_a_shift_to_identify(effect: EffectName) -> None:
+    made = make_mismatch_log(4, effect, SIZES.get(effect, 0.003), Rates.LOGGER)
+    (shift,) = detect_shifts(made.log, made.card).shifts
+    assert (shift.start_gear, shift.end_gear) == ("2", "3")
+    assert list(made.recorded.truth.effects) == [effect]
+
+
+@pytest.mark.parametrize(("rates", "step"), [(Rates.LOGGER, 0.001), (Rates.BUS, 0.02)])
+def test_rates_are_those_of_the_log(rates: Rates, step: float) -> None:
+    made = make_mismatch_log(2, None, 0.0, rates)
+    assert np.diff(made.log["input_speed"].time) == pytest.approx(step)
+    assert np.diff(made.log["engine_torque"].time).min() > 0.009
+    assert made.recorded.truth.effects == {}
+
+
+def test_stated_tolerances_are_on_the_card_and_in_the_log() -> None:
+    exact, wrong = (
+        make_mismatch_log(2, None, 0.0, Rates.BUS, tolerances=stated) for stated in (False, True)
+    )
+    assert not exact.card.sensors
+    assert wrong.card.sensors["output_torque"].gain == 0.01
+    ratio = wrong.log["output_torque"].values / exact.log["output_torque"].values
+    assert abs(np.median(ratio) - 1.0) > 1e-4
+
+
+def test_vehicles_differ_by_seed_and_have_the_log_again() -> None:
+    first, again, other = (
+        make_mismatch_log(seed, EffectName.TYRE_SLIP, 0.004, Rates.BUS) for seed in (5, 5, 6)
+    )
+    role = "output_torque"
+    assert np.array_equal(first.log[role].values, again.log[role].values)
+    truths = [each.recorded.truth.parameters["J_vehicle"] for each in (first, other)]
+    assert truths[0] != truths[1]
+
+
+def test_backlash_is_crossed() -> None:
+    made = make_mismatch_log(3, EffectName.BACKLASH, 0.02, Rates.LOGGER)
+    motion = made.recorded.trajectory
+    assert np.count_nonzero(motion.shaft_torque == 0.0) > 5
+    assert motion.shaft_torque.min() < 0.0
