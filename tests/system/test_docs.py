@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.cli.synth import ScenarioOption
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.names import EffectName, ScenarioName
 from drivetwin.parameters import SPECS, ParameterSpec
 from drivetwin.vehicle.card import load_card
 
@@ -80,9 +80,11 @@ def test_every_page_is_listed() -> None:
     assert listed == pages - {"README.md"}
 
 
-def test_every_scenario_is_described() -> None:
+def test_every_scenario_and_effect_is_described() -> None:
     (option,) = get_args(ScenarioOption)[1:]
     described = re.findall(r"(\w+)(?=[\w, ]*:)", option.help)
     page = (ROOT / "docs" / "howto" / "synthetic-log.md").read_text(encoding="utf-8")
     assert set(described) == set(ScenarioName)
-    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == list(ScenarioName)
+    rows = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
+    assert rows[: len(ScenarioName)] == list(ScenarioName)
+    assert set(rows[len(ScenarioName) :]) == set(EffectName)
