@@ -137,15 +137,7 @@ impl<T: Number> Channel<T> {
                 ends.chain([(scaled(s, sign), back)]).collect()
             }
             (Law::Slip { least_speed, .. }, Cell::Slip { sign }) => {
-                let next = |sign| Cell::Slip { sign };
-                if sign == 0.0 {
-                    let ends = between(r, (-least_speed, *least_speed));
-                    ends.map(|(border, step)| (border, next(step as f64))).collect()
-                } else {
-                    let mut border = scaled(r, sign);
-                    border[0] -= T::of(*least_speed);
-                    vec![(border, next(0.0))]
-                }
+                slip_borders(r, *least_speed, sign)
             }
             (Law::Regions(regions), Cell::Region { index }) => {
                 let border = |&(form, next): &(TwistForm<T>, usize)| {
@@ -158,6 +150,17 @@ impl<T: Number> Channel<T> {
             _ => Vec::new(),
         }
     }
+}
+
+/// Borders of a tyre on a road of speed `road` in direction `sign`, 0 below the least speed.
+fn slip_borders<T: Number>(road: &Series<T>, least_speed: f64, sign: f64) -> Vec<Border<T>> {
+    if sign == 0.0 {
+        let ends = between(road, (-least_speed, least_speed));
+        return ends.map(|(border, step)| (border, Cell::Slip { sign: step as f64 })).collect();
+    }
+    let mut border = scaled(road, sign);
+    border[0] -= T::of(least_speed);
+    vec![(border, Cell::Slip { sign: 0.0 })]
 }
 
 fn scaled<T: Number>(series: &Series<T>, factor: f64) -> Series<T> {

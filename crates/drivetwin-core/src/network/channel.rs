@@ -207,12 +207,7 @@ impl<T: Number> Channel<T> {
                 if sign == 0.0 {
                     *stiffness * s[k] / *least_speed
                 } else {
-                    // torque · |ω_road| = stiffness · (ω_wheel - ω_road), solved for coefficient k
-                    let mut rest = *stiffness * s[k] * sign;
-                    for i in 0..k {
-                        rest -= c.torque[i] * r[k - i];
-                    }
-                    rest / r[0]
+                    quotient_term(*stiffness * s[k] * sign, &c.torque, r, k)
                 }
             }
             (Law::Regions(regions), Cell::Region { index }) => {
@@ -223,6 +218,16 @@ impl<T: Number> Channel<T> {
             (law, cell) => unreachable!("cell {cell:?} does not belong to {law:?}"),
         };
     }
+}
+
+/// Coefficient `k` of q = p / r from that of p and the coefficients of q before: p = q r.
+#[inline(always)]
+fn quotient_term<T: Number>(p: T, q: &Series<T>, r: &Series<T>, k: usize) -> T {
+    let mut rest = p;
+    for i in 0..k {
+        rest -= q[i] * r[k - i];
+    }
+    rest / r[0]
 }
 
 /// Value of a linear form, given by its coefficients.
