@@ -15,12 +15,12 @@ from drivetwin.channels.shiftlog import Quantity, ShiftLog
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import convert_channels
-from drivetwin.dyno.names import EffectName
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log
 from drivetwin.vehicle.card import VehicleCard, load_card
+from drivetwin.vehicle.effects import EffectId
 
 OVERRUN, TIP, RAMP = -0.15, 0.6, 0.08
 """Torque in overrun over that of the shift, time between tips and length of a ramp [s]."""
@@ -45,7 +45,7 @@ class MismatchLog:
 
 
 def make_mismatch_log(
-    seed: int, effect: EffectName | None, size: float, rates: Rates, *, tolerances: bool = False
+    seed: int, effect: EffectId | None, size: float, rates: Rates, *, tolerances: bool = False
 ) -> MismatchLog:
     """Make the log of the vehicle of `seed` with one effect of a size, or without effect.
 
@@ -55,7 +55,7 @@ def make_mismatch_log(
     """
     vehicle = draw_vehicle(seed)
     scenario = _set_rates(vehicle.scenario, rates)
-    if effect is EffectName.BACKLASH:
+    if effect is EffectId.BACKLASH:
         scenario = replace(scenario, engine_torque=_build_tips(scenario))
     recorded = run(scenario, seed, effects={} if effect is None else {effect: size})
     card = vehicle.card

@@ -13,32 +13,32 @@ from scipy.integrate import cumulative_trapezoid
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects
-from drivetwin.dyno.names import EffectName
 from drivetwin.dyno.nominal import compute_friction_work
 from drivetwin.dyno.random_walk import WalkStream, draw_walk
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import FloatArray, Trajectory
+from drivetwin.vehicle.effects import EffectId
 
 SCENARIO = load_scenario("paper_steps")
 MODEL = SCENARIO.model
 SIZES = {
-    EffectName.EFFICIENCY_BY_GEAR: 0.01,
-    EffectName.INPUT_DRAG: 0.01,
-    EffectName.SLOW_LOAD: 0.01,
-    EffectName.AERO_LOAD: 0.2,
-    EffectName.DRUM_INERTIA: 0.05,
-    EffectName.PRESSURE_DELAY: 0.005,
-    EffectName.TORQUE_LAG: 0.015,
-    EffectName.INPUT_SHAFT_MODE: 35.0,
-    EffectName.TYRE_SLIP: 0.004,
-    EffectName.BACKLASH: 0.03,
-    EffectName.PROGRESSIVE_SHAFT: 0.03,
-    EffectName.FRICTION_SHAPE: 0.002,
-    EffectName.FRICTION_PRESSURE: 0.03,
-    EffectName.FRICTION_HEAT: 0.03,
-    EffectName.BRAKE_DRAG: 0.03,
+    EffectId.EFFICIENCY_BY_GEAR: 0.01,
+    EffectId.INPUT_DRAG: 0.01,
+    EffectId.SLOW_LOAD: 0.01,
+    EffectId.AERO_LOAD: 0.2,
+    EffectId.DRUM_INERTIA: 0.05,
+    EffectId.PRESSURE_DELAY: 0.005,
+    EffectId.TORQUE_LAG: 0.015,
+    EffectId.INPUT_SHAFT_MODE: 35.0,
+    EffectId.TYRE_SLIP: 0.004,
+    EffectId.BACKLASH: 0.03,
+    EffectId.PROGRESSIVE_SHAFT: 0.03,
+    EffectId.FRICTION_SHAPE: 0.002,
+    EffectId.FRICTION_PRESSURE: 0.03,
+    EffectId.FRICTION_HEAT: 0.03,
+    EffectId.BRAKE_DRAG: 0.03,
 }
 
 GRADUAL = [name for name in SIZES if name.value not in ("input_shaft_mode", "backlash")]
@@ -79,18 +79,18 @@ def integrate_load(load: FloatArray, motion: Trajectory) -> FloatArray:
 
 
 def test_every_effect_on_the_motion_has_a_size_here() -> None:
-    assert set(SIZES) | SENSOR_EFFECTS == set(EffectName)
+    assert set(SIZES) | SENSOR_EFFECTS == set(EffectId)
 
 
-@pytest.mark.parametrize("name", EffectName)
-def test_size_zero_gives_the_nominal_log(name: EffectName) -> None:
+@pytest.mark.parametrize("name", EffectId)
+def test_size_zero_gives_the_nominal_log(name: EffectId) -> None:
     nominal, bench = (run(SCENARIO, 3, effects=effects) for effects in ({}, {name: 0.0}))
     for channel, other in zip(bench.channels, nominal.channels, strict=True):
         assert np.allclose(channel.values, other.values, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", SIZES)
-def test_truth_is_that_of_the_model_and_lists_the_effect(name: EffectName) -> None:
+def test_truth_is_that_of_the_model_and_lists_the_effect(name: EffectId) -> None:
     nominal, bench = (run(SCENARIO, 3, effects=e) for e in ({}, {name: SIZES[name]}))
     assert bench.truth.parameters == nominal.truth.parameters
     assert bench.truth.friction == nominal.truth.friction
@@ -98,22 +98,22 @@ def test_truth_is_that_of_the_model_and_lists_the_effect(name: EffectName) -> No
 
 
 @pytest.mark.parametrize("name", GRADUAL)
-def test_the_change_of_the_motion_is_of_first_order_in_the_size(name: EffectName) -> None:
+def test_the_change_of_the_motion_is_of_first_order_in_the_size(name: EffectId) -> None:
     """At small sizes; those of a tyre are larger, since a stiff one takes many steps."""
-    first = SIZES[name] * (0.25 if name is EffectName.TYRE_SLIP else 0.02)
+    first = SIZES[name] * (0.25 if name is EffectId.TYRE_SLIP else 0.02)
     base, half, whole = (move({name: size}) for size in (0.0, 0.5 * first, first))
     changes = [np.abs(each.engine_speed - base.engine_speed).max() for each in (half, whole)]
     assert changes[1] / changes[0] == pytest.approx(2.0, rel=0.1)
 
 
 @pytest.mark.parametrize("name", SIZES)
-def test_a_run_starts_without_ringing(name: EffectName) -> None:
+def test_a_run_starts_without_ringing(name: EffectId) -> None:
     """At constant engine torque the output torque is quasi-steady until the shift begins."""
     scenario = load_scenario("paper")
     motion = move({name: SIZES[name]}, scenario)
     early = motion.shaft_torque[motion.time < 0.5]
     # Speeds that grow change the load of the effects by less than this within 0.5 s.
-    slow = {EffectName.AERO_LOAD: 40.0, EffectName.SLOW_LOAD: 40.0}.get(name, 0.5)
+    slow = {EffectId.AERO_LOAD: 40.0, EffectId.SLOW_LOAD: 40.0}.get(name, 0.5)
     assert np.ptp(early) < slow
 
 
@@ -290,7 +290,7 @@ def test_other_plants_are_refused(scenario: str) -> None:
 @pytest.mark.parametrize("scenario", ["input_gear", "dual_clutch", "manual", "power_off_up"])
 def test_other_dual_clutches_take_all_effects(scenario: str) -> None:
     sizes = dict(SIZES)
-    del sizes[EffectName.BACKLASH]
+    del sizes[EffectId.BACKLASH]
     nominal, zero = (
         move(effects, load_scenario(scenario)) for effects in ({}, {"input_drag": 0.0})
     )

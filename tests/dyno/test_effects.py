@@ -6,13 +6,13 @@ from __future__ import annotations
 import pytest
 
 from drivetwin.dyno.effects import check_effects, parse_effects
-from drivetwin.dyno.names import EffectName
 from drivetwin.errors import InputError
+from drivetwin.vehicle.effects import EffectId
 
 
 def test_texts_become_sizes_by_effect() -> None:
     effects = parse_effects(["tyre_slip=0.004", "input_drag=1e-2"])
-    assert effects == {EffectName.TYRE_SLIP: 0.004, EffectName.INPUT_DRAG: 0.01}
+    assert effects == {EffectId.TYRE_SLIP: 0.004, EffectId.INPUT_DRAG: 0.01}
 
 
 @pytest.mark.parametrize("text", ["tyre_slip", "tyre_slip=", "tyre_slip=much", "=0.1"])

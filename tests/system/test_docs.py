@@ -11,9 +11,10 @@ import pytest
 
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.cli.synth import ScenarioOption
-from drivetwin.dyno.names import EffectName, ScenarioName
+from drivetwin.dyno.names import ScenarioName
 from drivetwin.parameters import SPECS, ParameterSpec
 from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.effects import EffectId
 
 ROOT = Path(__file__).resolve().parents[2]
 REFERENCE = ROOT / "docs" / "reference"
@@ -87,4 +88,4 @@ def test_every_scenario_and_effect_is_described() -> None:
     assert set(described) == set(ScenarioName)
     rows = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
     assert rows[: len(ScenarioName)] == list(ScenarioName)
-    assert set(rows[len(ScenarioName) :]) == set(EffectName)
+    assert set(rows[len(ScenarioName) :]) == set(EffectId)

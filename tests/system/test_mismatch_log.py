@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from benchmarks.estimation.mismatch_log import Rates, make_mismatch_log
-from drivetwin.dyno.names import EffectName
 from drivetwin.shifts.detect import detect_shifts
+from drivetwin.vehicle.effects import EffectId
 
-SIZES = {EffectName.INPUT_SHAFT_MODE: 60.0, EffectName.AERO_LOAD: 0.1}
+SIZES = {EffectId.INPUT_SHAFT_MODE: 60.0, EffectId.AERO_LOAD: 0.1}
 
 
-@pytest.mark.parametrize("effect", EffectName)
-def test_every_effect_leaves_a_shift_to_identify(effect: EffectName) -> None:
+@pytest.mark.parametrize("effect", EffectId)
+def test_every_effect_leaves_a_shift_to_identify(effect: EffectId) -> None:
     made = make_mismatch_log(4, effect, SIZES.get(effect, 0.003), Rates.LOGGER)
     (shift,) = detect_shifts(made.log, made.card).shifts
     assert (shift.start_gear, shift.end_gear) == ("2", "3")
@@ -41,7 +41,7 @@ def test_stated_tolerances_are_on_the_card_and_in_the_log() -> None:
 
 def test_vehicles_differ_by_seed_and_have_the_log_again() -> None:
     first, again, other = (
-        make_mismatch_log(seed, EffectName.TYRE_SLIP, 0.004, Rates.BUS) for seed in (5, 5, 6)
+        make_mismatch_log(seed, EffectId.TYRE_SLIP, 0.004, Rates.BUS) for seed in (5, 5, 6)
     )
     role = "output_torque"
     assert np.array_equal(first.log[role].values, again.log[role].values)
@@ -50,7 +50,7 @@ def test_vehicles_differ_by_seed_and_have_the_log_again() -> None:
 
 
 def test_backlash_is_crossed() -> None:
-    made = make_mismatch_log(3, EffectName.BACKLASH, 0.02, Rates.LOGGER)
+    made = make_mismatch_log(3, EffectId.BACKLASH, 0.02, Rates.LOGGER)
     motion = made.recorded.trajectory
     assert np.count_nonzero(motion.shaft_torque == 0.0) > 5
     assert motion.shaft_torque.min() < 0.0

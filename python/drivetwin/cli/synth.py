@@ -10,7 +10,8 @@ import typer
 
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
-from drivetwin.dyno.names import EffectName, ScenarioName
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.vehicle.effects import EffectId
 
 if TYPE_CHECKING:
     from drivetwin.dyno.dyno import DynoRun
@@ -59,7 +60,7 @@ def synth(
         typer.Option(
             metavar="NAME=SIZE",
             help="A departure from the dual-clutch model, repeatable; in units and shares of "
-            f"docs/howto/synthetic-log.md: {', '.join(EffectName)}.",
+            f"docs/howto/synthetic-log.md: {', '.join(EffectId)}.",
         ),
     ] = None,
     as_json: JsonFlag = False,

@@ -7,9 +7,9 @@ import numpy as np
 
 from drivetwin.dyno.actuators import apply_lag
 from drivetwin.dyno.effects import Effects
-from drivetwin.dyno.names import EffectName
 from drivetwin.dyno.nominal import NominalRun, compute_friction_work
 from drivetwin.simulation.dual_clutch import FloatArray, ShiftElement, Signal, Trajectory
+from drivetwin.vehicle.effects import EffectId
 
 
 def lag_input(logged: Signal, time_constant: float) -> Signal:
@@ -38,11 +38,11 @@ def scale_capacity(
     """
     excess = np.maximum(acting.values - element.P0, 0.0)
     factor = np.ones_like(excess)
-    rise = effects.get(EffectName.FRICTION_PRESSURE, 0.0)
+    rise = effects.get(EffectId.FRICTION_PRESSURE, 0.0)
     span = nominal.get_pressure_range(element.name, element.P0)
     if rise > 0.0 and span > 0.0:
         factor *= 1.0 + rise * (np.minimum(excess / span, 1.0) - 0.5)
-    fall = effects.get(EffectName.FRICTION_HEAT, 0.0)
+    fall = effects.get(EffectId.FRICTION_HEAT, 0.0)
     whole = float(compute_friction_work(nominal.trajectory, element.name)[-1])
     if fall > 0.0 and whole > 0.0:
         share = np.interp(acting.arrival, nominal.trajectory.time, work) / whole
@@ -57,8 +57,8 @@ def build_acting_inputs(
 
     `heated` is a run on the times of the nominal one, from whose friction work μ falls.
     """
-    torque = lag_input(nominal.engine_torque, effects.get(EffectName.TORQUE_LAG, 0.0))
-    late = effects.get(EffectName.PRESSURE_DELAY, 0.0)
+    torque = lag_input(nominal.engine_torque, effects.get(EffectId.TORQUE_LAG, 0.0))
+    late = effects.get(EffectId.PRESSURE_DELAY, 0.0)
     pressures = {
         each.name: scale_capacity(
             delay_input(nominal.pressures[each.name], late),

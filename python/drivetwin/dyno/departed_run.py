@@ -9,11 +9,11 @@ from drivetwin.dyno.acting_inputs import build_acting_inputs
 from drivetwin.dyno.departed_driveline import DepartedDriveline
 from drivetwin.dyno.departure import compute_departure
 from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects
-from drivetwin.dyno.names import EffectName
 from drivetwin.dyno.nominal import NominalRun, compute_friction_work
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import InputError, SimulationError, Where
 from drivetwin.simulation.dual_clutch import FloatArray, Trajectory
+from drivetwin.vehicle.effects import EffectId
 
 _ROUNDS = 30
 """Most runs until friction work and the friction that falls with it agree."""
@@ -51,7 +51,7 @@ def simulate_departed(
         scenario.model, departure, [gear.element for gear in scenario.gears]
     )
     heated = nominal.trajectory
-    if effects.get(EffectName.FRICTION_HEAT, 0.0) > 0.0:
+    if effects.get(EffectId.FRICTION_HEAT, 0.0) > 0.0:
         heated = _heat(scenario, nominal, effects, driveline)
     inputs = build_acting_inputs(nominal, effects, heated)
     return driveline.simulate(*inputs, scenario.start(), time)
@@ -70,7 +70,7 @@ def _heat(
         heated = run
     raise SimulationError(
         f"friction and its work do not agree after {_ROUNDS} runs",
-        f"give a smaller {EffectName.FRICTION_HEAT}",
+        f"give a smaller {EffectId.FRICTION_HEAT}",
     )
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.dyno.effects import Effects
-from drivetwin.dyno.names import EffectName
 from drivetwin.dyno.nominal import NominalRun
 from drivetwin.dyno.random_walk import WalkStream, draw_walk
 from drivetwin.simulation.dual_clutch import (
@@ -19,6 +18,7 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     Stribeck,
 )
+from drivetwin.vehicle.effects import EffectId
 
 _MODE_DAMPING = 0.06
 """Damping ratio of the input shaft's mode."""
@@ -81,7 +81,7 @@ class Departure:
 def compute_departure(nominal: NominalRun, effects: Effects, seed: int) -> Departure:
     """Compute the added parts from the sizes of the effects and the run without them."""
 
-    def size(name: EffectName) -> float:
+    def size(name: EffectId) -> float:
         return effects.get(name, 0.0)
 
     model, full = nominal.model, nominal.largest_shaft_torque
@@ -89,20 +89,20 @@ def compute_departure(nominal: NominalRun, effects: Effects, seed: int) -> Depar
         elements=tuple(
             replace(
                 each,
-                drum_inertia=each.drum_inertia + size(EffectName.DRUM_INERTIA),
-                friction=_build_friction(each, nominal, size(EffectName.FRICTION_SHAPE)),
+                drum_inertia=each.drum_inertia + size(EffectId.DRUM_INERTIA),
+                friction=_build_friction(each, nominal, size(EffectId.FRICTION_SHAPE)),
             )
             for each in model.elements
         ),
-        load=_compute_load(nominal, size(EffectName.AERO_LOAD)),
-        walk=_draw_load_walk(nominal, size(EffectName.SLOW_LOAD), seed),
-        efficiency=size(EffectName.EFFICIENCY_BY_GEAR),
-        input_drag=size(EffectName.INPUT_DRAG) * nominal.largest_engine_torque,
-        brake_drag=size(EffectName.BRAKE_DRAG) * abs(nominal.load),
-        input_shaft=_compute_input_shaft(0.5 * model.J1, size(EffectName.INPUT_SHAFT_MODE)),
-        tyre=_compute_tyre(nominal, size(EffectName.TYRE_SLIP)),
-        gap=2.0 * size(EffectName.BACKLASH) * full / model.k_o,
-        shaft_table=_compute_shaft_table(full, model.k_o, size(EffectName.PROGRESSIVE_SHAFT)),
+        load=_compute_load(nominal, size(EffectId.AERO_LOAD)),
+        walk=_draw_load_walk(nominal, size(EffectId.SLOW_LOAD), seed),
+        efficiency=size(EffectId.EFFICIENCY_BY_GEAR),
+        input_drag=size(EffectId.INPUT_DRAG) * nominal.largest_engine_torque,
+        brake_drag=size(EffectId.BRAKE_DRAG) * abs(nominal.load),
+        input_shaft=_compute_input_shaft(0.5 * model.J1, size(EffectId.INPUT_SHAFT_MODE)),
+        tyre=_compute_tyre(nominal, size(EffectId.TYRE_SLIP)),
+        gap=2.0 * size(EffectId.BACKLASH) * full / model.k_o,
+        shaft_table=_compute_shaft_table(full, model.k_o, size(EffectId.PROGRESSIVE_SHAFT)),
     )
 
 

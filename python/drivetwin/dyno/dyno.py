@@ -50,7 +50,7 @@ def run(
     """Simulate the scenario and record it.
 
     `noise` scales the white noise of all sensors; 0 makes them ideal (no noise, no rounding) while
-    their rates and delays stay. `effects` are the sizes, by `EffectName`, of departures from the
+    their rates and delays stay. `effects` are the sizes, by `EffectId`, of departures from the
     dual-clutch model; the truth stays that of the model. The same arguments give the same log, bit
     for bit.
     Raises SimulationError where the run does not complete, InputError for a negative noise and for

@@ -6,32 +6,32 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from drivetwin.dyno.names import EffectName
 from drivetwin.errors import InputError, Where
+from drivetwin.vehicle.effects import EffectId
 
-Effects = Mapping[EffectName, float]
-"""Sizes by effect, in the units of `EffectName`; an effect of size 0 changes nothing."""
+Effects = Mapping[EffectId, float]
+"""Sizes by effect, in the units of `EffectId`; an effect of size 0 changes nothing."""
 
 SENSOR_EFFECTS = frozenset(
     {
-        EffectName.OUTPUT_TORQUE_OFFSET,
-        EffectName.OUTPUT_TORQUE_DRIFT,
-        EffectName.OUTPUT_TORQUE_DELAY,
+        EffectId.OUTPUT_TORQUE_OFFSET,
+        EffectId.OUTPUT_TORQUE_DRIFT,
+        EffectId.OUTPUT_TORQUE_DELAY,
     }
 )
 """Effects that change the recorded output torque and leave the motion as it is."""
 _LIMITS = {
-    EffectName.AERO_LOAD: 1.0,
-    EffectName.TYRE_SLIP: 1.0,
-    EffectName.PROGRESSIVE_SHAFT: 2.0,
-    EffectName.FRICTION_PRESSURE: 2.0,
-    EffectName.FRICTION_HEAT: 1.0,
+    EffectId.AERO_LOAD: 1.0,
+    EffectId.TYRE_SLIP: 1.0,
+    EffectId.PROGRESSIVE_SHAFT: 2.0,
+    EffectId.FRICTION_PRESSURE: 2.0,
+    EffectId.FRICTION_HEAT: 1.0,
 }
 """Sizes from which a torque would reverse or a share exceed the whole."""
 _KEY = Where(key="effect")
 
 
-def parse_effects(texts: Sequence[str]) -> dict[EffectName, float]:
+def parse_effects(texts: Sequence[str]) -> dict[EffectId, float]:
     """Parse texts `NAME=SIZE`, such as `tyre_slip=0.004`.
 
     Raises InputError for another form, a repeated or unknown name, or an impossible size.
@@ -53,20 +53,20 @@ def parse_effects(texts: Sequence[str]) -> dict[EffectName, float]:
     return check_effects(sizes)
 
 
-def check_effects(sizes: Mapping[str, float] | Effects) -> dict[EffectName, float]:
+def check_effects(sizes: Mapping[str, float] | Effects) -> dict[EffectId, float]:
     """Check names and sizes of effects.
 
     Raises InputError for unknown names, sizes that are negative, not finite or too large, and for
     `backlash` together with `progressive_shaft`, which are two laws of one shaft.
     """
-    unknown = [name for name in sizes if name not in list(EffectName)]
+    unknown = [name for name in sizes if name not in list(EffectId)]
     if unknown:
         raise InputError(
             f"no effect {', '.join(map(repr, unknown))}",
-            f"give any of {', '.join(EffectName)}",
+            f"give any of {', '.join(EffectId)}",
             _KEY,
         )
-    effects = {EffectName(name): float(size) for name, size in sizes.items()}
+    effects = {EffectId(name): float(size) for name, size in sizes.items()}
     bad = [
         f"{name} = {size:g}"
         for name, size in effects.items()
@@ -79,7 +79,7 @@ def check_effects(sizes: Mapping[str, float] | Effects) -> dict[EffectName, floa
             f"give finite sizes from 0 on, {limits}",
             _KEY,
         )
-    both = (EffectName.BACKLASH, EffectName.PROGRESSIVE_SHAFT)
+    both = (EffectId.BACKLASH, EffectId.PROGRESSIVE_SHAFT)
     if all(effects.get(name, 0.0) > 0.0 for name in both):
         raise InputError(f"{' and '.join(both)} in one shaft", "give one of them", _KEY)
     return effects

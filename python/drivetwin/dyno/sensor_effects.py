@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects
-from drivetwin.dyno.names import EffectName
 from drivetwin.dyno.random_walk import WalkStream, draw_walk
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
 from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.vehicle.effects import EffectId
 
 _ROLE = "output_torque"
 _DRIFT_TIME = 5.0
@@ -31,7 +31,7 @@ def apply_delay(sensors: tuple[Sensor, ...], effects: Effects) -> tuple[Sensor, 
             "choose a scenario with an output torque sensor",
             Where(key="effect"),
         )
-    late = effects.get(EffectName.OUTPUT_TORQUE_DELAY, 0.0)
+    late = effects.get(EffectId.OUTPUT_TORQUE_DELAY, 0.0)
     return tuple(
         replace(sensor, delay=sensor.delay + late) if sensor.role == _ROLE else sensor
         for sensor in sensors
@@ -62,8 +62,8 @@ class TorqueError:
 def compute_torque_error(effects: Effects, full: float, seed: int, duration: float) -> TorqueError:
     """Compute the error of the sensor; `full` is the largest shaft torque [N m]."""
     return TorqueError(
-        full * effects.get(EffectName.OUTPUT_TORQUE_OFFSET, 0.0),
-        full * effects.get(EffectName.OUTPUT_TORQUE_DRIFT, 0.0),
+        full * effects.get(EffectId.OUTPUT_TORQUE_OFFSET, 0.0),
+        full * effects.get(EffectId.OUTPUT_TORQUE_DRIFT, 0.0),
         seed,
         duration,
     )

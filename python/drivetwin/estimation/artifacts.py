@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.likelihood.fit import LikelihoodFit
     from drivetwin.estimation.linear.pipeline import IntegralShift
     from drivetwin.estimation.paper.pipeline import PaperShift
+    from drivetwin.estimation.result.cause import Cause
     from drivetwin.estimation.result.multi_log import Several
     from drivetwin.estimation.result.suggestion import ExperimentRanking
     from drivetwin.estimation.result.validation import HeldOut, Validation
@@ -43,6 +44,8 @@ class StageResults:
     loads: tuple[float, ...] = ()
     """Load of each shift at the output shaft [N m] where they differ, as on hills, T_v/i_f is then
     their mean; empty where the shifts of a log share one."""
+    cause: Cause | None = None
+    """Departure from the model that the log shows, by the likelihood method; None without one."""
     several: Several | None = None
     """The logs behind a fit of several, from `identify_joint`; None of one log."""
     suggestions: tuple[ExperimentRanking, ...] = ()

@@ -62,7 +62,7 @@ def _parse_elements(document: Mapping[str, Any]) -> dict[str, ElementTable]:
 
 
 def _check_effects(document: Mapping[str, Any]) -> list[Fault]:
-    known = [one.value for one in EffectId if one is not EffectId.SENSOR_TOLERANCE]
+    known = [one.value for one in EffectId]
     return [
         Fault(f"effects.{name}", f"there is no such effect; the effects are {', '.join(known)}")
         for name in _get_tables(document, "effects")

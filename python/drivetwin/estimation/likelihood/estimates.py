@@ -18,7 +18,7 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     check_residuals,
     check_weighting,
 )
-from drivetwin.estimation.likelihood.effects.causes import report_cause
+from drivetwin.estimation.likelihood.effects.causes import find_cause, report_cause
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.effects.withdrawal import find_unreliable
@@ -105,6 +105,7 @@ def build_estimates(
     )
     estimates = apply_errors(estimates, (*limits, *disagreements))
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
+    cause = find_cause(told, priors)
     return EstimateSet(
         estimates,
         build_friction_curves(fit, linear, told),
@@ -114,7 +115,7 @@ def build_estimates(
             *dict.fromkeys(fitted.notes.values()),
             *(one.finding for one in fitted.conflicts),
             *limits,
-            *report_cause(told, priors, values, matrix, std),
+            *(() if cause is None else (report_cause(cause, told, values, matrix, std),)),
             *(one for one in disagreements if one.subject not in estimates),
             *find_null_directions(fit),
             *report_different_loads(collect_loads(fit)),
@@ -122,6 +123,7 @@ def build_estimates(
         ),
         _build_load_law(fit, told),
         collect_loads(fit),
+        cause,
     )
 
 

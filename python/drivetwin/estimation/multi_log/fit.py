@@ -101,6 +101,7 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
         integral=tuple(one for each in alone for one in each.evidence.integral),
         likelihood=fit,
         loads=told.loads,
+        cause=told.cause,
         several=several,
     )
     return replace(_join_results(alone, told, several), evidence=evidence)

@@ -11,6 +11,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.result.cause import Cause
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import make_shift_labels
@@ -30,6 +31,8 @@ class EstimateSet:
     findings: tuple[Finding, ...]
     load: LoadLaw | None = None
     loads: tuple[float, ...] = ()
+    cause: Cause | None = None
+    """Departure from the model that the log shows; likelihood method only."""
 
 
 def _check_excitation(signals: ShiftSignals) -> Finding | None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.effects.effect import Disturbance, Group
+from drivetwin.estimation.likelihood.effects.effect import Disturbance
 from drivetwin.estimation.likelihood.effects.operating_point import (
     OperatingPoint,
     evaluate_operating_point,
@@ -19,6 +19,7 @@ from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.noise.linear_response import STATES, build_output_row
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.result.cause import Group
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import SensorTolerance
@@ -230,7 +231,7 @@ def _build_random(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Gr
             for one in effect.build(at, prior.std):
                 yield Group(name, one.subject), one
     for one in build_sensor_columns(at, priors.sensors):
-        yield Group(EffectId.SENSOR_TOLERANCE, one.subject), one
+        yield Group(None, one.subject), one
 
 
 def _build_known(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Disturbance, float]]:

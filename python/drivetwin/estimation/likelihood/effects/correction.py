@@ -15,7 +15,6 @@ from drivetwin.estimation.likelihood.effects.columns import (
     EffectPriors,
     build_columns,
 )
-from drivetwin.estimation.likelihood.effects.effect import Group
 from drivetwin.estimation.likelihood.effects.joint_step import (
     GroupEvidence,
     JointStep,
@@ -31,6 +30,7 @@ from drivetwin.estimation.likelihood.fit import (
     invert_information,
 )
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
+from drivetwin.estimation.result.cause import Group
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,13 @@ from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoi
 from drivetwin.estimation.likelihood.noise.linear_response import build_slip_row
 from drivetwin.vehicle.effects import EffectId
 
+REFERENCE_TORQUE = 1500.0
+"""Engine torque [N m] to which the prior refers: drums grow with the torque that they carry."""
+
 
 def build(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Add the torque of an inertia that rotates with the slip of each element without a drum."""
-    size = std * at.largest_engine_torque
+    size = std * at.largest_engine_torque / REFERENCE_TORQUE
     stated = {one.name for one in at.part.structure.driveline.drums}
     found = []
     for one in at.model.elements:
@@ -26,8 +29,8 @@ def build(at: OperatingPoint, std: float) -> list[Disturbance]:
 EFFECT = Effect(
     EffectId.DRUM_INERTIA,
     "a drum inertia that the card does not state",
-    "kg m² per N m of engine torque",
-    0.03 / 1500.0,
+    "kg m² per 1500 N m of engine torque",
+    0.03,
     "drums of heavy-duty boxes of 1500 N m weigh 5 to 10 kg at a radius of 0.08 m",
     "state drum_inertia_kgm2 of the element on the card",
     build,

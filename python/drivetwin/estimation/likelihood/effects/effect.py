@@ -11,14 +11,6 @@ from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoi
 from drivetwin.vehicle.effects import EffectId
 
 
-@dataclass(frozen=True, order=True)
-class Group:
-    """Columns that belong to one cause: an effect, and the element, gear or sensor that has it."""
-
-    effect: EffectId
-    subject: str = ""
-
-
 @dataclass(frozen=True, eq=False)
 class Disturbance:
     """Action of an effect on the driveline, or on the measured signals, over the steps of a run.

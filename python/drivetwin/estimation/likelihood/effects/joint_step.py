@@ -23,11 +23,11 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
-from drivetwin.estimation.likelihood.effects.effect import Group
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.score import compute_score
 from drivetwin.estimation.optimize.objective import NormalEquations
+from drivetwin.estimation.result.cause import Group
 from drivetwin.vehicle.effects import EffectId
 
 
@@ -167,7 +167,7 @@ def scale_by_evidence(
     groups = [
         sums.columns.find_columns(one)
         for one in dict.fromkeys(sums.columns.groups)
-        if one.effect is not EffectId.SENSOR_TOLERANCE
+        if one.effect is not None
     ]
     scale = np.ones(pull.size)
     for _ in range(SIZES.rounds):

@@ -22,7 +22,8 @@ from drivetwin.estimation.likelihood.effects import (
     torque_lag,
     tyre_slip,
 )
-from drivetwin.estimation.likelihood.effects.effect import Effect, Group
+from drivetwin.estimation.likelihood.effects.effect import Effect
+from drivetwin.estimation.result.cause import Group
 from drivetwin.vehicle.effects import EffectId
 
 EFFECTS: dict[EffectId, Effect] = {
@@ -52,7 +53,7 @@ EFFECTS: dict[EffectId, Effect] = {
 
 def describe_group(group: Group) -> str:
     """Describe a cause in the field's words, with the element or gear that has it."""
-    if group.effect not in EFFECTS:
+    if group.effect is None:
         return f"a tolerance of a sensor ({group.subject})"
     meaning = EFFECTS[group.effect].meaning
     return f"{meaning} ({group.subject})" if group.subject else meaning

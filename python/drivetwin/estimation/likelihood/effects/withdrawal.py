@@ -10,8 +10,8 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.correction import Correction
-from drivetwin.estimation.likelihood.effects.effect import Group
 from drivetwin.estimation.likelihood.effects.table import describe_group
+from drivetwin.estimation.result.cause import Group
 from drivetwin.findings import Code, Finding, report
 from drivetwin.vehicle.effects import EffectId
 
@@ -34,7 +34,7 @@ class WithdrawalSettings:
 
 
 WITHDRAWAL = WithdrawalSettings()
-EXEMPT = (EffectId.FRICTION_SHAPE, EffectId.SENSOR_TOLERANCE)
+EXEMPT = (EffectId.FRICTION_SHAPE, None)
 """Effects whose amounts may be large: shapes have no usual size, tolerances are the card's."""
 
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.correction import Correction
-from drivetwin.estimation.likelihood.effects.effect import Group
 from drivetwin.estimation.likelihood.effects.friction_shape import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.likelihood.slip_contact import find_loaded_slips
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
+from drivetwin.estimation.result.cause import Group
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.effects import EffectId

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""Cause of a departure from the model that the log shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drivetwin.vehicle.effects import EffectId
+
+LEAD = 5.0
+"""Lead of log evidence over the next cause from which a cause counts as found: odds of 150 to 1."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns that belong to one cause: an effect, and the element, gear or sensor that has it.
+
+    `effect` is None for the stated tolerance of a sensor.
+    """
+
+    effect: EffectId | None
+    subject: str = ""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Cause that the log shows.
+
+    `evidence` is the log evidence against its absence, `size` its estimate alone in the unit of
+    the effect with `std`; for a random effect `size` is its root mean square in stated sizes and
+    `std` None. `equivalent` are causes that the log cannot tell from it, `next_evidence` that of
+    the best other one. `is_certain` is False where another cause comes near.
+    """
+
+    group: Group
+    evidence: float
+    size: float
+    std: float | None
+    equivalent: tuple[Group, ...]
+    next_evidence: float
+
+    @property
+    def is_certain(self) -> bool:
+        """True if no other cause comes near in evidence."""
+        return self.evidence - self.next_evidence >= LEAD
