@@ -19,6 +19,7 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log
+from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.vehicle.effects import EffectId
 
@@ -54,7 +55,7 @@ def make_mismatch_log(
     Raises InputError for an impossible size, SimulationError where the run does not complete.
     """
     vehicle = draw_vehicle(seed)
-    scenario = _set_rates(vehicle.scenario, rates)
+    scenario = _set_rates(_hold_load(vehicle.scenario), rates)
     if effect is EffectId.BACKLASH:
         scenario = replace(scenario, engine_torque=_build_tips(scenario))
     recorded = run(scenario, seed, effects={} if effect is None else {effect: size})
@@ -67,6 +68,13 @@ def make_mismatch_log(
         card_file.write_text(card, encoding="utf-8")
         read = load_card(card_file)
         return MismatchLog(read_log(log_file, read), read, recorded)
+
+
+def _hold_load(scenario: Scenario) -> Scenario:
+    """Return the scenario with its load at the start, so that the truth has the whole load."""
+    model, wheel = scenario.model, scenario.start().wheel_speed
+    load = RoadLoad(constant=model.load.evaluate(wheel))
+    return replace(scenario, model=replace(model, load=load))
 
 
 def _set_rates(scenario: Scenario, rates: Rates) -> Scenario:
