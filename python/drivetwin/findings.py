@@ -120,11 +120,11 @@ class Code(StrEnum):
     IMPOSSIBLE_VALUE = auto()
     CARD_FOR_IMPOSSIBLE = auto()
     INTERVAL_WIDER_THAN_VALUE = auto()
+    OUTSIDE_LIMITS = auto()
     INTERVAL_WIDE = auto()
     INTERVAL_WIDE_WITH_PRIOR = auto()
     LOG_CONTRADICTS_CARD = auto()
     DEPENDS_ON_PRIOR = auto()
-    DEPENDS_ON_EFFECT = auto()
     DISAGREEING_LOG = auto()
     SENSOR_LIMITED = auto()
 

@@ -102,10 +102,6 @@ class MomentumFit:
         """Estimate of one parameter."""
         return float(self.fit.theta[self.find_index(name)])
 
-    def get_std(self, name: str) -> float:
-        """Standard error of one parameter."""
-        return float(self.fit.std[self.find_index(name)])
-
 
 def list_momentum_names(driveline: KnownDriveline) -> tuple[str, ...]:
     """Parameters of the regression: η, Je, Jo′, age and mean rounding error of T_e, drums."""

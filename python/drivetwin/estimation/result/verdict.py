@@ -92,7 +92,8 @@ def assess(
     advice = get_advice(parameter_id, std_noise, std_systematic)
     if not np.isfinite(width) or width > end or not inside:
         shown = Number(value, spec.unit, half)
-        reason = join_reasons(explain(Code.INTERVAL_WIDER_THAN_VALUE, value=shown), advice)
+        code = Code.INTERVAL_WIDER_THAN_VALUE if inside else Code.OUTSIDE_LIMITS
+        reason = join_reasons(explain(code, value=shown), advice)
         return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
     reason, verdict = note, Verdict.IDENTIFIED
     if width > limit:
