@@ -3,17 +3,26 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from string import Formatter
 
 import pytest
 
+from drivetwin import findings
 from drivetwin.errors import Where
 from drivetwin.files.records import FindingRecord
 from drivetwin.findings import Code, Number, Severity, load_catalogue, report, select_warnings
 
 
 def test_every_code_has_an_entry_and_each_entry_a_code() -> None:
-    assert list(load_catalogue()) == list(Code)
+    assert sorted(load_catalogue()) == sorted(Code)
+
+
+def test_every_code_is_reported_somewhere() -> None:
+    package = Path(findings.__file__).parent
+    sources = "".join(path.read_text(encoding="utf-8") for path in package.rglob("*.py"))
+    assert [code.name for code in Code if not re.search(rf"Code\.{code.name}\b", sources)] == []
 
 
 @pytest.mark.parametrize("code", Code)

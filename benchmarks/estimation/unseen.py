@@ -30,7 +30,7 @@ from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.method import DEFAULT_METHOD
-from drivetwin.estimation.result.verdict import DELAY_IDENTIFIED
+from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
@@ -41,7 +41,7 @@ from tests.support.bench import Bench
 HALF = 1.96
 """Half width of a 95 % interval in standard deviations."""
 OVER_ETA = "_over_eta"
-LIMIT = 4.0 * DELAY_IDENTIFIED
+LIMIT = 4.0 * VERDICT.delay_identified
 """Half width of the interval of a delay [s] from which it is refused; others at their value."""
 CLEAR = 0.5
 """Share of that limit below which a half width by the bound counts as clear of it."""

@@ -11,6 +11,7 @@ from drivetwin.channels.mapping import ChannelSpec, infer_candidates, normalise_
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.roles import NEEDED
 from drivetwin.errors import MappingError, MissingChannelError
+from drivetwin.findings import Code, render
 
 ELEMENTS = {"B2": "brake", "B3": "brake"}
 ENGLISH = ["EngTrq", "PrsBrk2", "PrsBrk3", "TrqOut", "SpdIn", "SpdOut", "SpdWhl"]
@@ -88,7 +89,7 @@ def test_resolve_orders_roles_and_prefers_what_is_stated() -> None:
     ]  # fmt: skip
     assert mapped.channels["output_torque"].source == "Sensor7"
     assert mapped.channels["pressure.B3"] == ChannelSpec("PrsBrk3")
-    assert mapped.warnings == ()
+    assert mapped.findings == ()
 
 
 def test_a_stated_column_is_not_guessed_for_another_role() -> None:
@@ -107,7 +108,9 @@ def test_the_engine_speed_stands_in_for_the_input_speed() -> None:
 def test_what_nobody_needs_may_be_missing() -> None:
     mapped = resolve_roles(columns(["SpdIn", "SpdOut"]), {}, ELEMENTS, ("input_speed",), "log.csv")
     assert list(mapped.channels) == ["input_speed", "output_speed"]
-    assert mapped.warnings == ("no pressure of B2, B3: nothing that needs it can be told",)
+    assert render(mapped.findings) == (
+        "No pressure of B2, B3: nothing that depends on it can be estimated.",
+    )
 
 
 def test_a_pressure_can_be_needed() -> None:
@@ -157,7 +160,7 @@ def test_a_third_element_may_lack_its_pressure() -> None:
     elements = {**ELEMENTS, "K2": "clutch"}
     mapped = resolve_roles(columns(ENGLISH), {}, elements, NEEDED, "log.csv")
     assert "pressure.K2" not in mapped.channels
-    assert mapped.warnings == ("no pressure of K2: nothing that needs it can be told",)
+    assert [one.code for one in mapped.findings] == [Code.NO_PRESSURE]
 
 
 def test_several_candidates_for_a_needed_role_are_an_error() -> None:
@@ -170,8 +173,9 @@ def test_several_candidates_for_a_needed_role_are_an_error() -> None:
 def test_several_candidates_for_another_role_are_a_warning() -> None:
     mapped = resolve_roles(columns([*ENGLISH, "Gang", "gear"]), {}, ELEMENTS, NEEDED, "log.csv")
     assert "gear" not in mapped.channels
-    assert mapped.warnings == (
-        "'gear' may be any of the columns Gang, gear; none is used, name one in a channel mapping",
+    assert render(mapped.findings) == (
+        "Role 'gear' may be any of the columns Gang, gear; none is used. "
+        "Name one in a channel mapping.",
     )
 
 
@@ -211,6 +215,6 @@ def test_a_strange_sender_counts_where_no_other_has_numbers() -> None:
     other = Column("EngSpeed", group=strange, aside=True)
     mapped = resolve_roles([own, other], {}, {}, (), "bus.log")
     assert mapped.channels["engine_speed"].group == own.group
-    assert strange in mapped.warnings[0]
+    assert strange in mapped.findings[0].text
     never = Column("EngSpeed", group=own.group, empty=True)
     assert infer_candidates([never, other], {}) == {"engine_speed": [other]}

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.findings import render
 from drivetwin.logs.quality.update_raster import find_raster, mark_late_samples
 
 STEP = 1e-3
@@ -201,6 +202,6 @@ def test_a_coarse_table_that_shows_messages_on_is_told(step: float, own: float, 
     assert len(texts) == told
     late = [step if told else 0.0] * 2
     assert [one.late for one in found.values()] == pytest.approx(late)
-    for text in texts:
-        assert "10 ms apart and repeat values of 'EngTrq'" in text
+    for text in render(texts):
+        assert "10.0 ms apart and repeat values of 'EngTrq'" in text
     assert mark_late_samples({"output_speed": speed}) == ({"output_speed": speed}, [])

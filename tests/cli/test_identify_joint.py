@@ -77,7 +77,7 @@ def test_what_is_printed_fits_80_columns(written: Written) -> None:
     results, _, _ = written.printed.partition("wrote")
     assert "Logs fitted together" in results
     assert "Held out: predicted, not fitted" in results
-    assert "the logs agree on what they share" in results
+    assert "The logs agree on their shared parameters" in results
     assert max(len(line) for line in results.splitlines()) <= 80
 
 

@@ -105,8 +105,8 @@ def test_what_shifts_warns_of_is_told_in_the_same_words(
     assert main(["shifts", *arguments, "--json"]) == 0
     assert found["findings"] == json.loads(capsys.readouterr().out)["findings"]
     texts = [one["text"] for one in found["findings"]]
-    assert any("'TrqOut': far beyond" in text for text in texts)
-    assert any("check scale and unit" in text for text in texts)
+    assert any("'TrqOut': Far beyond" in text for text in texts)
+    assert any("Check scale and unit" in text for text in texts)
     assert found["refusal"] is None
     assert main(["inspect", *arguments]) == 0
     shown = " ".join(capsys.readouterr().out.split())

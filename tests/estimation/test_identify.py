@@ -266,7 +266,7 @@ def test_without_an_output_torque_ratios_are_told_and_absolute_values_refused() 
     assert eta is not None
     for name in ("J_prime_2", "J_vehicle", "Tv_over_if", "k_o", "c_o"):
         assert found.estimates[name].value is None
-        assert "output torque" in found.estimates[name].reason
+        assert "output-torque sensor" in found.estimates[name].reason
         ratio, absolute = found.estimates[f"{name}_over_eta"], whole.estimates[name].value
         assert ratio.value is not None
         assert ratio.std_noise is not None

@@ -108,7 +108,7 @@ def test_a_unit_asserted_against_the_file_is_told(tmp_path: Path) -> None:
     log = mapped(tmp_path, table, UNITS, mapping)
     assert log.get_pressure("B2").values.max() == pytest.approx(14e5)
     assert render(log.findings) == (
-        "channel 'PrsBrk2': read in 'Pa' as mapped, the file says 'bar'.",
+        "channel 'PrsBrk2': Read in 'Pa' as mapped, but the file has 'bar'.",
     )
 
 
@@ -140,8 +140,8 @@ def scale(name: str, factor: float) -> Callable[[Table], None]:
         (put("time", slice(50, 51), 0.1), TimeError, "does not increase: sample 50", "remove"),
         (put("TrqOut", slice(50, 160), np.nan), DamagedChannelError, "only 90 of 200", "sensor"),
         (put("SpdOut", slice(None), 800.0), DamagedChannelError, "constant throughout", "sensor"),
-        (scale("PrsBrk2", 1e5), PlausibilityError, "above 100 bar", 'unit = "Pa"'),
-        (scale("PrsBrk3", 1e-5), PlausibilityError, "below 0.001 bar", "scale"),
+        (scale("PrsBrk2", 1e5), PlausibilityError, "above 100.0 bar", 'unit = "Pa"'),
+        (scale("PrsBrk3", 1e-5), PlausibilityError, "below 0.001000 bar", "scale"),
         (scale("SpdWhl", -1.0), PlausibilityError, "negative", "sign = -1"),
         (scale("SpdWhl", RPM), PlausibilityError, "the final drive 5", "check the units"),
         (scale("SpdIn", 0.25), PlausibilityError, "the gears 1.8, 1.4", "check the units"),
@@ -294,4 +294,4 @@ def test_a_channel_that_starts_late_is_told_with_its_times(tmp_path: Path) -> No
     path = write(tmp_path, table)
     log = read_log(path, card(tmp_path))
     assert log["output_torque"].time[0] == 0.3
-    assert "channel 'TrqOut': no samples from 0.000 s to 0.300 s." in render(log.findings)
+    assert "channel 'TrqOut': No samples from 0.000 s to 0.300 s." in render(log.findings)

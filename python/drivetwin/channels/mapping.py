@@ -12,6 +12,7 @@ from drivetwin.channels.pressure_roles import get_pressure_element, make_pressur
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS
 from drivetwin.errors import MappingError, MissingChannelError, Where
+from drivetwin.findings import Code, Finding, report
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Mapped:
 
     channels: Mapping[str, ChannelSpec]
     options: ReadOptions = field(default_factory=ReadOptions)
-    warnings: tuple[str, ...] = field(default=())
+    findings: tuple[Finding, ...] = ()
 
 
 _ENGINE = "mot|motor|eng|engine|verbrennungsmotor|vm"
@@ -187,26 +188,27 @@ def resolve_roles(
     _refuse_unknown_elements(stated, elements, file)
     channels = {role: _require_column(role, spec, columns, file) for role, spec in stated.items()}
     free = [one for one in columns if not any(spec.matches(one) for spec in stated.values())]
-    warnings: list[str] = []
+    findings: list[Finding] = []
     for role, candidates in infer_candidates(free, elements).items():
         if role in channels:
             continue
         if len(candidates) == 1:
             channels[role] = make_spec(candidates[0], columns)
-            warnings += _describe_other_senders(candidates[0], columns)
+            findings += _find_other_senders(candidates[0], columns)
             continue
-        what = f"{role!r} may be any of the columns {', '.join(map(str, candidates))}"
+        named = ", ".join(map(str, candidates))
         if role in needed or role in MEASURED or get_pressure_element(role) is not None:
+            what = f"{role!r} may be any of the columns {named}"
             raise MappingError(what, _suggest_choice(role, candidates), Where(file=file))
-        warnings.append(f"{what}; none is used, name one in a channel mapping")
+        findings.append(report(Code.COLUMN_AMBIGUOUS, role=role, columns=named))
     _refuse_double_use(channels, stated, file)
     _refuse_absent(needed, channels, columns, file)
     order = [*ROLES, *(make_pressure_role(element) for element in elements)]
     without = [element for element in elements if make_pressure_role(element) not in channels]
     if without:
-        warnings.append(f"no pressure of {', '.join(without)}: nothing that needs it can be told")
+        findings.append(report(Code.NO_PRESSURE, elements=", ".join(without)))
     return Mapped(
-        {role: channels[role] for role in order if role in channels}, warnings=tuple(warnings)
+        {role: channels[role] for role in order if role in channels}, findings=tuple(findings)
     )
 
 
@@ -223,12 +225,13 @@ def _suggest_choice(role: str, candidates: Sequence[Column]) -> str:
     )
 
 
-def _describe_other_senders(chosen: Column, columns: Sequence[Column]) -> list[str]:
-    """Return a warning for other senders of the same signal."""
+def _find_other_senders(chosen: Column, columns: Sequence[Column]) -> list[Finding]:
+    """Return a finding on other senders of the same signal."""
     others = [one for one in columns if one.aside and not one.silent and one.name == chosen.name]
     if not others:
         return []
-    return [f"{chosen} is used; left aside: {', '.join(map(str, others))}"]
+    unused = ", ".join(map(str, others))
+    return [report(Code.OTHER_SENDERS, used=str(chosen), unused=unused)]
 
 
 def make_spec(column: Column, columns: Sequence[Column]) -> ChannelSpec:

@@ -97,6 +97,11 @@ class Channel:
         """Median sample interval [s]."""
         return float(np.median(np.diff(self.time)))
 
+    @property
+    def place(self) -> Where:
+        """Place of a finding on the whole channel."""
+        return Where(channel=self.source_name)
+
     @cached_property
     def updates(self) -> Channel:
         """The channel reduced to the instants at which its value was updated.

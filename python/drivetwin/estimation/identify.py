@@ -4,19 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.artifacts import StageResults
-from drivetwin.estimation.data.segments import MomentumSettings
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import DesignData, PreparedLog, ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.pipeline import estimate_likelihood, estimate_without_linear
-from drivetwin.estimation.linear.friction_points import FrictionSettings
 from drivetwin.estimation.linear.multi_shift import add_tolerances, estimate_integral
 from drivetwin.estimation.paper.pipeline import (
     PaperShift,
@@ -28,6 +26,7 @@ from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.estimation.result.verdict import apply_errors
+from drivetwin.estimation.settings import collect_settings
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.shifts.coverage import AFTER, BEFORE
@@ -221,13 +220,7 @@ def _compute_validity(
 
 def _collect_settings(design: DesignData, method: Method) -> dict[str, Any]:
     ranges = {"J_prime_range": design.J_prime_range, "J_vehicle_range": design.J_vehicle_range}
-    if method is Method.PAPER:
-        return ranges
-    return {
-        "momentum": asdict(MomentumSettings()),
-        "friction": asdict(FrictionSettings()),
-        **ranges,
-    }
+    return collect_settings(method) | ranges
 
 
 def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet) -> tuple[str, ...]:

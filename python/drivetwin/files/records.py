@@ -183,22 +183,13 @@ class NumberRecord(Record):
     half_width: OptionalFloat = None
 
 
-class PlaceRecord(Record):
-    """Place of a finding; `time` in s on the log's clock."""
-
-    file: str | None = None
-    channel: str | None = None
-    time: OptionalFloat = None
-    key: str | None = None
-
-
 class FindingRecord(Record):
     """A finding: its `text` follows from code, subject, place, numbers and names."""
 
     code: Code
     severity: Severity
     subject: str
-    place: PlaceRecord
+    place: Where
     numbers: dict[str, NumberRecord]
     names: dict[str, str]
     remedy: str
@@ -210,8 +201,7 @@ class FindingRecord(Record):
             key: Number(math.nan if one.value is None else one.value, one.unit, one.half_width)
             for key, one in self.numbers.items()
         }
-        place = Where(**self.place.model_dump())
-        return Finding(self.code, self.subject, place, numbers, self.names)
+        return Finding(self.code, self.subject, self.place, numbers, self.names)
 
 
 def dump_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:

@@ -16,7 +16,7 @@ from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, get_quantity
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.channels.units import find_unit, list_first_spellings, resolve_channel_unit
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, UnitError, Where
-from drivetwin.findings import Code, report
+from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.quality.channel_checks import Checked, check_channel
 from drivetwin.logs.quality.consistency_checks import (
@@ -80,7 +80,8 @@ def read_recording(
     specs = {**({} if card is None else card.channels), **stated.channels}
     mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path))
     _refuse_unitless(recording, mapped.channels, specs, str(path))
-    warnings = [*recording.warnings, *mapped.warnings]
+    findings = [report(Code.RECORDING, text=text) for text in recording.warnings]
+    findings += mapped.findings
     for count, (role, spec) in enumerate(mapped.channels.items()):
         notify_progress(count / len(mapped.channels))
         try:
@@ -89,24 +90,24 @@ def read_recording(
         except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
             if role in specs or get_quantity(role) not in AUXILIARY:
                 raise
-            warnings.append(f"channel {spec.source!r}: {fault.what}; left out")
+            place = Where(channel=spec.source)
+            findings.append(report(Code.CHANNEL_LEFT_OUT, "", place, why=fault.what))
             continue
         channels[role] = checked.channel
-        warnings += checked.warnings
+        findings += checked.findings
     check_common_span(channels, str(path))
     if card is not None:
         check_gearing(channels, card, str(path))
     check_torque_signs(channels, str(path))
-    warnings += check_coverage(channels)
+    findings += check_coverage(channels)
     if card is not None:
-        warnings += [*check_torque_balance(channels, card), *check_final_drive(channels, card)]
-        warnings += check_speed_clocks(channels, card)
-    warnings += check_torque_delays(channels)
+        findings += [*check_torque_balance(channels, card), *check_final_drive(channels, card)]
+        findings += check_speed_clocks(channels, card)
+    findings += check_torque_delays(channels)
     if not stated.options.time.simultaneous:
         channels, late = mark_late_samples(channels)
-        warnings += late
-    findings = tuple(report(Code.RECORDING, text=text) for text in dict.fromkeys(warnings))
-    return ShiftLog(channels, str(path), _compute_digest(path), findings)
+        findings += late
+    return ShiftLog(channels, str(path), _compute_digest(path), tuple(dict.fromkeys(findings)))
 
 
 def _refuse_unitless(
@@ -182,16 +183,18 @@ def _convert_channel(role: str, spec: ChannelSpec, source: RawChannel, file: str
 
 
 def _make_checked_channel(role: str, spec: ChannelSpec, raw: RawChannel, file: str) -> Checked:
-    """Return the checked channel of a role, and its warnings."""
-    notes = [f"channel {raw.name!r}: {note}" for note in raw.notes]
+    """Return the checked channel of a role, and its findings."""
+    place = Where(channel=raw.name)
+    notes = [report(Code.RECORDING, "", place, text=note) for note in raw.notes]
     found = check_channel(_convert_channel(role, spec, raw, file), file)
     held = find_raster(found.channel) is not None
-    warnings = (*notes, *_describe_unit_override(spec, raw), *found.warnings)
-    return Checked(replace(found.channel, held=held), warnings)
+    findings = (*notes, *_check_unit_override(spec, raw), *found.findings)
+    return Checked(replace(found.channel, held=held), findings)
 
 
-def _describe_unit_override(spec: ChannelSpec, raw: RawChannel) -> list[str]:
-    """A warning where the mapping asserts another unit than the file states."""
+def _check_unit_override(spec: ChannelSpec, raw: RawChannel) -> list[Finding]:
+    """Return a finding if the mapping asserts another unit than the file states."""
     if spec.unit is None or raw.unit is None or find_unit(raw.unit) == find_unit(spec.unit):
         return []
-    return [f"channel {spec.source!r}: read in {spec.unit!r} as mapped, the file says {raw.unit!r}"]
+    place = Where(channel=spec.source)
+    return [report(Code.UNIT_OVERRIDDEN, "", place, mapped=spec.unit, stated=raw.unit)]

@@ -17,7 +17,7 @@ from drivetwin.estimation.data.prepare import (
     prepare_shift,
     prepare_signal,
 )
-from drivetwin.estimation.data.select_shifts import BESIDE, drop_unbalanced
+from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog, ShiftSignals
 from drivetwin.estimation.linear.multi_shift import apply_sensor_error
 from drivetwin.shifts.coverage import AFTER, BEFORE
@@ -76,8 +76,8 @@ def test_of_a_long_log_the_estimators_see_what_is_near_the_shift() -> None:
         signals.pressures["B2"],
     ]
     for signal in seen:
-        assert signal.time[0] == pytest.approx(95.0 - BESIDE, abs=0.011)
-        assert signal.time[-1] == pytest.approx(104.0 + BESIDE, abs=0.011)
+        assert signal.time[0] == pytest.approx(95.0 - SHIFT_SELECTION.kept_beside, abs=0.011)
+        assert signal.time[-1] == pytest.approx(104.0 + SHIFT_SELECTION.kept_beside, abs=0.011)
     assert signals.engine_torque.sigma == prepare_signal(log["engine_torque"]).sigma
     whole = signals_of(log, replace(one, before=(0.0, 100.0), after=(100.6, 200.0)))
     assert whole.engine_torque.time.size == log["engine_torque"].time.size

@@ -12,7 +12,7 @@ import pytest
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.estimation.data.load_stationarity import fit_constant_load
 from drivetwin.estimation.data.prepare import prepare_signal
-from drivetwin.estimation.data.select_shifts import MAX_SHIFTS, select_shifts
+from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
@@ -121,17 +121,17 @@ def test_a_shift_that_tells_nothing_of_its_load_is_left_out() -> None:
 
 
 def test_no_more_shifts_than_tell_something_new() -> None:
-    usual = [shift(50.0 + 5.0 * k) for k in range(MAX_SHIFTS + 5)]
+    usual = [shift(50.0 + 5.0 * k) for k in range(SHIFT_SELECTION.max_shifts + 5)]
     rare = replace(shift(150.0), kind=ShiftKind.POWER_OFF_UP)
     kept, refused = choose(channels(), (*usual, rare))
-    assert len(kept) == MAX_SHIFTS
+    assert len(kept) == SHIFT_SELECTION.max_shifts
     assert rare in kept
     assert list(kept) == sorted(kept, key=lambda one: one.lockup_time)
-    assert len(refused) == len(usual) + 1 - MAX_SHIFTS
+    assert len(refused) == len(usual) + 1 - SHIFT_SELECTION.max_shifts
     assert all("not needed" in one.reason for one in refused)
 
 
 def test_without_an_output_torque_the_first_of_each_kind_are_taken() -> None:
-    usual = tuple(shift(50.0 + 5.0 * k) for k in range(MAX_SHIFTS + 1))
+    usual = tuple(shift(50.0 + 5.0 * k) for k in range(SHIFT_SELECTION.max_shifts + 1))
     kept, _ = choose(None, usual)
-    assert kept == usual[:MAX_SHIFTS]
+    assert kept == usual[: SHIFT_SELECTION.max_shifts]

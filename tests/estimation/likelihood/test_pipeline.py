@@ -10,7 +10,7 @@ import pytest
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData
-from drivetwin.estimation.likelihood.pipeline import DISAGREE, estimate_likelihood
+from drivetwin.estimation.likelihood.pipeline import LINEAR_START, estimate_likelihood
 from drivetwin.estimation.linear.estimates import assess_shifts
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
 from drivetwin.findings import Code
@@ -36,7 +36,7 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
     assert linear_J.value is not None
     assert linear_J.std_noise is not None
     assert J.value is not None
-    assert abs(linear_J.value - J.value) > DISAGREE * linear_J.std_noise
+    assert abs(linear_J.value - J.value) > LINEAR_START.disagreement * linear_J.std_noise
     assert Code.METHODS_DIFFER not in [one.code for one in told.findings]
 
 

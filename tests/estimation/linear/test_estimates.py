@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
-from drivetwin.estimation.linear.estimates import MISFIT, assess_shifts
+from drivetwin.estimation.linear.estimates import INTEGRAL_VERDICT, assess_shifts
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
@@ -85,7 +85,10 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
     (shift,), signals = found.evidence.integral, found.evidence.signals
     driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
     before = getattr(shift, stage)
-    for chi2, verdict in ((0.9 * MISFIT, Verdict.IDENTIFIED), (1.1 * MISFIT, Verdict.WEAK)):
+    for chi2, verdict in (
+        (0.9 * INTEGRAL_VERDICT.misfit_power, Verdict.IDENTIFIED),
+        (1.1 * INTEGRAL_VERDICT.misfit_power, Verdict.WEAK),
+    ):
         after = replace(before, fit=replace(before.fit, chi2=chi2))
         told = assess_shifts([replace(shift, **{stage: after})], signals, [driveline], {}).estimates
         assert told[touched].verdict is verdict

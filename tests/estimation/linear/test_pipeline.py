@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.noise import estimate_white_noise
-from drivetwin.estimation.data.segments import MomentumSettings, find_off_going_release
+from drivetwin.estimation.data.segments import MOMENTUM, find_off_going_release
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
 from drivetwin.estimation.linear.friction_points import evaluate_fitted_stribeck
 from drivetwin.estimation.linear.momentum_balance import estimate_rounding_error
@@ -80,7 +80,7 @@ def test_an_off_going_element_of_unknown_or_no_fill_pressure_still_leaves_an_ine
 ) -> None:
     signals, driveline = constant.signals(), Truth().driveline()
     unknown = replace(driveline, offgoing=replace(driveline.offgoing, P0=P0))
-    settings = MomentumSettings()
+    settings = MOMENTUM
     known, free = (find_off_going_release(signals, one, settings) for one in (driveline, unknown))
     assert known < free < known + 0.05
     compare(identify_shift(signals, unknown, 12.0), Truth(), 5e-4, 5e-4)
@@ -93,7 +93,7 @@ def test_an_off_going_element_that_lingers_about_its_fill_pressure_is_never_free
     low = signals.pressures["B2"]
     held = replace(low, values=np.maximum(low.values, Truth().P0 + 3e3))
     lingering = replace(signals, pressures={**signals.pressures, "B2": held})
-    free = find_off_going_release(lingering, driveline, MomentumSettings())
+    free = find_off_going_release(lingering, driveline, MOMENTUM)
     assert free == pytest.approx(signals.shift.lockup_time, abs=2e-3)
 
 
@@ -171,7 +171,7 @@ def test_what_was_known_beforehand_is_told_with_the_values(stepped: Run, ring: b
     design = {"J_out": PriorValue(0.9, 0.09), "P0.B3": PriorValue(8e4, 5e3)}
     rounding = estimate_rounding_error(signals.engine_torque, signals.torque_resolution)
     torque = {
-        "te_delay": MomentumSettings().delay_prior,
+        "te_delay": MOMENTUM.delay_prior,
         "te_rounding": PriorValue(0.0, rounding),
     }
     assert found.priors == {**design, "drum.B2": drum, "drum.B3": drum, **torque}

@@ -19,7 +19,7 @@ from drivetwin.estimation.result.prior_conflict import (
     check_efficiency_limit,
     find_contradictions,
 )
-from drivetwin.estimation.result.prior_update import CONTRADICTS, remove_prior
+from drivetwin.estimation.result.prior_update import PRIOR, remove_prior
 from drivetwin.estimation.result.verdict import assess, from_prior
 from drivetwin.findings import Code, render
 from drivetwin.vehicle.spec import PriorValue
@@ -48,7 +48,7 @@ def _found(design: PriorValue, sensors: float = 0.0) -> tuple[Contradiction, ...
 
 
 @pytest.mark.parametrize("std", [0.02, 0.1, 0.3])
-@pytest.mark.parametrize(("apart", "told"), [(CONTRADICTS - 0.1, False), (7.0, True)])
+@pytest.mark.parametrize(("apart", "told"), [(PRIOR.contradiction - 0.1, False), (7.0, True)])
 def test_a_contradiction_is_the_distance_from_what_the_log_alone_tells(
     std: float, apart: float, told: bool
 ) -> None:

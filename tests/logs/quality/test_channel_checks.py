@@ -11,6 +11,7 @@ import pytest
 from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError
+from drivetwin.findings import render
 from drivetwin.logs.quality.channel_checks import check_channel
 
 TIME = np.round(np.arange(100) * 0.01, 2)
@@ -29,7 +30,7 @@ def test_a_sound_channel_passes_unchanged() -> None:
     sound = channel("input_speed", ramp(100.0, 150.0), "rad/s")
     checked = check_channel(sound, "log.csv")
     assert checked.channel is sound
-    assert checked.warnings == ()
+    assert checked.findings == ()
 
 
 def test_time_must_increase() -> None:
@@ -57,8 +58,8 @@ def test_single_samples_without_number_are_left_out_and_told() -> None:
     checked = check_channel(channel("input_speed", values), "log.csv")
     assert checked.channel.time.tolist() == np.delete(TIME, [10, 50, 51, 52]).tolist()
     assert np.isfinite(checked.channel.values).all()
-    assert checked.warnings == (
-        "channel 'X': 4 samples without a number left out, the first at 0.100 s",
+    assert render(checked.findings) == (
+        "channel 'X': 4 samples without a number left out, at 0.100 s, from 0.500 s to 0.520 s.",
     )
 
 
@@ -68,8 +69,9 @@ def test_runs_without_numbers_are_left_out_and_told_with_their_spans() -> None:
     values[60:66] = np.inf
     checked = check_channel(channel("input_speed", values), "log.csv")
     assert checked.channel.values.size == 84
-    assert checked.warnings == (
-        "channel 'X': no number from 0.200 s to 0.290 s, from 0.600 s to 0.650 s",
+    assert render(checked.findings) == (
+        "channel 'X': 16 samples without a number left out, "
+        "from 0.200 s to 0.290 s, from 0.600 s to 0.650 s.",
     )
 
 
@@ -155,7 +157,10 @@ def test_a_pressure_off_by_1e5_names_both_figures_in_bar() -> None:
     wrong = channel("pressure.B2", ramp(0.0, 14e5 * 1e5), "bar")
     with pytest.raises(PlausibilityError) as caught:
         check_channel(wrong, "log.csv")
-    assert caught.value.what == "largest pressure is 1.4e+06 bar, above 100 bar, with unit 'bar'"
+    assert (
+        caught.value.what
+        == "largest pressure is 1\u202f400\u202f000 bar, above 100.0 bar, with unit 'bar'"
+    )
 
 
 def test_a_negative_speed_asks_for_the_sign() -> None:
@@ -169,7 +174,7 @@ def test_a_negative_speed_asks_for_the_sign() -> None:
 def test_a_gap_of_the_file_is_told() -> None:
     time = np.concatenate((TIME[:40], TIME[60:]))
     checked = check_channel(channel("input_speed", ramp(100, 150)[:80], time=time), "log.csv")
-    assert checked.warnings == ("channel 'X': no samples from 0.390 s to 0.600 s",)
+    assert render(checked.findings) == ("channel 'X': No samples from 0.390 s to 0.600 s.",)
 
 
 def test_a_stamp_far_ahead_is_refused() -> None:
@@ -180,11 +185,11 @@ def test_a_stamp_far_ahead_is_refused() -> None:
 
 def test_an_engine_torque_at_its_limit_is_told() -> None:
     values = np.minimum(ramp(100.0, 900.0), 700.0)
-    (text,) = check_channel(channel("engine_torque", values), "log.csv").warnings
-    assert "at its largest number for 25 % of the log" in text
+    (text,) = render(check_channel(channel("engine_torque", values), "log.csv").findings)
+    assert "At its largest number, 700.0 Nm, for 25 % of the log" in text
     values = np.where(TIME < 0.6, -9999.0, ramp(100.0, 900.0))
-    (text,) = check_channel(channel("engine_torque", values), "log.csv").warnings
-    assert "at its largest number for 60 % of the log, -9999 N·m" in text
+    (text,) = render(check_channel(channel("engine_torque", values), "log.csv").findings)
+    assert "At its largest number, −9\u202f999 Nm, for 60 % of the log" in text
 
 
 def test_a_pedal_that_is_held_is_no_limit() -> None:
@@ -192,14 +197,14 @@ def test_a_pedal_that_is_held_is_no_limit() -> None:
     held = np.round(np.interp(TIME, [0.3, 0.5], [800.0, 900.0]))
     noisy = 5.0 * np.round(180.0 + np.random.default_rng(6).normal(0.0, 0.4, TIME.size))
     for values in (held, -held, noisy):
-        assert check_channel(channel("engine_torque", values), "log.csv").warnings == ()
+        assert check_channel(channel("engine_torque", values), "log.csv").findings == ()
     lost = np.where(TIME > 0.3, 8191.0, held)
-    (text,) = check_channel(channel("engine_torque", lost), "log.csv").warnings
-    assert "8191 N·m" in text
+    (text,) = render(check_channel(channel("engine_torque", lost), "log.csv").findings)
+    assert "8\u202f191 Nm" in text
 
 
 def test_suction_asks_for_the_sign() -> None:
-    with pytest.raises(PlausibilityError, match="goes down to -14 bar") as caught:
+    with pytest.raises(PlausibilityError, match=r"goes down to −14\.00 bar") as caught:
         check_channel(channel("pressure.B2", ramp(-14e5, 0.1e5), "bar"), "log.csv")
     assert 'channels.pressure.B2 = { source = "X", sign = -1 }' in caught.value.remedy
 
@@ -238,16 +243,16 @@ def test_an_electric_motor_turns_fast_and_changes_its_speed_fast() -> None:
 def test_a_switched_pressure_does_not_overflow() -> None:
     values = np.where(np.arange(TIME.size) < TIME.size // 2, 14e5, 0.0)
     values = values + 4e3 * np.random.default_rng(1).normal(size=TIME.size)
-    assert check_channel(channel("pressure.B2", values), "log.csv").warnings == ()
+    assert check_channel(channel("pressure.B2", values), "log.csv").findings == ()
     noise = 4e3 * np.random.default_rng(1).normal(size=TIME.size)
-    assert check_channel(channel("pressure.B2", noise), "log.csv").warnings == ()
+    assert check_channel(channel("pressure.B2", noise), "log.csv").findings == ()
 
 
 def test_a_saturated_pressure_is_told() -> None:
     true = 8e5 + 4e3 * np.random.default_rng(1).normal(size=TIME.size)
     true = true + 3e5 * np.sin(np.linspace(0.0, 26.0, TIME.size))
     checked = check_channel(channel("pressure.B2", np.minimum(true, 9.9e5)), "log.csv")
-    assert any("at one number" in text for text in checked.warnings)
+    assert any("at one number" in text for text in render(checked.findings))
     assert np.count_nonzero(checked.channel.values == 9.9e5) < 3
 
 
@@ -257,11 +262,13 @@ def test_a_channel_of_few_steps_is_told() -> None:
         800.0 + 600.0 * np.sin(np.linspace(0.0, 9.0, TIME.size)) + 5.0 * rng.normal(size=TIME.size)
     )
     checked = check_channel(channel("engine_torque", 100.0 * np.round(true / 100.0)), "log.csv")
-    assert any("in steps of 100 N·m, 7 % of its largest" in text for text in checked.warnings)
+    assert any(
+        "in steps of 100.0 Nm, 7 % of its largest" in text for text in render(checked.findings)
+    )
     fine = check_channel(channel("engine_torque", 12.5 * np.round(true / 12.5)), "log.csv")
-    assert fine.warnings == ()
+    assert fine.findings == ()
     switched = np.where(np.arange(TIME.size) < TIME.size // 2, 0.0, 9e5)
-    assert check_channel(channel("pressure.B2", switched), "log.csv").warnings == ()
+    assert check_channel(channel("pressure.B2", switched), "log.csv").findings == ()
 
 
 def test_steep_ramps_between_exact_levels_are_no_coarse_steps() -> None:
@@ -272,10 +279,10 @@ def test_steep_ramps_between_exact_levels_are_no_coarse_steps() -> None:
     jumps = np.abs(np.diff(torque))
     assert jumps[jumps > 0.0].min() > 0.03 * levels.max()
     checked = check_channel(channel("engine_torque", torque), "log.csv")
-    assert not any("in steps of" in text for text in checked.warnings)
+    assert not any("in steps of" in text for text in render(checked.findings))
 
 
-@pytest.mark.parametrize(("value", "words"), [(8191.0, "far beyond"), (0.0, "fell to zero")])
+@pytest.mark.parametrize(("value", "words"), [(8191.0, "Far beyond"), (0.0, "Fell to zero")])
 def test_all_samples_that_repeat_a_damaged_update_are_left_out(value: float, words: str) -> None:
     """Engine torque every 10 ms in a table of 1 ms."""
     time = np.round(np.arange(4000) * 0.001, 3)
@@ -284,8 +291,8 @@ def test_all_samples_that_repeat_a_damaged_update_are_left_out(value: float, wor
     torque = channel("engine_torque", np.repeat(updates, 10), "Nm", time)
     checked = check_channel(torque, "log.csv")
     assert checked.channel.time.tolist() == np.delete(time, np.s_[1500:1520]).tolist()
-    assert len(checked.warnings) == 1
-    assert words in checked.warnings[0]
+    assert len(render(checked.findings)) == 1
+    assert words in render(checked.findings)[0]
 
 
 @pytest.mark.parametrize("role", ["pressure.B2", "wheel_speed", "engine_torque"])
@@ -297,8 +304,8 @@ def test_numbers_that_stand_for_no_value_are_left_out(role: str, value: float) -
     put_in = (TIME > 0.395) & (TIME < 0.475)
     checked = check_channel(channel(role, unit * np.where(put_in, value, sound)), "log.csv")
     assert checked.channel.values.tolist() == (unit * sound[~put_in]).tolist()
-    assert checked.warnings[0].endswith(
-        "far beyond all other numbers from 0.400 s to 0.470 s, left out"
+    assert render(checked.findings)[0].endswith(
+        "Far beyond all other numbers from 0.400 s to 0.470 s, left out."
     )
 
 
@@ -309,5 +316,5 @@ def test_a_pulse_is_left_out_of_a_measured_torque_only() -> None:
     values[800:810] -= 700.0
     checked = check_channel(channel("output_torque", values, "Nm", time), "log.csv")
     assert checked.channel.time.tolist() == np.delete(time, np.s_[800:810]).tolist()
-    assert "jumped up or down and back from 0.800 s to 0.809 s" in checked.warnings[0]
-    assert check_channel(channel("engine_torque", values, "Nm", time), "log.csv").warnings == ()
+    assert "Jumped up or down and back from 0.800 s to 0.809 s" in render(checked.findings)[0]
+    assert check_channel(channel("engine_torque", values, "Nm", time), "log.csv").findings == ()

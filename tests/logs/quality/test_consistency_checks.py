@@ -64,9 +64,9 @@ def test_channels_that_start_late_or_end_early_are_told() -> None:
     late = channels["output_speed"]
     channels["output_speed"] = replace(late, time=late.time[10:], values=late.values[10:])
     channels["wheel_speed"] = replace(late, time=late.time[:40], values=late.values[:40])
-    assert check_coverage(channels) == [
-        f"channel 'n_output_speed': no samples from 0.000 s to {TIME[10]:.3f} s",
-        f"channel 'n_output_speed': no samples from {TIME[39]:.3f} s to 0.500 s",
+    assert list(render(check_coverage(channels))) == [
+        f"channel 'n_output_speed': No samples from 0.000 s to {TIME[10]:.3f} s.",
+        f"channel 'n_output_speed': No samples from {TIME[39]:.3f} s to 0.500 s.",
     ]
 
 
@@ -110,7 +110,7 @@ def test_a_torque_of_the_wrong_scale_is_told(tmp_path: Path, share: float, told:
     texts = check_torque_balance(powered(1.8, share), card(tmp_path))
     assert bool(texts) == told
     if told:
-        assert f"in gear 2 the output torque is {share:.2f} of ratio times" in texts[0]
+        assert f"In gear 2 the output torque is {share:.2f} of ratio times" in texts[0].text
 
 
 def test_overrun_and_little_torque_do_not_count_in_the_balance(tmp_path: Path) -> None:
@@ -150,8 +150,10 @@ def driven(wheel_over: float, noise: float = 0.02) -> dict[str, Channel]:
 
 def test_a_final_drive_that_is_not_the_cards_is_told(tmp_path: Path) -> None:
     vehicle = card(tmp_path)
-    (text,) = check_final_drive(driven(4.99), vehicle)
-    found = re.match(r"'output_speed' over 'wheel_speed' is ([\d.]+), .* final_drive = 5:", text)
+    (one,) = check_final_drive(driven(4.99), vehicle)
+    found = re.match(
+        r"'output_speed' over 'wheel_speed' is ([\d.]+), .* final_drive = 5\.", one.text
+    )
     assert found is not None
     assert float(found[1]) == pytest.approx(4.99, abs=0.001)
     assert check_final_drive(driven(5.0), vehicle) == []

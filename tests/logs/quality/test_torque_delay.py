@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.findings import render
 from drivetwin.logs.quality.torque_delay import check_torque_delays, estimate_torque_delay
 
 J_V, I_F, K_O = 6000.0, 5.0, 1.7e5
@@ -71,16 +72,16 @@ def test_a_shaft_between_torque_and_speed_is_no_delay() -> None:
 
 
 def test_a_late_torque_is_told_against_all_speeds() -> None:
-    (text,) = check_torque_delays(recorded(output_torque=0.02))
-    assert "'output_torque' is about" in text
-    assert "late against 'wheel_speed' and 'output_speed'" in text
-    assert "tyre slip looks the same" in text
+    (text,) = render(check_torque_delays(recorded(output_torque=0.02)))
+    assert "'output_torque': About" in text
+    assert "late relative to 'wheel_speed' and 'output_speed'" in text
+    assert "tyre slip has the same effect" in text
     assert "channels.output_torque.time_shift_s = -0.0" in text
 
 
 def test_a_late_wheel_speed_is_told_against_the_torque() -> None:
-    (text,) = check_torque_delays(recorded(wheel_speed=0.03))
-    assert re.search(r"'wheel_speed' is about (29|30|31) ms late against 'output_torque'", text)
+    (text,) = render(check_torque_delays(recorded(wheel_speed=0.03)))
+    assert re.search(r"'wheel_speed': About (29|30|31) ms late relative to 'output_torque'", text)
     assert "tyre slip" not in text
     assert re.search(r"channels\.wheel_speed\.time_shift_s = -0\.0(29|30|31)", text)
 
@@ -88,8 +89,8 @@ def test_a_late_wheel_speed_is_told_against_the_torque() -> None:
 def test_two_late_channels_are_told() -> None:
     late = check_torque_delays(recorded(output_torque=0.012, wheel_speed=0.012))
     assert len(late) == 1
-    assert "'output_speed' is about" in late[0]
-    assert "early against 'output_torque'" in late[0]
+    assert "'output_speed': About" in late[0].text
+    assert "early relative to 'output_torque'" in late[0].text
 
 
 def bus(channel: Channel, period: float) -> Channel:
@@ -109,8 +110,8 @@ def test_speeds_that_are_means_and_held_do_not_make_the_torque_early() -> None:
     assert check_torque_delays(held) == []
     late = recorded(output_torque=0.03)
     held = late | {role: bus(late[role], 0.01) for role in ("output_speed", "wheel_speed")}
-    (text,) = check_torque_delays(held)
-    assert re.search(r"'output_torque' is about 2[3-7] ms late", text)
+    (text,) = render(check_torque_delays(held))
+    assert re.search(r"'output_torque': About 2[3-7] ms late", text)
 
 
 def test_a_gap_is_not_bridged() -> None:

@@ -21,7 +21,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import notify_progress, scale_progress
 from drivetwin.estimation.analysis.experiments import BaseShift, ExperimentPlan, plan_experiment
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
-from drivetwin.estimation.data.segments import MomentumSettings
+from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
@@ -39,11 +39,7 @@ from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.suggestion import ExpectedPrecision, Experiment, ExperimentRanking
-from drivetwin.estimation.result.verdict import (
-    DELAY_IDENTIFIED,
-    assess,
-    is_sensor_limited,
-)
+from drivetwin.estimation.result.verdict import VERDICT, assess, is_sensor_limited
 from drivetwin.findings import Code, explain
 from drivetwin.parameters import get_parameter_spec
 
@@ -112,7 +108,7 @@ def _compute_relative_width(one: Estimate) -> float:
     identified."""
     if one.value is None or one.std_total is None:
         return 0.0
-    whole = DELAY_IDENTIFIED if get_parameter_spec(one.id).stem == AGE else abs(one.value)
+    whole = VERDICT.delay_identified if get_parameter_spec(one.id).stem == AGE else abs(one.value)
     return one.std_total / max(whole, 1e-300)
 
 
@@ -182,7 +178,7 @@ def _compute_covariance(
     information[:own, :own] = fit.normal.information
     if _get_delay_name(fit) not in fit.point.names:
         k = names.index(_get_delay_name(fit))
-        information[k, k] += MomentumSettings().delay_prior.std ** -2
+        information[k, k] += MOMENTUM.delay_prior.std**-2
     if gain is not None:
         information += repeats * _eliminate_start(gain, size)
     return invert_information(information)

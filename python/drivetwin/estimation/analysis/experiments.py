@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import MAX_DELAY_S, Output, ShiftRecord
+from drivetwin.estimation.likelihood.data.shift_record import RECORD, Output, ShiftRecord
 from drivetwin.estimation.likelihood.objective import ShiftTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.suggestion import FIRMER, SOFTER, TORQUE_LEVEL, Experiment
@@ -153,7 +153,7 @@ def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> ShiftR
     step = float(np.median(np.diff(record.time)))
     time = step * np.arange(int(length / step), dtype=np.float64)
     period = float(np.median(np.diff(record.engine_torque.time)))
-    stamps = np.arange(-2.0 * MAX_DELAY_S, length + 2.0 * MAX_DELAY_S, period)
+    stamps = np.arange(-2.0 * RECORD.max_delay, length + 2.0 * RECORD.max_delay, period)
     torque = Signal(stamps, np.interp(stamps, demand.time, demand.values))
     ends = np.array([0.0, length])
     closed = float(np.max(record.pressures[driveline.offgoing.name].values))

@@ -7,17 +7,31 @@ nearly all noise. Blocks in which the signal itself bends sharply stand out and 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 
 _THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)
 """Standard deviation of the third difference of unit white noise: sqrt(1 + 9 + 9 + 1)."""
-_CLIP = 3.0
-"""Deviates beyond so many sigma are corners of the signal, not noise."""
+
+
+@dataclass(frozen=True)
+class NoiseSettings:
+    """Settings of the estimate of white noise from third differences."""
+
+    clip: float = 3.0
+    """Deviates beyond this are corners of the signal, not noise [standard deviations]."""
+    passes: int = 10
+    """Passes of clipping [count]."""
+
+
+NOISE = NoiseSettings()
+
+
 _INNER_POWER = 0.97334
 """Variance of unit normal deviates cut at 3 sigma."""
-_PASSES = 10
 
 
 def estimate_white_noise(values: FloatArray, block: int = 25, spread: float = 3.0) -> float:
@@ -39,7 +53,7 @@ def estimate_white_noise(values: FloatArray, block: int = 25, spread: float = 3.
 def _compute_clipped_rms(squares: FloatArray) -> float:
     """Root mean of squares (n,) of normal deviates, those beyond `_CLIP` sigma left out."""
     level = float(np.mean(squares))
-    for _ in range(_PASSES):
-        inner = squares[squares <= _CLIP**2 * level]
+    for _ in range(NOISE.passes):
+        inner = squares[squares <= NOISE.clip**2 * level]
         level = float(np.mean(inner)) / _INNER_POWER
     return float(np.sqrt(level))

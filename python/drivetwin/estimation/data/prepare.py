@@ -18,7 +18,7 @@ from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError, NoShiftError, Where
 from drivetwin.estimation.data.noise import estimate_white_noise
-from drivetwin.estimation.data.select_shifts import BESIDE, select_shifts
+from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
 from drivetwin.estimation.data.shift_data import (
     DesignData,
     KnownDriveline,
@@ -224,7 +224,16 @@ def _prepare_shift(
     if referred is not log:
         whole = replace(whole, torque_of_speeds=_build_speed_torque(log, card, whole, sampler))
         driveline = replace(driveline, known={**driveline.known, "te_delay": NO_AGE})
-    return ShiftData(_cut(whole, (shift.before[0] - BESIDE, shift.after[1] + BESIDE)), driveline)
+    return ShiftData(
+        _cut(
+            whole,
+            (
+                shift.before[0] - SHIFT_SELECTION.kept_beside,
+                shift.after[1] + SHIFT_SELECTION.kept_beside,
+            ),
+        ),
+        driveline,
+    )
 
 
 def _cut(whole: ShiftSignals, span: tuple[float, float]) -> ShiftSignals:

@@ -38,6 +38,9 @@ class MomentumSettings:
         return self.margin + 3.0 * shift.sigma.get(boundary, 0.0)
 
 
+MOMENTUM = MomentumSettings()
+
+
 @dataclass(frozen=True, eq=False)
 class Segment:
     """Part of the log in which one momentum equation holds.
@@ -52,20 +55,21 @@ class Segment:
     windows: Windows
 
 
-SMOOTH = 5
-"""Samples over which a pressure is averaged before it is held against a limit."""
+@dataclass(frozen=True)
+class SegmentSettings:
+    """Settings of the segments of a shift in which one momentum equation holds."""
+
+    smooth: int = 5
+    """Samples over which a pressure is averaged before it is compared with a limit [count]."""
+    vented: float = 0.5
+    """Pressure over P0 below which an element counts as empty after lock-up [ratio]."""
+    min_span: float = 0.05
+    """Shortest segment [s]; shorter ones contain no informative window."""
+    min_beside_gap: float = 0.25
+    """Shortest engaged gear beside a gap [s]: a delayed torque leaves no window there."""
 
 
-VENTED = 0.5
-"""Share of P0 below which a pressure that is left after lock-up means an empty element."""
-
-
-LEAST_SPAN = 0.05
-"""Least duration [s] of a segment; shorter ones contain no informative window."""
-
-
-LEAST_BESIDE = 0.25
-"""A gear held for less [s] beside a gap has windows that a torque as late as it may be leaves."""
+SEGMENTS = SegmentSettings()
 
 
 def find_off_going_release(
@@ -83,9 +87,9 @@ def find_off_going_release(
     pressure = signals.pressures[element.name]
     limit = element.P0.value - 2.0 * element.P0.std
     rest, margin = _estimate_vented_pressure(pressure, shift)
-    if limit < rest + margin and rest < max(VENTED * element.P0.value, margin):
+    if limit < rest + margin and rest < max(SEGMENTS.vented * element.P0.value, margin):
         limit = rest + margin
-    smooth = compute_moving_mean(pressure.values, SMOOTH)
+    smooth = compute_moving_mean(pressure.values, SEGMENTS.smooth)
     inside = (pressure.time >= start) & (pressure.time < shift.lockup_time)
     held = pressure.time[inside & (smooth >= limit)]
     return float(held[-1]) if held.size else start
@@ -98,7 +102,7 @@ def _estimate_vented_pressure(pressure: MeasuredSignal, shift: Shift) -> tuple[f
     """
     spans = (np.linspace(*span, 100) for span in (shift.before, shift.after))
     before, rest = (float(np.median(pressure.interpolate_at_times(time))) for time in spans)
-    return rest, 5.0 * pressure.sigma / float(np.sqrt(SMOOTH)) + 0.01 * abs(before - rest)
+    return rest, 5.0 * pressure.sigma / float(np.sqrt(SEGMENTS.smooth)) + 0.01 * abs(before - rest)
 
 
 def _select_driving_windows(torque: MeasuredSignal, windows: Windows) -> Windows:
@@ -135,7 +139,7 @@ def find_segments(
     for name, span, tied in spans:
         ratio = driveline.i_before if name == "before" else driveline.i_after
         for part in split_at_gaps(span, signals.output_gaps):
-            if tied and part != span and part[1] - part[0] < LEAST_BESIDE:
+            if tied and part != span and part[1] - part[0] < SEGMENTS.min_beside_gap:
                 continue
             windows = _build_span_windows(part, settings)
             if driveline.loss_law == "dissipative" and windows.count:
@@ -158,9 +162,9 @@ def find_segments(
 
 
 def _build_span_windows(span: Span, settings: MomentumSettings) -> Windows:
-    """Windows over a span, narrower ones where it is short; none below LEAST_SPAN."""
+    """Windows over a span, narrower ones where it is short; none below `min_span`."""
     length = span[1] - span[0]
-    if length < LEAST_SPAN:
+    if length < SEGMENTS.min_span:
         return build_windows(span, np.inf, settings.step)
     short = length < 2.0 * settings.width
     width = settings.share * length if short else settings.width

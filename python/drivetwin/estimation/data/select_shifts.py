@@ -3,34 +3,41 @@
 
 On a road the driver brakes and the slope changes, and no channel records either. A shift with a
 varying load biases the fit of all others, so it is dropped if enough other shifts remain. Beyond
-MOST shifts the sensor tolerances dominate the intervals, while time and memory of a fit still
+`max_shifts` the sensor tolerances dominate the intervals, while time and memory of a fit still
 grow. For each gear change, the shifts with the smallest load residual are therefore used first.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.progress import notify_progress
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.load_stationarity import estimate_common_vehicle, fit_constant_load
-from drivetwin.estimation.data.segments import MomentumSettings, find_segments
+from drivetwin.estimation.data.segments import MOMENTUM, find_segments
 from drivetwin.estimation.data.shift_data import MeasuredSignal, PreparedLog
 from drivetwin.shifts.shift import RejectedShift, Shift
 
-BESIDE = 10.0
-"""Time of a log that is kept before and after the engaged gears of a shift [s]: smoothing and ages
-of channels reach no further."""
-MAX_SHIFTS = 12
-"""Most shifts of one log in one fit."""
-MAX_LOAD_MISFIT = 5.0
-"""Noise power left by eq. 11 up to which a load counts as constant, over that of the best shift:
-braked ones and those over a change of grade leave 30 to 10000 times as much, others 0.7 to 1.5
-times. That of the best is 1, or what a delay of the sensors makes of it, which is the same in all.
-"""
+
+@dataclass(frozen=True)
+class ShiftSelectionSettings:
+    """Settings of the selection of shifts that are fitted."""
+
+    kept_beside: float = 10.0
+    """Time of a log kept before and after the engaged gears [s]; smoothing and delays reach no
+    further."""
+    max_shifts: int = 12
+    """Most shifts of one log in one fit [count]."""
+    max_load_misfit: float = 5.0
+    """Noise power left by eq. 11, over that of the best shift, up to which a load counts as
+    constant [ratio]: braked shifts and changes of grade leave 30 to 10000, others 0.7 to 1.5. The
+    best leaves 1, or the effect of a sensor delay, which is the same in all."""
+
+
+SHIFT_SELECTION = ShiftSelectionSettings()
 
 
 def drop_unbalanced(log: PreparedLog) -> PreparedLog:
@@ -41,7 +48,7 @@ def drop_unbalanced(log: PreparedLog) -> PreparedLog:
     kept, rejected = [], []
     for one in log.shifts:
         try:
-            find_segments(one.signals, one.driveline, MomentumSettings())
+            find_segments(one.signals, one.driveline, MOMENTUM)
         except IdentificationError as fault:
             shift = one.signals.shift
             span = (shift.before[1], shift.lockup_time)
@@ -66,7 +73,7 @@ def select_shifts(
     left = (
         [0.0] * len(shifts) if channels is None else _compute_load_misfits(*channels, i_f, shifts)
     )
-    most = MAX_LOAD_MISFIT * max(1.0, min(left))
+    most = SHIFT_SELECTION.max_load_misfit * max(1.0, min(left))
     steady = [k for k, power in enumerate(left) if power <= most]
     taken = sorted(_rank_steady_shifts(shifts, left, steady))
     refused = [
@@ -80,9 +87,8 @@ def select_shifts(
 def _describe_rejection(left: float, steady: bool) -> str:
     if steady:
         return (
-            f"not needed: {MAX_SHIFTS} shifts of the log are fitted, of every change of "
-            f"gears those "
-            "first whose load is the most constant; hold it out to see it predicted"
+            f"not needed: {SHIFT_SELECTION.max_shifts} shifts of the log are fitted, for each gear "
+            "change those with the steadiest load first; hold it out to see it predicted"
         )
     if not np.isfinite(left):
         return "the gears held beside it tell nothing of its load; other shifts of the log do"
@@ -100,7 +106,10 @@ def _compute_load_misfits(
     The vehicle is the same in all. Infinite if a shift has no information on its load.
     """
     spans = [(one.before[0], one.after[1]) for one in shifts]
-    near = [(start - BESIDE, end + BESIDE) for start, end in spans]
+    near = [
+        (start - SHIFT_SELECTION.kept_beside, end + SHIFT_SELECTION.kept_beside)
+        for start, end in spans
+    ]
     seen = [(torque.select_span(span), wheel.select_span(span)) for span in near]
     alone = []
     for k, (span, (T_o, w)) in enumerate(zip(spans, seen, strict=True)):
@@ -120,10 +129,10 @@ def _compute_load_misfits(
 def _rank_steady_shifts(
     shifts: Sequence[Shift], left: Sequence[float], steady: Sequence[int]
 ) -> list[int]:
-    """At most MOST of `steady`: the best of every change of gears, then the second best, ..."""
+    """Take at most `max_shifts` of `steady`: the best of each gear change, then the second, ..."""
     kinds: dict[tuple[str, str, str], list[int]] = {}
     for k in sorted(steady, key=lambda k: left[k]):
         one = shifts[k]
         kinds.setdefault((one.start_gear, one.end_gear, one.kind), []).append(k)
     ranked = [(place, left[k], k) for same in kinds.values() for place, k in enumerate(same)]
-    return [k for _, _, k in sorted(ranked)[:MAX_SHIFTS]]
+    return [k for _, _, k in sorted(ranked)[: SHIFT_SELECTION.max_shifts]]

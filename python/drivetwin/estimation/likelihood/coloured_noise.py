@@ -9,6 +9,7 @@ driveline it is, and that is what moves parameters.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,13 +18,20 @@ from drivetwin.estimation.likelihood.data.shift_record import Output
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.optimize.objective import NormalEquations
 
-BLOCK = 0.02
-"""Length of a block [s]: a quarter of a period of a driveline oscillation."""
-PROBES = 8
-"""Probes of a weighting, which is told to a few per cent by so many."""
-SURE = 5.0
-"""Power of block means above that of white noise, in standard deviations of what white noise
-shows, from which it is no chance."""
+
+@dataclass(frozen=True)
+class ColouredNoiseSettings:
+    """Settings of the test for coloured residuals."""
+
+    block: float = 0.02
+    """Length of a block [s]: a quarter of a period of a driveline oscillation."""
+    probes: int = 8
+    """Probes of a weighting [count]; so many determine it to a few per cent."""
+    significant: float = 5.0
+    """Excess power of block means over white noise that is significant [standard deviations]."""
+
+
+COLOURED_NOISE = ColouredNoiseSettings()
 
 
 def split_whitened(
@@ -51,7 +59,7 @@ def compute_block_means(time: FloatArray, white: FloatArray) -> tuple[FloatArray
 
 def _block(time: FloatArray) -> int:
     """Samples in a block."""
-    return max(2, round(BLOCK / float(np.median(np.diff(time)))))
+    return max(2, round(COLOURED_NOISE.block / float(np.median(np.diff(time)))))
 
 
 def compute_long_run_excess(
@@ -86,7 +94,7 @@ def compute_slow_power(part: ShiftTerm, out: Output, rows: slice, white: FloatAr
         return 1.0
     power = float(np.mean(means**2))
     usual, own = _by_probes(part, rows, _block(part.record.time[out.place]))
-    if power < usual * (1.0 + SURE * np.sqrt(2.0 / means.size)):
+    if power < usual * (1.0 + COLOURED_NOISE.significant * np.sqrt(2.0 / means.size)):
         return 1.0
     return 1.0 + (power - usual) / own
 
@@ -96,10 +104,10 @@ def _by_probes(part: ShiftTerm, rows: slice, size: int) -> tuple[float, float]:
     `rows`, and how much of it is this sensor's."""
     count = (rows.stop - rows.start) // size
     held = slice(rows.start, rows.start + count * size)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(count, PROBES))
-    probes = np.zeros((part.record.size, PROBES))
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(count, COLOURED_NOISE.probes))
+    probes = np.zeros((part.record.size, COLOURED_NOISE.probes))
     probes[held] = np.repeat(signs, size, axis=0) / np.sqrt(size)
     sigma = part.record.sigma[:, None]
     left = (probes - part.weighting.estimate_input_part(sigma * probes) / sigma)[held]
-    means = left.reshape(count, size, PROBES).sum(axis=1) / np.sqrt(size)
+    means = left.reshape(count, size, COLOURED_NOISE.probes).sum(axis=1) / np.sqrt(size)
     return float(np.mean(signs * means)), float(np.mean(means**2))

@@ -46,10 +46,18 @@ from drivetwin.simulation.dual_clutch import (
     simulate_sensitivities,
 )
 
-MAX_RESIDUAL_SIGMA = 1e9
-"""Residual in standard deviations from which a run counts as failed."""
-SQUARE_RTOL = 1e-6
-"""Tolerance for a negative sum of squares, relative to the squares in it."""
+
+@dataclass(frozen=True)
+class ObjectiveSettings:
+    """Numerical limits of the objective."""
+
+    max_residual: float = 1e9
+    """Residual from which a run counts as failed [standard deviations]."""
+    square_rtol: float = 1e-6
+    """Tolerance for a negative sum of squares, over the squares in it [ratio]."""
+
+
+OBJECTIVE = ObjectiveSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +100,7 @@ class ShiftTerm:
     def _is_complete(self, run: Trajectory) -> bool:
         """Return whether a run reached its end with residuals that can be squared."""
         worst = np.max(np.abs(self.compute_residual(run)) / self.record.sigma)
-        return run.status == "completed" and bool(worst < MAX_RESIDUAL_SIGMA)
+        return run.status == "completed" and bool(worst < OBJECTIVE.max_residual)
 
     def compute_residual(self, run: Trajectory) -> FloatArray:
         """Compute measured minus simulated (n,), the latter as for the measured inputs."""
@@ -369,4 +377,4 @@ def _is_semidefinite(data: FloatArray) -> bool:
     if np.any(squares < 0.0):
         return False
     length = np.sqrt(np.where(squares > 0.0, squares, 1.0))
-    return bool(np.linalg.eigvalsh(data / np.outer(length, length))[0] > -SQUARE_RTOL)
+    return bool(np.linalg.eigvalsh(data / np.outer(length, length))[0] > -OBJECTIVE.square_rtol)

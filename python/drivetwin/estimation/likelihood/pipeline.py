@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,11 +23,21 @@ from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.findings import Code, Finding, Number, report
 
-DISAGREE = 5.0
-"""Difference of the two methods in its standard deviations from which a warning is due."""
 
-OUTSIDE = 10.0
-"""Factor beside the design range of J3 from which the linear method's value is no start."""
+@dataclass(frozen=True)
+class LinearStartSettings:
+    """Limits of the use of the linear method as initial value and comparison."""
+
+    disagreement: float = 5.0
+    """Difference of the two methods from which a finding is due [standard deviations]."""
+    max_outside: float = 10.0
+    """Factor beyond the design range of J3 from which the linear value is no initial value
+    [ratio]."""
+
+
+LINEAR_START = LinearStartSettings()
+
+
 BEHIND_GEARBOX = ("J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Unknowns whose initial value depends on the linear method's J3."""
 OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
@@ -77,7 +87,7 @@ def _compute_guess(
     """
     found = estimate_initial_values(shifts, drivelines)
     low, high = design.J_vehicle_range
-    if low / OUTSIDE < found["J_vehicle"] < high * OUTSIDE:
+    if low / LINEAR_START.max_outside < found["J_vehicle"] < high * LINEAR_START.max_outside:
         return found
     own = _compute_own_guess(signals, drivelines, design)
     behind = {n: own[n] for n in own if n in BEHIND_GEARBOX or n.endswith(f".{LOAD_DEVIATION}")}
@@ -117,7 +127,7 @@ def _find_disagreements(told: EstimateSet, linear: EstimateSet) -> list[Finding]
         if other is None or other.value is None or estimate.value is None or name in explained:
             continue
         spread = float(np.hypot(estimate.std_noise or 0.0, other.std_noise or 0.0))
-        if spread > 0.0 and abs(estimate.value - other.value) > DISAGREE * spread:
+        if spread > 0.0 and abs(estimate.value - other.value) > LINEAR_START.disagreement * spread:
             a, b = (Number(value, estimate.unit) for value in (estimate.value, other.value))
             differ.append(report(Code.METHODS_DIFFER, name, likelihood=a, linear=b))
     return differ

@@ -15,10 +15,10 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import InputError
-from drivetwin.estimation.data.segments import MomentumSettings
+from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
-from drivetwin.estimation.likelihood.data.shift_record import MAX_DELAY_S, build_record
+from drivetwin.estimation.likelihood.data.shift_record import RECORD, build_record
 from drivetwin.estimation.likelihood.data.slipping_elements import find_all_slipping_elements
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.parametrization import (
@@ -32,8 +32,8 @@ from drivetwin.estimation.likelihood.parametrization import (
     map_log_names,
 )
 from drivetwin.estimation.linear.friction_points import LAW_PRIOR
-from drivetwin.estimation.linear.load_balance import AERO, AERO_SPREAD, compute_mean_speed
-from drivetwin.estimation.linear.momentum_balance import DELAY_STD_MAX, estimate_rounding_error
+from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE, compute_mean_speed
+from drivetwin.estimation.linear.momentum_balance import DELAY, estimate_rounding_error
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS
@@ -42,7 +42,7 @@ from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
-    "te_delay": (-0.5 * MAX_DELAY_S, MAX_DELAY_S),
+    "te_delay": (-0.5 * RECORD.max_delay, RECORD.max_delay),
     "J_e": (1e-3, SPECS["J_prime"].upper),
     "J_out": (1e-3, SPECS["J_out"].upper),
     "J_vehicle": (1.0, SPECS["J_vehicle"].upper),
@@ -159,7 +159,7 @@ def is_delay_identifiable(torque: MeasuredSignal) -> bool:
     if torque.sigma == 0.0:
         return bool(np.ptp(torque.values) > 0.0)
     rate = np.diff(smooth_adaptive(torque)) / np.diff(torque.time)
-    return bool(np.sum((rate / torque.sigma) ** 2) > DELAY_STD_MAX**-2)
+    return bool(np.sum((rate / torque.sigma) ** 2) > DELAY.max_std**-2)
 
 
 def split_spans(signals: Sequence[ShiftSignals]) -> tuple[Span, ...]:
@@ -223,7 +223,7 @@ def _collect_priors(
     guess: Mapping[str, float],
 ) -> dict[str, PriorValue]:
     """Collect the priors by unknown."""
-    found = {"te_delay": MomentumSettings().delay_prior}
+    found = {"te_delay": MOMENTUM.delay_prior}
     if drivelines[0].J_out is not None:
         known = drivelines[0].J_out
         found["J_out"] = known if signals[0].scale_known else drivelines[0].divide_by_eta(known)
@@ -235,7 +235,7 @@ def _collect_priors(
         if rounding > 0.0:
             found.setdefault(own.get(TE_OFFSET, TE_OFFSET), PriorValue(0.0, rounding))
     if AERO in guess:
-        found[AERO] = PriorValue(0.0, AERO_SPREAD)
+        found[AERO] = PriorValue(0.0, LOAD_BALANCE.aero_std)
     law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)}
     for name in _list_law_coefficients(signals, drivelines):
         found[name] = law[name.split(".")[-1]]

@@ -7,7 +7,7 @@ On a hilly road each shift has a load of its own, and T_v/i_f is their mean.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -19,16 +19,27 @@ from drivetwin.estimation.linear.pipeline import NUISANCES, IntegralShift
 LOAD = "Tv_over_if"
 """Id of the load; on a hilly road each shift has its own, with its number appended after `@`."""
 
-NUGGET = 1e-7
-"""Variance, as a share of a parameter's own, by which parameters may leave the equation that makes
-one of the others: of J′ in two gears and Jo′ one follows, so their covariance is singular."""
+
+@dataclass(frozen=True)
+class CombinationSettings:
+    """Settings of the combination of the estimates of several shifts."""
+
+    nugget: float = 1e-7
+    """Variance by which parameters may leave an equation between them, as a share of their own
+    [ratio]; without it their covariance is singular."""
+    min_agreement: float = 1e-3
+    """Probability of the scatter of the shifts below which an interval is widened to it
+    [probability]."""
+
+
+COMBINATION = CombinationSettings()
+
+
 SHAFT = ("k_o", "c_o", "f_d_", "zeta_")
 """Prefixes of parameters derived from ring-down and inertias by nonlinear equations. Each shift
 linearises them about its own values. The linearisations of two shifts differ to second order (the
 square of a relative standard deviation), so combined values may violate the equations by as much.
 """
-AGREE = 1e-3
-"""Probability of the shifts' scatter about a value below which its interval is widened to it."""
 
 
 def merge_shifts(
@@ -60,7 +71,7 @@ def _estimate_scatter(name: str, value: float, shifts: Sequence[IntegralShift]) 
         for k in (shift.ids.index(name),)
     ]
     square, freedom = float(np.sum(np.square(told))), len(told) - 1
-    if freedom < 1 or square < chi2.isf(AGREE, freedom):
+    if freedom < 1 or square < chi2.isf(COMBINATION.min_agreement, freedom):
         return 1.0
     return float(np.sqrt(square / freedom))
 
@@ -97,7 +108,7 @@ def _compute_loose_variances(shift: IntegralShift) -> FloatArray:
     """Variances (q,) by which its parameters may leave the equations between them, as shares."""
     bent = [name.startswith(SHAFT) for name in shift.ids]
     relative = np.diag(shift.covariance) / np.square(shift.values)
-    return np.where(bent, np.maximum(relative, NUGGET), NUGGET)
+    return np.where(bent, np.maximum(relative, COMBINATION.nugget), COMBINATION.nugget)
 
 
 def _join_shifts(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,15 +32,26 @@ from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.parameters import get_parameter_spec
 
 METHOD = "integral"
-CHI2_WARN = 1.6
-"""Residual power over stated noise above which a warning is due."""
-TREND_WARN = 4.0
-"""Trend of the load torque over speed, in standard deviations, above which a warning is due."""
-NAMED = 3
-"""Most shifts that one warning names."""
-MISFIT = 10.0
-"""Residual power over stated noise above which the model does not hold: an interval, however
-widened, counts what scatters and not what is missing."""
+
+
+@dataclass(frozen=True)
+class IntegralVerdictSettings:
+    """Limits of the verdicts and findings of the integral method."""
+
+    noisy_power: float = 1.6
+    """Residual power over noise power above which a finding is due [ratio]."""
+    max_trend: float = 4.0
+    """Trend of the load torque over speed above which a finding is due [standard deviations]."""
+    misfit_power: float = 10.0
+    """Residual power over noise power above which the model does not hold [ratio]: a wider
+    interval covers scatter, not a missing effect."""
+    max_named: int = 3
+    """Most shifts that one finding names [count]."""
+
+
+INTEGRAL_VERDICT = IntegralVerdictSettings()
+
+
 RESTS_ON = {
     "momentum balance": ("eta", "J_prime", "J_out", "te_delay", "k_o", "c_o", "zeta", "P0"),
     "load": ("J_vehicle", "Tv_over_if", "k_o", "c_o", "zeta"),
@@ -198,7 +210,7 @@ def _find_misfits(
     found: dict[str, str] = {}
     for shift, label in zip(shifts, collect_shift_labels(signals), strict=True):
         for name, chi2 in _compute_residual_powers(shift).items():
-            if chi2 > MISFIT:
+            if chi2 > INTEGRAL_VERDICT.misfit_power:
                 text = explain(Code.REGRESSION_MISFIT, label, regression=name, power=chi2)
                 concerned = [
                     i
@@ -235,9 +247,9 @@ def _collect_findings(
     refused: dict[str, list[str]] = {}
     for shift, label in zip(shifts, labels, strict=True):
         for name, chi2 in _compute_residual_powers(shift).items():
-            if chi2 > CHI2_WARN:
+            if chi2 > INTEGRAL_VERDICT.noisy_power:
                 noisy.setdefault(name, {})[label] = chi2
-        if abs(shift.load.speed_trend) > TREND_WARN:
+        if abs(shift.load.speed_trend) > INTEGRAL_VERDICT.max_trend:
             trends[label] = shift.load
         if "friction" in shift.refusals:
             refused.setdefault(shift.refusals["friction"], []).append(label)
@@ -260,7 +272,9 @@ def _collect_findings(
 
 def _describe_shifts(labels: Collection[str]) -> str:
     """The shifts by name, or how many they are."""
-    return ", ".join(labels) if len(labels) <= NAMED else f"{len(labels)} shifts"
+    return (
+        ", ".join(labels) if len(labels) <= INTEGRAL_VERDICT.max_named else f"{len(labels)} shifts"
+    )
 
 
 def _format_range(values: Iterable[float], style: str) -> str:

@@ -49,6 +49,9 @@ class FrictionSettings:
     """Pressure [Pa] above P0 from which an element counts as filled."""
 
 
+FRICTION = FrictionSettings()
+
+
 @dataclass(frozen=True, eq=False)
 class FrictionFit:
     """Stribeck law and P0 of one element; `fit.theta` is (mu_c, mu_s - mu_c, mu_v, ln v_s, P0, …).

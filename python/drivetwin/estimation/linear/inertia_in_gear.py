@@ -29,16 +29,26 @@ from drivetwin.estimation.regression.modulating_functions import (
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.shifts.coverage import split_at_gaps
 
-WIDTH = 1.6
-"""Width of a window [s]: a Hann window so long passes a millionth of a 4 Hz oscillation's power."""
-STEPS = 8
-"""Windows per width."""
-LEAST_FREEDOM = 6.0
-"""Fewest independent windows beyond the three unknowns."""
-IDENTIFIED, WEAK = 0.25, 0.6
-"""Half width of the 95 % interval over the value up to which it is identified, or weak."""
-BLOCKS = 8
-"""Parts of the record that are left out in turn."""
+
+@dataclass(frozen=True)
+class GearInertiaSettings:
+    """Settings of the inertia over η in an engaged gear."""
+
+    width: float = 1.6
+    """Width of a window [s]: such a Hann window passes a millionth of the power at 4 Hz."""
+    steps: int = 8
+    """Windows per width [count]."""
+    min_freedom: float = 6.0
+    """Fewest independent windows beyond the three unknowns [count]."""
+    identified: float = 0.25
+    """Half width of the 95 % interval over the value up to which it is identified [ratio]."""
+    weak: float = 0.6
+    """Half width of the 95 % interval over the value up to which it is weak [ratio]."""
+    blocks: int = 8
+    """Parts of the record that are left out in turn [count]."""
+
+
+GEAR_INERTIA = GearInertiaSettings()
 
 
 @dataclass(frozen=True)
@@ -78,10 +88,15 @@ def estimate_gear_inertia(
     the value and its verdict.
     """
     parts = split_at_gaps(span, (*torque.unrecorded, *speed.unrecorded))
-    windows = join_windows([build_windows(part, WIDTH, WIDTH / STEPS) for part in parts])
-    recorded = sum(high - low for low, high in parts if high - low >= WIDTH)
-    freedom = 2.0 * recorded / WIDTH - 3.0
-    if freedom < LEAST_FREEDOM:
+    windows = join_windows(
+        [
+            build_windows(part, GEAR_INERTIA.width, GEAR_INERTIA.width / GEAR_INERTIA.steps)
+            for part in parts
+        ]
+    )
+    recorded = sum(high - low for low, high in parts if high - low >= GEAR_INERTIA.width)
+    freedom = 2.0 * recorded / GEAR_INERTIA.width - 3.0
+    if freedom < GEAR_INERTIA.min_freedom:
         return _refuse_gear(
             gear, span, f"only {recorded:.1f} s of the gear are recorded without a gap"
         )
@@ -92,8 +107,8 @@ def estimate_gear_inertia(
     plain = np.linalg.lstsq(columns[:, :2], drive, rcond=None)[0]
     value = float(grown[0])
     spread = float(np.hypot(_estimate_jackknife_std(columns, drive), 0.5 * (plain[0] - value)))
-    half = float(student.ppf(0.975, BLOCKS - 1)) * spread
-    if value <= 0.0 or half > WEAK * value:
+    half = float(student.ppf(0.975, GEAR_INERTIA.blocks - 1)) * spread
+    if value <= 0.0 or half > GEAR_INERTIA.weak * value:
         return _refuse_gear(
             gear,
             span,
@@ -101,7 +116,7 @@ def estimate_gear_inertia(
             f"acceleration varies by "
             f"{format_with_unit(float(rate.std()), 'rad/s^2', digits=2)} only",
         )
-    verdict = Verdict.IDENTIFIED if half < IDENTIFIED * value else Verdict.WEAK
+    verdict = Verdict.IDENTIFIED if half < GEAR_INERTIA.identified * value else Verdict.WEAK
     left = drive - columns @ grown
     explained = 1.0 - float(left @ left) / float(np.sum((drive - drive.mean()) ** 2))
     return HeldGear(gear, span, verdict, value, half, float(grown[1]), explained)
@@ -126,13 +141,15 @@ def _compute_window_means(
 
 def _estimate_jackknife_std(columns: FloatArray, target: FloatArray) -> float:
     """Standard deviation of the first coefficient, by leaving out one of BLOCKS blocks in turn."""
-    blocks = np.array_split(np.arange(len(target)), BLOCKS)
+    blocks = np.array_split(np.arange(len(target)), GEAR_INERTIA.blocks)
     values = []
     for block in blocks:
         # Windows overlap: those beside the block hold part of it.
-        near = slice(max(block[0] - STEPS // 2, 0), block[-1] + 1 + STEPS // 2)
+        near = slice(
+            max(block[0] - GEAR_INERTIA.steps // 2, 0), block[-1] + 1 + GEAR_INERTIA.steps // 2
+        )
         keep = np.ones(len(target), dtype=np.bool_)
         keep[near] = False
         values.append(float(np.linalg.lstsq(columns[keep], target[keep], rcond=None)[0][0]))
     spread = np.array(values) - np.mean(values)
-    return float(np.sqrt((BLOCKS - 1) / BLOCKS * (spread @ spread)))
+    return float(np.sqrt((GEAR_INERTIA.blocks - 1) / GEAR_INERTIA.blocks * (spread @ spread)))

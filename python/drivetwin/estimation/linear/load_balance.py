@@ -28,17 +28,27 @@ from drivetwin.estimation.data.vehicle_balance import (
 from drivetwin.estimation.regression.errors_in_variables import Fit, Prior
 from drivetwin.findings import Code, Finding, Number, report
 
-ONE_LOAD = 0.05
-"""Probability under one load below which the shifts of a log have a load each. High: a load too
-many costs a little width, one too few puts what hills do into J3 and η."""
+
+@dataclass(frozen=True)
+class LoadSettings:
+    """Settings of the load and of its growth with speed."""
+
+    min_common_load: float = 0.05
+    """Probability of one load below which each shift has its own [probability]. High: a load too
+    many costs a little width, one too few moves J3 and η on hills."""
+    aero_std: float = 10.0
+    """Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
+    significant: float = 3.0
+    """Growing part of the load from which it is kept [standard deviations]."""
+    settling: float = 0.5
+    """Time after lock-up in which the output speed cannot replace the wheel speed [s]."""
+
+
+LOAD_BALANCE = LoadSettings()
+
+
 AERO = "aero"
 """The part of the load that grows with the square of the speed, at the wheel [N m s^2/rad^2]."""
-AERO_SPREAD = 10.0
-"""Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
-SIGNIFICANT = 3.0
-"""Size of the growing part of the load, in its standard deviations, from which it is kept."""
-SETTLING = 0.5
-"""Time after lock-up [s] in which the output speed cannot stand in for the wheel speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +85,7 @@ def is_common_load(differences: FloatArray, covariance: FloatArray) -> bool:
     scale = np.sqrt(np.diag(covariance))
     inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
     unit = differences / scale
-    return bool(unit @ inverse @ unit < chi2.isf(ONE_LOAD, differences.size))
+    return bool(unit @ inverse @ unit < chi2.isf(LOAD_BALANCE.min_common_load, differences.size))
 
 
 def report_different_loads(loads: Sequence[float]) -> list[Finding]:
@@ -91,7 +101,7 @@ def select_load_spans(signals: ShiftSignals) -> tuple[Span, ...]:
     shift = signals.shift
     if signals.wheel_speed is not None:
         return ((shift.before[0], shift.after[1]),)
-    return (shift.before, (shift.lockup_time + SETTLING, shift.after[1]))
+    return (shift.before, (shift.lockup_time + LOAD_BALANCE.settling, shift.after[1]))
 
 
 def find_growth_reference(signals: Sequence[ShiftSignals], i_f: float) -> float | None:
@@ -104,7 +114,7 @@ def find_growth_reference(signals: Sequence[ShiftSignals], i_f: float) -> float 
     fits = [estimate_momentum_load(s, i_f, select_load_spans(s), speed).fit for s in signals]
     growth = np.array([fit.theta[GROWTH] for fit in fits])
     weight = np.array([fit.std[GROWTH] ** -2 for fit in fits])
-    return speed if growth @ weight > SIGNIFICANT * np.sqrt(np.sum(weight)) else None
+    return speed if growth @ weight > LOAD_BALANCE.significant * np.sqrt(np.sum(weight)) else None
 
 
 def compute_mean_speed(signals: Sequence[ShiftSignals], i_f: float) -> float:
@@ -147,7 +157,7 @@ def estimate_momentum_load(
         load = np.full(windows.count, fit.theta[LOAD])
     else:
         grown = (balance.square - holds_at**2) / i_f
-        prior = Prior.from_independent(3, {GROWTH: (0.0, AERO_SPREAD)})
+        prior = Prior.from_independent(3, {GROWTH: (0.0, LOAD_BALANCE.aero_std)})
         fit = balance.solve_load(grown, np.append(start, 0.0), prior)
         load = fit.theta[LOAD] + fit.theta[GROWTH] * grown
     local = speed.interpolate_at_times(windows.centre) * ratio

@@ -41,13 +41,21 @@ from drivetwin.estimation.regression.modulating_functions import (
 )
 from drivetwin.vehicle.spec import PriorValue
 
-DELAY_STD_MAX = 0.005
-"""Standard error [s] above which the age of the engine torque is taken as not shown."""
-NO_ROUNDING = 1e-3
-"""Mean error of rounding over the noise of a sample that counts as none: a thousand samples leave
-thirty times as much in their mean."""
-DELAY_Q_MIN = 30.0
-"""Least rise of Q over the scanned ages for the minimum to mean anything."""
+
+@dataclass(frozen=True)
+class DelaySettings:
+    """Settings of the delay of the engine torque in the momentum balance."""
+
+    max_std: float = 0.005
+    """Standard error above which the delay counts as not determined [s]."""
+    min_rise: float = 30.0
+    """Smallest rise of Q over the scanned delays of a significant minimum [1]."""
+    max_rounding: float = 1e-3
+    """Mean rounding error over the noise of a sample that is negligible [ratio]: in the mean of a
+    thousand samples it is thirty times as large."""
+
+
+DELAY = DelaySettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +71,7 @@ class DelayScan:
 
     def can_estimate_delay(self, std: float) -> bool:
         """Return True if the engine torque varies enough to estimate its delay to `std` [s]."""
-        return std < DELAY_STD_MAX and float(np.ptp(self.q)) > DELAY_Q_MIN
+        return std < DELAY.max_std and float(np.ptp(self.q)) > DELAY.min_rise
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +101,6 @@ class MomentumFit:
     def get_value(self, name: str) -> float:
         """Estimate of one parameter."""
         return float(self.fit.theta[self.find_index(name)])
-
-    def get_std(self, name: str) -> float:
-        """Standard error of one parameter."""
-        return float(self.fit.std[self.find_index(name)])
 
 
 def list_momentum_names(driveline: KnownDriveline) -> tuple[str, ...]:
@@ -205,7 +209,7 @@ def estimate_rounding_error(torque: MeasuredSignal, step: float) -> float:
         return 0.0
     square = max(torque.sigma**2 - step**2 / 12.0, 0.0)
     left = float(step / np.pi * np.exp(-2.0 * np.pi**2 * square / step**2) / np.sqrt(2.0))
-    return left if left > NO_ROUNDING * torque.sigma else 0.0
+    return left if left > DELAY.max_rounding * torque.sigma else 0.0
 
 
 def _build_priors(

@@ -10,23 +10,19 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.segments import MomentumSettings, find_off_going_release
+from drivetwin.estimation.data.segments import MOMENTUM, find_off_going_release
 from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
-from drivetwin.estimation.linear.friction_points import (
-    FrictionFit,
-    FrictionSettings,
-    fit_momentum_friction,
-)
+from drivetwin.estimation.linear.friction_points import FRICTION, FrictionFit, fit_momentum_friction
 from drivetwin.estimation.linear.load_balance import (
     AERO,
-    AERO_SPREAD,
+    LOAD_BALANCE,
     LoadFit,
     estimate_momentum_load,
     select_load_spans,
 )
 from drivetwin.estimation.linear.momentum_balance import MomentumFit, estimate_momentum_inertia
 from drivetwin.estimation.linear.ringdown import (
-    START_AFTER_LOCKUP,
+    RING_DOWN,
     Drive,
     RingDown,
     compute_shaft_parameters,
@@ -83,7 +79,7 @@ def _fit_ring(
     J5 = load.J_vehicle / driveline.i_f**2
     gain = momentum.get_value("eta") * ratio * J5 / (J4 + J5)
     shift, measured, age = signals.shift, signals.engine_torque, momentum.get_value("te_delay")
-    after = min(START_AFTER_LOCKUP, MomentumSettings().compute_guard("lockup", shift))
+    after = min(RING_DOWN.latest_start, MOMENTUM.compute_guard("lockup", shift))
     acting = MeasuredSignal(measured.time - age, measured.values, measured.sigma)
     return fit_ringdown(
         signals.output_torque,
@@ -149,7 +145,7 @@ def identify_shift(
     inertia or load; without an oscillation, or with a too short inertia phase, only the parameters
     of that stage are missing.
     """
-    settings = MomentumSettings()
+    settings = MOMENTUM
     shift = signals.shift
     momentum = estimate_momentum_inertia(signals, driveline, settings, start_inertia)
     load = estimate_momentum_load(signals, driveline.i_f, select_load_spans(signals), load_at)
@@ -162,7 +158,7 @@ def identify_shift(
         refusals["shaft"] = error.what
     try:
         free = find_off_going_release(signals, driveline, settings)
-        friction = fit_momentum_friction(signals, driveline, momentum, free, FrictionSettings())
+        friction = fit_momentum_friction(signals, driveline, momentum, free, FRICTION)
     except IdentificationError as error:
         refusals["friction"] = error.what
     try:
@@ -184,7 +180,7 @@ def identify_shift(
         refusals["te_delay"] = "the engine torque moves too little for its age to show"
     priors = {name: one for name, one in momentum.priors.items() if name in ids}
     if AERO in ids:
-        priors[AERO] = PriorValue(0.0, AERO_SPREAD)
+        priors[AERO] = PriorValue(0.0, LOAD_BALANCE.aero_std)
     if friction is not None:
         ids = (*ids, f"P0.{friction.element}")
         priors[ids[-1]] = driveline.oncoming.P0

@@ -16,30 +16,40 @@ from scipy.optimize import least_squares
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.linear.ringdown import BAND, FASTEST
+from drivetwin.estimation.linear.ringdown import RING_DOWN
 from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.shift import Shift
 
-FIRST, LAST = 0.02, 0.42
-"""Starts of the windows after lock-up [s]: a later oscillation is not the shift's."""
-STEP = 0.04
-"""Distance of the starts [s]."""
-LENGTHS = (0.5, 0.6, 0.7, 0.8, 1.0)
-"""Lengths of the windows [s]."""
-TRIED = 150
-"""Frequencies whose power decides where a fit starts."""
-EXPLAINED = 0.93
-"""Least share of the variance about the trend that a decaying sine must explain."""
-FINEST = 5e-3
-"""Samples closer than this [s] are averaged first."""
-CYCLES = 2.5
-"""Fewest periods in a window."""
-SURE = 4.0
-"""Least decay rate in its standard deviations."""
-DAMPED = 0.3
-"""Greatest damping ratio: beyond it nothing oscillates."""
-AGREEING = 2
-"""Least number of windows with consistent results."""
+
+@dataclass(frozen=True)
+class ResonanceSettings:
+    """Settings of the search for the resonance of the driveline in a speed."""
+
+    first_start: float = 0.02
+    """First start of a window after lock-up [s]."""
+    last_start: float = 0.42
+    """Last start of a window after lock-up [s]; a later oscillation is not caused by the shift."""
+    step: float = 0.04
+    """Distance of the starts [s]."""
+    lengths: tuple[float, ...] = (0.5, 0.6, 0.7, 0.8, 1.0)
+    """Lengths of the windows [s]."""
+    frequencies: int = 150
+    """Frequencies whose power gives the initial value of a fit [count]."""
+    min_explained: float = 0.93
+    """Share of the variance about the trend that a decaying sine must explain [ratio]."""
+    min_step: float = 5e-3
+    """Samples closer than this are averaged first [s]."""
+    min_periods: float = 2.5
+    """Fewest periods in a window [count]."""
+    min_decay: float = 4.0
+    """Smallest significant decay rate [standard deviations]."""
+    max_damping: float = 0.3
+    """Largest damping ratio of an oscillation [1]."""
+    min_agreeing: int = 2
+    """Fewest windows with consistent results [count]."""
+
+
+RESONANCE = ResonanceSettings()
 
 
 @dataclass(frozen=True)
@@ -76,11 +86,11 @@ class _Decay:
     def clean(self) -> bool:
         periods = (self.span[1] - self.span[0]) * self.omega / (2.0 * np.pi)
         return (
-            self.explained > EXPLAINED
-            and periods >= CYCLES
-            and self.rate > SURE * self.rate_std
-            and self.zeta < DAMPED
-            and BAND[0] < self.omega / (2.0 * np.pi) < BAND[1]
+            self.explained > RESONANCE.min_explained
+            and periods >= RESONANCE.min_periods
+            and self.rate > RESONANCE.min_decay * self.rate_std
+            and self.zeta < RESONANCE.max_damping
+            and RING_DOWN.band[0] < self.omega / (2.0 * np.pi) < RING_DOWN.band[1]
         )
 
 
@@ -102,14 +112,16 @@ def fit_resonance(speed: MeasuredSignal, lockup: float, end: float) -> Resonance
     there is no clean decay.
     """
     found = []
-    for start in np.arange(lockup + FIRST, lockup + LAST, STEP):
-        for length in LENGTHS:
+    for start in np.arange(
+        lockup + RESONANCE.first_start, lockup + RESONANCE.last_start, RESONANCE.step
+    ):
+        for length in RESONANCE.lengths:
             span = (float(start), float(start + length))
             if span[1] <= end and split_at_gaps(span, speed.gaps) == (span,):
                 decay = _fit_window(speed.select_span(span))
                 if decay is not None and decay.clean:
                     found.append(decay)
-    if len({decay.span[0] for decay in found}) < AGREEING:
+    if len({decay.span[0] for decay in found}) < RESONANCE.min_agreeing:
         raise IdentificationError(
             "no clean decay after lock-up: what oscillates there is driven by engine or road",
             "record a shift with a firm lock-up on an even road, pedal held still",
@@ -145,8 +157,12 @@ def _fit_window(part: MeasuredSignal) -> _Decay | None:
         q, _ = np.linalg.qr(np.column_stack([*swing, trend]))
         return np.asarray(values - q @ (q.T @ values), dtype=float)
 
-    fastest = FASTEST * np.pi / float(np.median(np.diff(time)))
-    omega = np.linspace(2.0 * np.pi * BAND[0], min(2.0 * np.pi * BAND[1], fastest), TRIED)
+    fastest = RING_DOWN.max_nyquist_share * np.pi / float(np.median(np.diff(time)))
+    omega = np.linspace(
+        2.0 * np.pi * RING_DOWN.band[0],
+        min(2.0 * np.pi * RING_DOWN.band[1], fastest),
+        RESONANCE.frequencies,
+    )
     strongest = omega[np.abs(np.exp(1j * np.outer(omega, time)) @ rest).argmax()]
     best = least_squares(projected, (2.0, strongest), x_scale=(2.0, 5.0), method="lm")
     if abs(best.x[1]) > fastest:
@@ -169,7 +185,7 @@ def _reduce_samples(part: MeasuredSignal) -> tuple[FloatArray, FloatArray]:
     """Time from the first sample [s] and value, means over FINEST where sampling is finer."""
     if part.time.size < 2:
         return part.time, part.values
-    width = max(round(FINEST / float(np.median(np.diff(part.time)))), 1)
+    width = max(round(RESONANCE.min_step / float(np.median(np.diff(part.time)))), 1)
     usable = part.time.size // width * width
     time, values = (x[:usable].reshape(-1, width).mean(axis=1) for x in (part.time, part.values))
     return time - time[:1], values

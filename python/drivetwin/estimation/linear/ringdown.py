@@ -38,16 +38,34 @@ def compute_shaft_parameters(decay_rate: float, omega_d: float, J4: float, J5: f
     return np.array([J * (decay_rate**2 + omega_d**2), 2.0 * decay_rate * J])
 
 
-PER_PERIOD = 8
-"""Knots of an unknown torque in a period of the ring."""
+@dataclass(frozen=True)
+class RingDownSettings:
+    """Settings of the ring-down of the output shaft after lock-up."""
+
+    latest_start: float = 0.05
+    """Latest start of the fit after lock-up [s]; at 30 Hz most of the power is lost by then."""
+    min_length: float = 0.15
+    """Shortest fitted span [s]."""
+    max_length: float = 1.6
+    """Longest fitted span [s]: by then a driveline oscillation has decayed."""
+    min_samples: int = 20
+    """Fewest fitted samples [count]."""
+    band: tuple[float, float] = (2.0, 60.0)
+    """Range of the first torsional mode of a driveline [Hz]."""
+    max_nyquist_share: float = 0.8
+    """Highest estimated frequency over the Nyquist frequency [ratio]."""
+    chance: float = 1e-6
+    """Probability with which noise alone may pass for an oscillation [probability]. One that just
+    passes has a size and decay distorted by noise, hence the small value."""
+    knots_per_period: int = 8
+    """Knots of an unknown torque in a period of the oscillation [count]."""
+    max_knots: int = 200
+    """Most knots [count]: as many fill the longest span at 16 Hz; faster ones decay before."""
+    min_response: float = 1e-6
+    """Smallest response that counts, over the strongest [ratio]."""
 
 
-MOST_KNOTS = 200
-"""Most knots: as many fill the longest stretch at 16 Hz, and faster rings have died away before."""
-
-
-SEEN = 1e-6
-"""Least response, as a share of the strongest, that counts as one."""
+RING_DOWN = RingDownSettings()
 
 
 TINY = float(np.finfo(float).tiny)
@@ -76,7 +94,11 @@ class FitResidual:
 def place_knots(time: FloatArray, omega: float) -> FloatArray:
     """Knots (m,) [s] between which an unknown torque runs straight, for a ring of ω [rad/s]."""
     span = float(time[-1] - time[0])
-    step = max(2.0 * np.pi / omega / PER_PERIOD, span / MOST_KNOTS, span / (time.size - 1))
+    step = max(
+        2.0 * np.pi / omega / RING_DOWN.knots_per_period,
+        span / RING_DOWN.max_knots,
+        span / (time.size - 1),
+    )
     return np.linspace(time[0], time[-1], int(span / step + 1e-9) + 1)
 
 
@@ -96,12 +118,14 @@ def estimate_variances(left: FitResidual) -> tuple[float, FloatArray]:
     basis, strength, mixture = np.linalg.svd(
         left.response - q @ (q.T @ left.response), full_matrices=False
     )
-    kept = strength > SEEN * strength[0]
+    kept = strength > RING_DOWN.min_response * strength[0]
     basis, seen = basis[:, kept], (strength[:, None] * mixture)[kept]
     shown = basis.T @ left.residual
     rest = max(float(left.residual @ left.residual - shown @ shown), 0.0)
     freedom = left.residual.size - q.shape[1]
-    floor = max(left.sigma**2, SEEN * float(np.max(left.known)) * strength[0] ** 2, TINY)
+    floor = max(
+        left.sigma**2, RING_DOWN.min_response * float(np.max(left.known)) * strength[0] ** 2, TINY
+    )
     noisy = np.eye(shown.size) + (seen * (left.known / floor)) @ seen.T
     power, modes = eigh(seen @ seen.T, noisy)
     ratios = RATIOS / strength[0] ** 2
@@ -122,21 +146,6 @@ def estimate_slope_covariance(left: FitResidual, slopes: FloatArray) -> FloatArr
     return np.asarray(noise * inverse + (acting * torque) @ acting.T)
 
 
-START_AFTER_LOCKUP = 0.05
-"""Latest start of the fit after lock-up [s]; a ring at 30 Hz has lost most of its power by then."""
-SHORTEST = 0.15
-"""Shortest stretch fitted [s]."""
-FEWEST = 20
-"""Fewest samples fitted."""
-LONGEST = 1.6
-"""Longest stretch fitted [s]: by then a drivetrain oscillation has died away."""
-BAND = (2.0, 60.0)
-"""Frequencies [Hz] in which a driveline's first torsional mode is looked for."""
-FASTEST = 0.8
-"""Highest frequency estimated, as a share of the Nyquist frequency."""
-CHANCE = 1e-6
-"""Probability with which noise alone may pass for an oscillation. So small, for one that just
-passes owes much of its size to noise, and what noise and ring make together decays too slowly."""
 SURE = 5
 """Columns of a ring-down's basis without jitter: the two of the sine, three of the trend."""
 
@@ -226,12 +235,15 @@ def _refuse(what: str) -> IdentificationError:
 def _select_ring_samples(
     torque: MeasuredSignal, lockup: float, end: float, after: float
 ) -> MeasuredSignal:
-    span = (lockup + after, min(end, lockup + LONGEST))
+    span = (lockup + after, min(end, lockup + RING_DOWN.max_length))
     for whole in split_at_gaps(span, torque.gaps):
         part = torque.select_span(whole)
-        if part.time.size >= FEWEST and part.time[-1] - part.time[0] >= SHORTEST:
+        if (
+            part.time.size >= RING_DOWN.min_samples
+            and part.time[-1] - part.time[0] >= RING_DOWN.min_length
+        ):
             return part
-    raise _refuse(f"less than {SHORTEST:g} s of the new gear are left after lock-up")
+    raise _refuse(f"less than {RING_DOWN.min_length:g} s of the new gear are left after lock-up")
 
 
 def _build_quadratic(time: FloatArray) -> FloatArray:
@@ -258,9 +270,9 @@ def estimate_pencil_start(
     amplitude = np.abs(np.linalg.lstsq(powers, y.astype(complex), rcond=None)[0])
     rates = np.log(np.where(poles == 0.0, 1e-300, poles)) / h
     frequency = rates.imag / (2.0 * np.pi)
-    good = (frequency > BAND[0]) & (frequency < BAND[1]) & (rates.real < 0.0)
+    good = (frequency > RING_DOWN.band[0]) & (frequency < RING_DOWN.band[1]) & (rates.real < 0.0)
     if not np.any(good):
-        raise _refuse(f"no decaying mode between {BAND[0]:g} and {BAND[1]:g} Hz")
+        raise _refuse("no decaying mode between {:g} and {:g} Hz".format(*RING_DOWN.band))
     best = int(np.argmax(np.where(good, amplitude, 0.0)))
     return float(-rates[best].real), float(rates[best].imag)
 
@@ -274,14 +286,14 @@ def _list_pencil_starts(time: FloatArray, values: FloatArray) -> list[tuple[floa
     found: list[tuple[float, float]] = []
     for share in (1, 2, 4, 8):
         count = values.size // share
-        if count < FEWEST:
+        if count < RING_DOWN.min_samples:
             break
         try:
             found.append(estimate_pencil_start(time[:count], values[:count]))
         except IdentificationError:
             continue
     if not found:
-        raise _refuse(f"no decaying mode between {BAND[0]:g} and {BAND[1]:g} Hz")
+        raise _refuse("no decaying mode between {:g} and {:g} Hz".format(*RING_DOWN.band))
     return found
 
 
@@ -329,7 +341,7 @@ def fit_ringdown(
     lockup: float,
     end: float,
     drive: Drive | None,
-    after: float = START_AFTER_LOCKUP,
+    after: float = RING_DOWN.latest_start,
 ) -> RingDown:
     """Fit one decaying sine on a quadratic to T_o from `after` [s] past lock-up.
 
@@ -363,7 +375,7 @@ def fit_ringdown(
     start = min(starts, key=lambda p: float(np.sum(projected(np.array(p)) ** 2)))
     found = least_squares(projected, start, x_scale=(5.0, 5.0), method="lm")
     rate, omega = (float(v) for v in found.x)
-    if not 0.0 < rate < omega < FASTEST * np.pi / (time[1] - time[0]):
+    if not 0.0 < rate < omega < RING_DOWN.max_nyquist_share * np.pi / (time[1] - time[0]):
         raise _refuse(f"the fit ends at decay rate {rate:.3g} 1/s, {omega / (2 * np.pi):.3g} Hz")
     residual = projected(found.x)
     still = _remove_explained(beside(found.x), unforced(found.x))
@@ -415,7 +427,7 @@ def _require_more_than_chance(explained: float, count: int) -> None:
     Of noise one sine with its phase explains χ² of two degrees of freedom, more than x with the
     probability exp(-x/2); about as many sines as there are samples are independent.
     """
-    chance = 2.0 * float(np.log(count / CHANCE))
+    chance = 2.0 * float(np.log(count / RING_DOWN.chance))
     if explained < chance:
         raise _refuse(
             f"the best decaying sine explains {explained:.3g} times the noise power of a sample, "

@@ -43,7 +43,7 @@ from drivetwin.estimation.multi_log.consistency import check_consistency
 from drivetwin.estimation.multi_log.verdicts import apply_consistency, pool_curves
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.multi_log import FAR, LogShare, Several
+from drivetwin.estimation.result.multi_log import CONSISTENCY, LogShare, Several
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.parameters import split_log_number
 from drivetwin.vehicle.spec import SensorTolerance
@@ -198,7 +198,7 @@ def find_largest_differences(alone: Sequence[Identification]) -> list[str]:
             if b is None or a.value is None or b.value is None or name in LOG_SPECIFIC:
                 continue
             spread = float(np.hypot(a.std_noise or 0.0, b.std_noise or 0.0))
-            if spread > 0.0 and abs(a.value - b.value) > FAR * spread:
+            if spread > 0.0 and abs(a.value - b.value) > CONSISTENCY.far * spread:
                 text = (
                     f"{name} {format_with_unit(a.value, a.unit)} and "
                     f"{format_with_unit(b.value, b.unit)}"

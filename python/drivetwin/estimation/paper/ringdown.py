@@ -6,13 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.linear.ringdown import (
-    BAND,
-    START_AFTER_LOCKUP,
-    RingDown,
-    _refuse,
-    _select_ring_samples,
-)
+from drivetwin.estimation.linear.ringdown import RING_DOWN, RingDown, _refuse, _select_ring_samples
 from drivetwin.estimation.paper.wlse import compute_window_edges, compute_window_means
 
 
@@ -22,7 +16,7 @@ def estimate_paper_ringdown(torque: MeasuredSignal, lockup: float, end: float) -
     T_o is averaged over 10 ms windows; half the difference of neighbouring extremes falls by
     exp(-σ·T/2). Extremes count while they exceed four times the noise of an average.
     """
-    part = _select_ring_samples(torque, lockup, end, START_AFTER_LOCKUP)
+    part = _select_ring_samples(torque, lockup, end, RING_DOWN.latest_start)
     edges = compute_window_edges((part.time[0], part.time[-1]))
     mean, centre = compute_window_means(part, edges), 0.5 * (edges[1:] + edges[:-1])
     count = max(part.time.size / mean.size, 1.0)
@@ -44,7 +38,7 @@ def estimate_paper_ringdown(torque: MeasuredSignal, lockup: float, end: float) -
     swing = np.log(0.5 * np.abs(np.diff(mean[at])))
     decrement = -float(np.polyfit(order[:-1], swing, 1)[0])
     rate, omega = decrement / half_period, np.pi / half_period
-    if not (rate > 0.0 and BAND[0] < omega / (2 * np.pi) < BAND[1]):
+    if not (rate > 0.0 and RING_DOWN.band[0] < omega / (2 * np.pi) < RING_DOWN.band[1]):
         raise _refuse(f"decay rate {rate:.3g} 1/s at {omega / (2 * np.pi):.3g} Hz")
     return RingDown(
         rate, omega, np.zeros((2, 2)), part.time, part.values, part.values, instants, mean[at]

@@ -37,12 +37,17 @@ class Several:
     consistency: Consistency
 
 
-SIGNIFICANT = 0.01
-"""Probability of χ² under agreeing logs below which they count as inconsistent."""
+@dataclass(frozen=True)
+class ConsistencySettings:
+    """Limits of the homogeneity test of several logs."""
+
+    min_probability: float = 0.01
+    """Probability of χ² below which logs count as inconsistent [probability]."""
+    far: float = 3.0
+    """Move of a parameter without one log from which it is named [standard deviations]."""
 
 
-FAR = 3.0
-"""Move of a parameter without one log, in standard deviations of it, from which it is named."""
+CONSISTENCY = ConsistencySettings()
 
 
 @dataclass(frozen=True)
@@ -71,12 +76,12 @@ class Consistency:
     @property
     def agree(self) -> bool:
         """True if the logs are consistent with one vehicle in one state."""
-        return self.p >= SIGNIFICANT
+        return self.p >= CONSISTENCY.min_probability
 
     @property
     def doubtful(self) -> dict[str, LogPull]:
         """Parameters on which the logs disagree; empty if they agree."""
-        far = {one.parameter: one for one in self.moves if abs(one.z) > FAR}
+        far = {one.parameter: one for one in self.moves if abs(one.z) > CONSISTENCY.far}
         return {} if self.agree else far
 
     @property

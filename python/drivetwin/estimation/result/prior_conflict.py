@@ -16,7 +16,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
-from drivetwin.estimation.result.prior_update import CONTRADICTS, remove_prior
+from drivetwin.estimation.result.prior_update import PRIOR, remove_prior
 from drivetwin.estimation.result.verdict import reject_identified
 from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
@@ -77,7 +77,7 @@ def find_contradictions(
             alone = sensors * abs(log.value - design.value) / moved
             spread = float(np.linalg.norm([design.std, log.std, alone]))
         apart = abs(log.value - design.value) / spread
-        if apart > CONTRADICTS:
+        if apart > PRIOR.contradiction:
             found.append(Contradiction(name, design, log, apart, without))
     return tuple(found)
 

@@ -8,6 +8,7 @@ measurement of one parameter; σ = 0 fixes it. The other parameters follow by th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,10 +17,18 @@ from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue
 
-CONTRADICTS = 3.0
-"""Difference of log and known value in its standard deviations from which a warning is due."""
-LEAST = 0.02
-"""Share of the information on a parameter below which nothing of it is the log's own."""
+
+@dataclass(frozen=True)
+class PriorSettings:
+    """Limits of the comparison of log and design values."""
+
+    contradiction: float = 3.0
+    """Difference of log and design value from which a finding is due [standard deviations]."""
+    min_information: float = 0.02
+    """Share of the information on a parameter below which none is from the log [ratio]."""
+
+
+PRIOR = PriorSettings()
 
 
 def add_priors(
@@ -44,7 +53,7 @@ def add_priors(
         if spread <= 0.0:
             continue
         miss = prior.value - values[k]
-        if prior.std == 0.0 and abs(miss) > CONTRADICTS * np.sqrt(spread):
+        if prior.std == 0.0 and abs(miss) > PRIOR.contradiction * np.sqrt(spread):
             unit = get_parameter_spec(name).unit
             card, log = Number(prior.value, unit), Number(float(values[k]), unit)
             found.append(report(Code.FIXED_VALUE_CONTRADICTED, name, card=card, log=log))
@@ -65,7 +74,7 @@ def remove_prior(
     if prior.std <= 0.0 or not np.isfinite(covariance).all() or variance <= 0.0:
         return None
     left = prior.std**2 - variance
-    if left < LEAST * prior.std**2:
+    if left < PRIOR.min_information * prior.std**2:
         return None
     freed = covariance + np.outer(column, column) / left
     return values + column * ((values[k] - prior.value) / left), freed

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -15,12 +15,22 @@ from drivetwin.findings import Code, Finding, Number, Severity, explain
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue
 
-DELAY_IDENTIFIED = 0.005
-"""Half width of the 95 % interval of a delay [s] below which it counts as identified."""
-PRIOR_SHARE = 0.8
-"""Share of the prior's standard deviation above which a posterior's is dominated by the prior."""
-SENSORS = 0.8
-"""Share of the total standard deviation from which the sensors' tolerances decide an interval."""
+
+@dataclass(frozen=True)
+class VerdictSettings:
+    """Limits of the verdicts; those of widths are in the parameter table."""
+
+    delay_identified: float = 0.005
+    """Half width of the 95 % interval up to which a delay is identified [s]."""
+    prior_share: float = 0.8
+    """Standard deviation over that of the prior from which the prior dominates [ratio]."""
+    sensor_share: float = 0.8
+    """Share of the sensor tolerances in the standard deviation from which they dominate an
+    interval [ratio]."""
+
+
+VERDICT = VerdictSettings()
+
 
 _HOLD_STILL = "Hold the pedal still for a second after a firm lock-up."
 _EXPERIMENT = {
@@ -48,7 +58,7 @@ def get_experiment(parameter_id: str) -> str:
 def is_sensor_limited(std_noise: float, std_systematic: float | None) -> bool:
     """Return True if sensor tolerances dominate an interval, so that no experiment narrows it."""
     systematic = std_systematic or 0.0
-    return systematic > SENSORS * float(np.hypot(std_noise, systematic))
+    return systematic > VERDICT.sensor_share * float(np.hypot(std_noise, systematic))
 
 
 def get_advice(parameter_id: str, std_noise: float, std_systematic: float | None) -> str:
@@ -75,14 +85,15 @@ def assess(
     spec = get_parameter_spec(parameter_id)
     half = Z95 * float(np.hypot(std_noise, std_systematic or 0.0))
     if spec.stem == "te_delay":
-        width, limit, end = half, DELAY_IDENTIFIED, 4.0 * DELAY_IDENTIFIED
+        width, limit, end = half, VERDICT.delay_identified, 4.0 * VERDICT.delay_identified
     else:
         width, limit, end = half / max(abs(value), 1e-300), spec.weak_above, 1.0
     inside = spec.lower <= value <= spec.upper
     advice = get_advice(parameter_id, std_noise, std_systematic)
     if not np.isfinite(width) or width > end or not inside:
         shown = Number(value, spec.unit, half)
-        reason = join_reasons(explain(Code.INTERVAL_WIDER_THAN_VALUE, value=shown), advice)
+        code = Code.INTERVAL_WIDER_THAN_VALUE if inside else Code.OUTSIDE_LIMITS
+        reason = join_reasons(explain(code, value=shown), advice)
         return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
     reason, verdict = note, Verdict.IDENTIFIED
     if width > limit:
@@ -107,7 +118,7 @@ def assess_with_prior(
     name, value, std = told
     if design.std == 0.0:
         return from_prior(name, PriorValue(value), Code.FIXED_BY_CARD)
-    if std >= PRIOR_SHARE * design.std:
+    if std >= VERDICT.prior_share * design.std:
         return from_prior(name, PriorValue(value, std), Code.CARD_DOMINATES, std_systematic)
     one, spec = assess(name, value, std, method, std_systematic, note), get_parameter_spec(name)
     if one.value is not None or not spec.lower <= value <= spec.upper:

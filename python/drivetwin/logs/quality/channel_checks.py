@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.logs.quality.outliers import (
     BEYOND,
     Damage,
@@ -110,7 +112,7 @@ class Checked:
     """A channel that passed, and what was left out of it."""
 
     channel: Channel
-    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 def check_channel(channel: Channel, file: str) -> Checked:
@@ -120,14 +122,14 @@ def check_channel(channel: Channel, file: str) -> Checked:
     whole channel is in doubt.
     """
     where = Where(file=file, channel=channel.source_name)
-    warnings: list[str] = []
+    findings: list[Finding] = []
     check_order(channel.time, where)
     _check_count(channel, channel.time.size, where)
     _check_rate(channel, where)
-    warnings += _describe_gaps(channel)
+    findings += _check_gaps(channel)
     total = channel.time.size
-    found = find_missing(channel.time, channel.values)
-    channel = _drop_damage(channel, found, warnings)
+    found = find_missing(channel.values)
+    channel = _drop_damage(channel, found, findings)
     _check_count(channel, total, where)
     _check_variation(channel, where)
     for look in (
@@ -139,29 +141,29 @@ def check_channel(channel: Channel, file: str) -> Checked:
         _check_clipping,
         _check_stale,
     ):
-        channel = _drop_damage(channel, look(channel), warnings)
+        channel = _drop_damage(channel, look(channel), findings)
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
     _check_sign(channel, where)
     _check_jumps(channel, where)
     _check_wraps(channel, where)
-    warnings += _describe_limit(channel)
-    warnings += _describe_rest(channel)
-    warnings += _describe_rounding(channel)
-    return Checked(channel, tuple(warnings))
+    findings += _check_limit(channel)
+    findings += _check_rest(channel)
+    findings += _check_rounding(channel)
+    return Checked(channel, tuple(findings))
 
 
-def _describe_gaps(channel: Channel) -> list[str]:
-    """Words for the gaps that the file itself has."""
+def _check_gaps(channel: Channel) -> list[Finding]:
+    """Report the gaps that the file itself has."""
     if not channel.gaps:
         return []
     spans = ", ".join(f"{start:.3f} s to {end:.3f} s" for start, end in channel.gaps[:3])
     more = f" and {len(channel.gaps) - 3} more" if len(channel.gaps) > 3 else ""
-    return [f"channel {channel.source_name!r}: no samples from {spans}{more}"]
+    return [report(Code.NO_SAMPLES, "", channel.place, spans=spans + more)]
 
 
-def _describe_limit(channel: Channel) -> list[str]:
-    """Words for an engine torque that rests at its largest number alone; it may have reason to."""
+def _check_limit(channel: Channel) -> list[Finding]:
+    """Report an engine torque that rests at its largest number alone; it may be genuine."""
     limit = float(channel.values[np.abs(channel.values).argmax()])
     at_limit = channel.values == limit
     share = float(np.mean(at_limit))
@@ -175,40 +177,31 @@ def _describe_limit(channel: Channel) -> list[str]:
     far = abs(limit) > BEYOND * float(np.abs(channel.values[~at_limit]).max())
     if elsewhere > min(HELD, there / LONGER) and not far:
         return []
-    return [
-        f"channel {channel.source_name!r}: at its largest number for {100 * share:.0f} % of the "
-        f"log, {_format_value(limit, channel.quantity)}; if it is saturated there, or none "
-        f"was received, "
-        "results that rest on it are wrong"
-    ]
+    shown = Number(limit, channel.quantity.unit)
+    return [report(Code.AT_LARGEST_NUMBER, "", channel.place, limit=shown, share=100.0 * share)]
 
 
-def _describe_rest(channel: Channel) -> list[str]:
-    """Words for an engine torque that stays at one number where chance would have moved it."""
+def _check_rest(channel: Channel) -> list[Finding]:
+    """Report an engine torque that stays at one number where noise would have moved it."""
     if channel.role != "engine_torque":
         return []
     fresh = replace(channel, held=find_raster(channel) is not None).updates
     span = find_longest_rest(fresh.time, fresh.values)
     if span is None:
         return []
-    return [
-        f"channel {channel.source_name!r}: one number from {span[0]:.3f} s to {span[1]:.3f} s, "
-        "though it jitters elsewhere; if it is stuck there, results that rest on it are wrong"
-    ]
+    start, end = (Number(time, "s") for time in span)
+    return [report(Code.AT_ONE_NUMBER, "", channel.place, start=start, end=end)]
 
 
-def _describe_rounding(channel: Channel) -> list[str]:
-    """Words for a measured channel that was rounded so much that nothing precise rests on it."""
+def _check_rounding(channel: Channel) -> list[Finding]:
+    """Report a measured channel that was rounded coarsely."""
     # Not from one sample to the next: along a ramp of a slow channel all may be many steps apart.
     numbers = np.unique(channel.values[np.isfinite(channel.values)])
     step, largest = estimate_resolution(numbers), float(np.abs(numbers).max(initial=0.0))
     if channel.quantity in AUXILIARY or step <= COARSE * largest or _is_binary(channel.values):
         return []
-    return [
-        f"channel {channel.source_name!r}: recorded in steps of "
-        f"{_format_value(step, channel.quantity)}, "
-        f"{100 * step / largest:.0f} % of its largest number; what rests on it may be as coarse"
-    ]
+    shown, share = Number(step, channel.quantity.unit), 100.0 * step / largest
+    return [report(Code.COARSE_RESOLUTION, "", channel.place, step=shown, share=share)]
 
 
 def _is_binary(values: FloatArray) -> bool:
@@ -262,18 +255,18 @@ def _check_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -
     if found is None or not held:
         return found
     update = np.searchsorted(fresh.time, channel.time, side="right") - 1
-    return Damage(found.mask[np.clip(update, 0, None)], found.text)
+    return Damage(found.mask[np.clip(update, 0, None)], found.code)
 
 
 def _check_stale(channel: Channel) -> Damage | None:
     """Find values that a logger repeats while messages are lost."""
     if channel.quantity in AUXILIARY:
         return None
-    return _check_updates(channel, lambda fresh: find_stale(fresh.time, fresh.values))
+    return _check_updates(channel, lambda fresh: find_stale(fresh.values))
 
 
 def _check_clipping(channel: Channel) -> Damage | None:
-    return find_clipping(channel.time, channel.values) if _has_sensor_noise(channel) else None
+    return find_clipping(channel.values) if _has_sensor_noise(channel) else None
 
 
 def _has_sensor_noise(channel: Channel) -> bool:
@@ -281,11 +274,11 @@ def _has_sensor_noise(channel: Channel) -> bool:
     return channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
 
 
-def _drop_damage(channel: Channel, damage: Damage | None, warnings: list[str]) -> Channel:
-    """Drop the damaged samples and add a warning."""
+def _drop_damage(channel: Channel, damage: Damage | None, findings: list[Finding]) -> Channel:
+    """Drop the damaged samples and add a finding."""
     if damage is None:
         return channel
-    warnings.append(f"channel {channel.source_name!r}: {damage.text}")
+    findings.append(damage.report(channel.time, channel.place))
     keep = ~damage.mask
     return replace(channel, time=channel.time[keep], values=channel.values[keep])
 
@@ -386,8 +379,8 @@ def _check_jumps(channel: Channel, where: Where) -> None:
     if jumps.size:
         index = int(jumps[0]) + 1
         before, after = (
-            _format_value(float(channel.values[index - 1]), channel.quantity),
-            _format_value(float(channel.values[index]), channel.quantity),
+            format_with_unit(float(channel.values[index - 1]), channel.quantity.unit),
+            format_with_unit(float(channel.values[index]), channel.quantity.unit),
         )
         raise DamagedChannelError(
             f"jumps from {before} to {after} between two samples ({jumps.size} such jumps)",
@@ -418,10 +411,12 @@ def _check_wraps(channel: Channel, where: Where) -> None:
         went = float(values[index + 1 + near] - values[index + 1])
         least = WRAP_DRIFT * span
         if min(-np.sign(jump) * came, -np.sign(jump) * went) > least:
+            last, first = (
+                format_with_unit(float(values[k]), channel.quantity.unit)
+                for k in (index, index + 1)
+            )
             raise DamagedChannelError(
-                f"goes on at {_format_value(float(values[index + 1]), channel.quantity)} after "
-                f"{_format_value(float(values[index]), channel.quantity)}, as a number that "
-                f"overflows does",
+                f"goes on at {first} after {last}, as a number that overflows does",
                 "export the channel with more bits or another scale, or cut the log there",
                 Where(where.file, where.channel, float(channel.time[index])),
             )
@@ -463,30 +458,20 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
         else f"correct unit or scale of channels.{channel.role} in the channel mapping"
     )
     raise PlausibilityError(
-        f"largest {channel.quantity} is {_format_value(largest, channel.quantity)}, {side} "
-        f"{_format_value(limit, channel.quantity)}, with unit {channel.source_unit!r}",
+        f"largest {channel.quantity} is {format_with_unit(largest, channel.quantity.unit)}, {side} "
+        f"{format_with_unit(limit, channel.quantity.unit)}, with unit {channel.source_unit!r}",
         remedy,
         where,
     )
-
-
-def _format_value(value: float, quantity: Quantity) -> str:
-    """Value in the unit an engineer reads: bar, rpm, N·m."""
-    factor, unit = {
-        Quantity.PRESSURE: (1.0 / BAR, "bar"),
-        Quantity.SPEED: (1.0 / RPM, "rpm"),
-        Quantity.TORQUE: (1.0, "N·m"),
-    }.get(quantity, (1.0, ""))
-    return f"{value * factor:.4g} {unit}".rstrip()
 
 
 def _check_sign(channel: Channel, where: Where) -> None:
     if channel.quantity is Quantity.PRESSURE:
         lowest, highest = float(channel.values.min()), float(channel.values.max())
         if -lowest > max(highest, LEAST_SUCTION):
+            low, high = (format_with_unit(one, "Pa") for one in (lowest, highest))
             raise PlausibilityError(
-                f"gauge pressure goes down to {_format_value(lowest, channel.quantity)}, but up to "
-                f"{_format_value(highest, channel.quantity)} only",
+                f"gauge pressure goes down to {low}, but up to {high} only",
                 f"set the sign in the channel mapping: channels.{channel.role} = "
                 f'{{ source = "{channel.source_name}", sign = -1 }}',
                 where,

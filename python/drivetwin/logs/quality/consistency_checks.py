@@ -10,6 +10,7 @@ import numpy as np
 from drivetwin.channels.roles import AUXILIARY, get_quantity
 from drivetwin.channels.shiftlog import Channel, find_uncovered_ends
 from drivetwin.errors import PlausibilityError, TimeError, Where
+from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.quality.time_alignment import SIGNIFICANT, estimate_speed_ratio
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -60,8 +61,8 @@ def check_common_span(channels: Mapping[str, Channel], file: str) -> None:
         )
 
 
-def check_coverage(channels: Mapping[str, Channel]) -> list[str]:
-    """Return a warning for the channels that start later or end earlier than the log."""
+def check_coverage(channels: Mapping[str, Channel]) -> list[Finding]:
+    """Return a finding for the channels that start later or end earlier than the log."""
     measured = [one for role, one in channels.items() if get_quantity(role) not in AUXILIARY]
     if not measured:
         return []
@@ -70,7 +71,7 @@ def check_coverage(channels: Mapping[str, Channel]) -> list[str]:
         max(float(channel.time[-1]) for channel in measured),
     )
     return [
-        f"channel {channel.source_name!r}: no samples from {low:.3f} s to {high:.3f} s"
+        report(Code.NO_SAMPLES, "", channel.place, spans=f"{low:.3f} s to {high:.3f} s")
         for channel in measured
         for low, high in find_uncovered_ends(channel.updates.time, whole)
         if high - low > STARTS_APART
@@ -114,19 +115,16 @@ def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str)
             )
 
 
-def check_final_drive(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Return a warning if the ratio of output and wheel speed is not the final drive."""
+def check_final_drive(channels: Mapping[str, Channel], card: VehicleCard) -> list[Finding]:
+    """Return a finding if the ratio of output and wheel speed is not the final drive."""
     if "output_speed" not in channels or "wheel_speed" not in channels:
         return []
     outlet, wheel, final = channels["output_speed"], channels["wheel_speed"], card.final_drive
     found = estimate_speed_ratio(outlet, wheel)
     if found is None or abs(found[0] - final) < FINAL_DRIVE_DRIFT * final + SIGNIFICANT * found[1]:
         return []
-    return [
-        f"{outlet.source_name!r} over {wheel.source_name!r} is {found[0]:.5g}, the card says "
-        f"final_drive = {final:.5g}: correct it, or the scale of a speed; the speed of a wheel "
-        "that is not driven is off by the slip of the tyres and cannot stand for the driven ones"
-    ]
+    names = {"outlet": outlet.source_name, "wheel": wheel.source_name}
+    return [report(Code.FINAL_DRIVE_DIFFERS, ratio=found[0], card=final, **names)]
 
 
 def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
@@ -148,15 +146,15 @@ def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
         )
 
 
-def check_torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Return a warning if output and engine torque do not match the ratio of the engaged gear."""
+def check_torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[Finding]:
+    """Return a finding if output and engine torque do not match the ratio of the engaged gear."""
     roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
     if not all(role in channels for role in roles):
         return []
     engine = channels["engine_torque"]
     output, inlet, outlet = (channels[role].interpolate(engine.time) for role in roles[1:])
     low, high = TORQUE_BALANCE
-    texts = []
+    findings = []
     loaded = (engine.values > LEAST_LOAD * engine.values.max()) & np.isfinite(output)
     for gear in card.gears:
         expected = gear.ratio * outlet
@@ -166,9 +164,7 @@ def check_torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> 
         driving = card.compute_ratio(gear.name) * float(engine.values[held].sum())
         share = float(output[held].sum()) / driving
         if not low <= share <= high:
-            texts.append(
-                f"in gear {gear.name} the output torque is {share:.2f} of ratio times engine "
-                f"torque, {low:g} to {high:g} is usual: check scale and unit of "
-                f"{engine.source_name!r} and {channels['output_torque'].source_name!r}"
-            )
-    return texts
+            names = {"engine": engine.source_name, "output": channels["output_torque"].source_name}
+            shown = {"share": share, "low": low, "high": high}
+            findings.append(report(Code.TORQUES_DIFFER, gear=gear.name, **names, **shown))
+    return findings

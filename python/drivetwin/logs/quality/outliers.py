@@ -14,6 +14,8 @@ from scipy.special import erf
 
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.shiftlog import FloatArray, Quantity
+from drivetwin.errors import Where
+from drivetwin.findings import Code, Finding, report
 
 Mask = NDArray[np.bool_]
 
@@ -114,25 +116,33 @@ _CLIPPED_RUNS = 3
 
 @dataclass(frozen=True, eq=False)
 class Damage:
-    """Samples (n,) that are no measurement, and the words for them."""
+    """Samples (n,) that are no measurement, and the code of the finding on them."""
 
     mask: Mask
-    text: str
+    code: Code
 
-
-def find_missing(time: FloatArray, values: FloatArray) -> Damage | None:
-    """Samples without a number."""
-    mask = ~np.isfinite(values)
-    if not mask.any():
-        return None
-    found = find_true_runs(mask)
-    if all(end - start <= _CLIPPED_SAMPLES for start, end in found):
-        first = float(time[found[0][0]])
-        return Damage(
-            mask,
-            f"{int(mask.sum())} samples without a number left out, the first at {first:.3f} s",
+    def report(self, time: FloatArray, place: Where) -> Finding:
+        """Report how many of the samples at `time` (n,) are damaged, and where."""
+        runs = find_true_runs(self.mask)
+        places = ", ".join(
+            f"at {time[start]:.3f} s"
+            if end - start == 1
+            else f"from {time[start]:.3f} s to {time[end - 1]:.3f} s"
+            for start, end in runs[:_LISTED]
         )
-    return Damage(mask, f"no number {_describe_runs(time, found)}")
+        if len(runs) > _LISTED:
+            places += f" and {len(runs) - _LISTED} more times"
+        samples = int(self.mask.sum())
+        return report(self.code, "", place, samples=samples, runs=len(runs), places=places)
+
+
+def _make_damage(mask: Mask, code: Code) -> Damage | None:
+    return Damage(mask, code) if mask.any() else None
+
+
+def find_missing(values: FloatArray) -> Damage | None:
+    """Samples without a number."""
+    return _make_damage(~np.isfinite(values), Code.SAMPLES_MISSING)
 
 
 def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
@@ -151,13 +161,7 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
             break
         for start in _find_spike_starts(values, steps, width, least):
             mask[start : start + width] = True
-    if not mask.any():
-        return None
-    return Damage(
-        mask,
-        f"{len(find_true_runs(mask))} spikes left out, "
-        f"{_describe_runs(time, find_true_runs(mask))}",
-    )
+    return _make_damage(mask, Code.SPIKES)
 
 
 def _find_spike_starts(
@@ -205,11 +209,7 @@ def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
         drift = abs(float(steps[first] + steps[last]))
         if min(size[first], size[last]) > _SPIKE_CONTRAST * max(calm, drift):
             mask[first + 1 : last + 1] = True
-    if not mask.any():
-        return None
-    return Damage(
-        mask, f"jumped up or down and back {_describe_runs(time, find_true_runs(mask))}, left out"
-    )
+    return _make_damage(mask, Code.GLITCHES)
 
 
 def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
@@ -237,14 +237,10 @@ def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dama
             # The first is the last that was measured, unless the signal jumped to it.
             jumped = start == 0 or moving[start - 1] > _STUCK_RELEASE * usual
             mask[start if jumped else start + 1 : end + 1] = True
-    if not mask.any():
-        return None
-    return Damage(
-        mask, f"stuck at one number {_describe_runs(time, find_true_runs(mask))}, left out"
-    )
+    return _make_damage(mask, Code.STUCK)
 
 
-def find_stale(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_stale(values: FloatArray) -> Damage | None:
     """Updates (n,) that repeat the one before while the signal moves on and then catches up.
 
     Lost messages cause such repeats. Where the signal turns or rests, a repeat may be genuine.
@@ -263,15 +259,7 @@ def find_stale(time: FloatArray, values: FloatArray) -> Damage | None:
         catches_up = before < after < _CATCHES_UP * (lost + 1) * before
         if onwards and catches_up and before + after >= least * (lost + 2):
             mask[start + 1 : end + 1] = True
-    if not mask.any():
-        return None
-    count = int(mask.sum())
-    what = "sample repeats" if count == 1 else "samples repeat"
-    return Damage(
-        mask,
-        f"{count} {what} the one before while the signal moves on, as where a message is lost: "
-        f"left out, {_describe_runs(time, find_true_runs(mask))}",
-    )
+    return _make_damage(mask, Code.MESSAGES_LOST)
 
 
 def _is_noisy(steps: FloatArray, usual: float) -> bool:
@@ -336,9 +324,7 @@ def find_dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
             least = min(least, max(_SPIKE_SHARE * level, _SPIKE_CONTRAST * calm))
         if min(moving[start - 1], moving[end - 1]) > least:
             mask[start:end] = True
-    if not mask.any():
-        return None
-    return Damage(mask, f"fell to zero {_describe_runs(time, find_true_runs(mask))}, left out")
+    return _make_damage(mask, Code.DROPOUTS)
 
 
 def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
@@ -361,9 +347,7 @@ def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -
             and _has_only_inserted_runs(time, values, found, float(largest))
             and not any(_can_be_fill_pulse(values, run, possible) for run in found)
         ):
-            return Damage(
-                mask, f"far beyond all other numbers {_describe_runs(time, found)}, left out"
-            )
+            return Damage(mask, Code.OUTLIERS)
     return None
 
 
@@ -398,7 +382,7 @@ def _can_be_fill_pulse(values: FloatArray, run: tuple[int, int], possible: float
     return float(values[end] - values[start - 1]) > _LIFT * usual
 
 
-def find_clipping(time: FloatArray, values: FloatArray) -> Damage | None:
+def find_clipping(values: FloatArray) -> Damage | None:
     """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
     same = find_true_runs(np.diff(values) == 0.0)
     for limit in (float(values.max()), float(values.min())):
@@ -411,17 +395,5 @@ def find_clipping(time: FloatArray, values: FloatArray) -> Damage | None:
             mask = np.zeros(values.size, np.bool_)
             for start, end in rests:
                 mask[start:end] = True
-            return Damage(mask, f"saturated at one number {_describe_runs(time, rests)}, left out")
+            return Damage(mask, Code.SATURATED)
     return None
-
-
-def _describe_runs(time: FloatArray, found: Sequence[tuple[int, int]]) -> str:
-    """`from 0.200 s to 0.290 s` of the first stretches, and how many more."""
-    parts = [
-        f"at {time[start]:.3f} s"
-        if end - start == 1
-        else f"from {time[start]:.3f} s to {time[end - 1]:.3f} s"
-        for start, end in found[:_LISTED]
-    ]
-    more = f" and {len(found) - _LISTED} more times" if len(found) > _LISTED else ""
-    return ", ".join(parts) + more

@@ -15,6 +15,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 GRID = 0.01
@@ -167,22 +168,22 @@ def fit_least_squares(design: FloatArray, target: FloatArray) -> Fit | None:
     return Fit(solution / scale, float(residual @ residual) / independent * covariance)
 
 
-def check_speed_clocks(channels: Mapping[str, Channel], card: VehicleCard) -> list[str]:
-    """Return warnings for significant delays and drifts of speeds against the input speed."""
+def check_speed_clocks(channels: Mapping[str, Channel], card: VehicleCard) -> list[Finding]:
+    """Return findings on significant delays and drifts of speeds against the input speed."""
     if "input_speed" not in channels:
         return []
     inlet = channels["input_speed"].updates
-    texts: list[str] = []
+    findings: list[Finding] = []
     if "output_speed" in channels:
         outlet = channels["output_speed"].updates
         found = estimate_speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
-        texts += _describe_delay(found, outlet, inlet)
+        findings += _check_delay(found, outlet, inlet)
     if "engine_speed" in channels:
         engine = channels["engine_speed"].updates
         found = estimate_speed_delay(engine, inlet, [card.i_in])
         turned = None if found is None else replace(found, value=-found.value, drift=-found.drift)
-        texts += _describe_delay(turned, engine, inlet)
-    return texts
+        findings += _check_delay(turned, engine, inlet)
+    return findings
 
 
 def is_significant_delay(delay: Delay, one: Channel, other: Channel) -> bool:
@@ -200,22 +201,31 @@ def _compute_min_delay(one: Channel, other: Channel) -> float:
     return max(_LEAST_DELAY, 0.5 * one.step, 0.5 * other.step)
 
 
-def _describe_delay(delay: Delay | None, other: Channel, reference: Channel) -> list[str]:
-    """Words for the delay of `other` against `reference`, if it is large and certain enough."""
+def _check_delay(delay: Delay | None, other: Channel, reference: Channel) -> list[Finding]:
+    """Report the delay of `other` against `reference`, if it is large and certain enough."""
     if delay is None:
         return []
     least = _compute_min_delay(other, reference)
-    texts = []
+    findings = []
     if is_significant_delay(delay, other, reference):
-        side = "late" if delay.value > 0.0 else "early"
-        texts.append(
-            f"channel {other.source_name!r} is {1e3 * abs(delay.value):.1f} ms {side} against "
-            f"{reference.source_name!r} (± {1e3 * delay.sigma:.1f} ms): to correct it set "
-            f"channels.{other.role}.time_shift_s = {-delay.value:.4f} in the channel mapping"
-        )
+        amount = Number(delay.value, "s", 1.96 * delay.sigma)
+        findings.append(report_delay(Code.CLOCK_LATE, other, amount, reference.source_name))
     if abs(delay.drift) * delay.span > max(least, SIGNIFICANT * delay.drift_sigma * delay.span):
-        texts.append(
-            f"the clocks of {other.source_name!r} and {reference.source_name!r} drift apart by "
-            f"{1e6 * abs(delay.drift):.0f} µs/s: export both on one clock"
-        )
-    return texts
+        names = {"other": reference.source_name}
+        drift = Number(abs(delay.drift), "s/s")
+        findings.append(report(Code.CLOCKS_DRIFT, "", other.place, drift=drift, **names))
+    return findings
+
+
+def report_delay(code: Code, channel: Channel, delay: Number, reference: str) -> Finding:
+    """Report a `delay` [s] of a channel relative to others, with the time shift that removes it."""
+    return report(
+        code,
+        "",
+        channel.place,
+        delay=replace(delay, value=abs(delay.value)),
+        side="late" if delay.value > 0.0 else "early",
+        reference=reference,
+        role=channel.role,
+        shift=Number(-delay.value, "s"),
+    )

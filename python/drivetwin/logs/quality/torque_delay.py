@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.findings import Code, Finding, Number
 from drivetwin.logs.quality.time_alignment import (
     GRID,
     LONGEST,
@@ -21,6 +22,7 @@ from drivetwin.logs.quality.time_alignment import (
     Fit,
     fit_least_squares,
     is_significant_delay,
+    report_delay,
     sample_means,
 )
 
@@ -88,8 +90,8 @@ def _estimate_delay(fit: Fit) -> Delay | None:
     return Delay(value, float(np.sqrt(slope @ fit.covariance[:2, :2] @ slope)))
 
 
-def check_torque_delays(channels: Mapping[str, Channel]) -> list[str]:
-    """Return warnings for a significant delay between output torque and speeds.
+def check_torque_delays(channels: Mapping[str, Channel]) -> list[Finding]:
+    """Return findings on a significant delay between output torque and speeds.
 
     A delay against all speeds is attributed to the torque, else to the speed. Only the first sample
     of a repeated value is used.
@@ -106,20 +108,14 @@ def check_torque_delays(channels: Mapping[str, Channel]) -> list[str]:
     mean = float(values.mean())
     if np.all(np.abs(values - mean) < ALIKE * abs(mean)):
         names = " and ".join(repr(speed.source_name) for speed, _ in found)
-        return [_describe_torque_delay(torque, -mean, names, mean < 0.0)]
+        return [_report_torque_delay(torque, -mean, names, mean < 0.0)]
     return [
-        _describe_torque_delay(speed, value, repr(torque.source_name), value < 0.0)
+        _report_torque_delay(speed, value, repr(torque.source_name), value < 0.0)
         for speed, value in late
     ]
 
 
-def _describe_torque_delay(channel: Channel, value: float, others: str, torque_last: bool) -> str:
-    """Words for a channel that is `value` [s] late; tyre slip too puts a speed before a torque."""
-    side = "late" if value > 0.0 else "early"
-    doubt = "tyre slip looks the same; " if torque_last else ""
-    return (
-        f"channel {channel.source_name!r} is about {1e3 * abs(value):.0f} ms {side} against "
-        f"{others}, by what the torque does to the speed of the vehicle: {doubt}where two clocks "
-        f"recorded them set channels.{channel.role}.time_shift_s = {-value:.3f} in the channel "
-        "mapping"
-    )
+def _report_torque_delay(channel: Channel, value: float, others: str, torque_last: bool) -> Finding:
+    """Report a channel that is `value` [s] late; tyre slip too puts a speed before a torque."""
+    code = Code.TORQUE_LATE_OR_SLIP if torque_last else Code.TORQUE_CLOCK_LATE
+    return report_delay(code, channel, Number(value, "s"), others)

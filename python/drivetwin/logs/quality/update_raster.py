@@ -12,6 +12,7 @@ from drivetwin.channels import update_raster
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.channels.update_raster import UpdateRaster
+from drivetwin.findings import Code, Finding, Number, report
 
 _COARSE = 2.1e-3
 """Step of a table [s] above which it matters how much later than its message a value is shown: with
@@ -25,8 +26,8 @@ def find_raster(channel: Channel) -> UpdateRaster | None:
     return update_raster.find_raster(channel.time, channel.values)
 
 
-def mark_late_samples(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
-    """Mark channels as `late` that a coarse table repeats; return them by role, and warnings.
+def mark_late_samples(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
+    """Mark channels as `late` that a coarse table repeats; return them by role, and findings.
 
     The arrival of their messages within a row is unknown. Channels with stamps of their own have
     those of the messages.
@@ -41,10 +42,5 @@ def mark_late_samples(channels: Mapping[str, Channel]) -> tuple[dict[str, Channe
         return dict(channels), []
     names = ", ".join(repr(one.source_name) for one in held)
     aged = {role: replace(one, late=rows.step) for role, one in measured.items()}
-    return {**channels, **aged}, [
-        f"the rows of the table are {1e3 * rows.step:.3g} ms apart and repeat values of {names}: a "
-        "value stands there up to a row later than its message came, of each channel by another "
-        "time; intervals count that, and the age of the engine torque, c_o, P0 and μ hang on it: "
-        "export each channel with its own stamps, or rows of 1 ms; where all values of a row are "
-        "of its stamp, say simultaneous = true under [time] of the channel mapping"
-    ]
+    step = Number(rows.step, "s")
+    return {**channels, **aged}, [report(Code.TABLE_ROWS_COARSE, step=step, channels=names)]

@@ -9,7 +9,7 @@ from itertools import groupby
 from drivetwin._util.display_units import format_significant
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.coloured_noise import BLOCK
+from drivetwin.estimation.likelihood.coloured_noise import COLOURED_NOISE
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     MAX_EXCESS_POWER,
     SIGNIFICANT,
@@ -53,8 +53,8 @@ def _build_fit_section(found: Identification, fit: LikelihoodFit) -> Section:
         phases = get_shift_spans(shift)
         text = (
             f"Shift {label}: residual of each output, averaged over "
-            f"{1e3 * BLOCK:.0f} ms and divided by what noise alone would leave. A stretch outside "
-            "the dashed lines is where the vehicle does something that the model does not know."
+            f"{1e3 * COLOURED_NOISE.block:.0f} ms, over the residual of noise alone. Outside the "
+            "dashed lines the model lacks an effect."
         )
         blocks.append(
             FigureBlock(
@@ -107,10 +107,9 @@ def _build_test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> Ta
         for test in group
     ]
     return TableBlock(
-        f"Tests of what is left. Slow part: power of means over {1e3 * BLOCK:.0f} ms against that "
-        f"of white noise, doubtful above {MAX_EXCESS_POWER:g}. Correlation with an input in "
-        f"standard "
-        f"deviations of chance, doubtful beyond ±{SIGNIFICANT:g}.",
+        f"Residual tests. Slow part: power of means over {1e3 * COLOURED_NOISE.block:.0f} ms "
+        f"over that of white noise, doubtful above {MAX_EXCESS_POWER:g}. Correlation with an "
+        f"input in standard deviations of chance, doubtful beyond ±{SIGNIFICANT:g}.",
         head,
         rows,
     )

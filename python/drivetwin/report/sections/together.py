@@ -10,7 +10,7 @@ from pathlib import Path
 from drivetwin._util.display_units import format_significant, get_display_unit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate
-from drivetwin.estimation.result.multi_log import FAR, Consistency, LogShare, Several
+from drivetwin.estimation.result.multi_log import CONSISTENCY, Consistency, LogShare, Several
 from drivetwin.estimation.result.validation import HeldOut, Outcome, Validation
 from drivetwin.findings import render
 from drivetwin.parameters import split_log_number
@@ -123,7 +123,7 @@ def _build_shared_table(
     rows = []
     for name, estimate in shared.items():
         display, move = get_display_unit(estimate.unit), moves.get(name)
-        far = move is not None and abs(move.z) > FAR
+        far = move is not None and abs(move.z) > CONSISTENCY.far
         rows.append(
             (
                 Cell(get_parameter_label(name), note=name),
@@ -150,7 +150,8 @@ def _build_shared_table(
     )
     return TableBlock(
         "What the logs share. Farthest off: by how much one log moves the value from what the "
-        f"others say, in standard deviations of that, noise alone; doubtful beyond {FAR:g}.",
+        "others say, in standard deviations of that, noise alone; doubtful beyond "
+        f"{CONSISTENCY.far:g}.",
         head,
         rows,
     )

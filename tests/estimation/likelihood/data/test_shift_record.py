@@ -8,11 +8,7 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.likelihood.data.shift_record import (
-    MIN_RELATIVE_NOISE,
-    TORQUE,
-    build_record,
-)
+from drivetwin.estimation.likelihood.data.shift_record import RECORD, TORQUE, build_record
 from tests.estimation.likelihood.fixtures import bench
 
 
@@ -23,7 +19,7 @@ def test_an_input_without_noise_has_that_of_an_ideal_sensor(level: float) -> Non
     values = torque.values if level == 0.0 else 0.0 * torque.values + level
     exact = replace(signals, engine_torque=replace(torque, values=values, sigma=0.0))
     record = build_record(exact, (signals.shift.before[0], signals.shift.after[1]))
-    assert record.input_sigma[TORQUE] == pytest.approx(MIN_RELATIVE_NOISE * abs(values).max())
+    assert record.input_sigma[TORQUE] == pytest.approx(RECORD.min_noise * abs(values).max())
     for name, pressure in signals.pressures.items():
         assert record.input_sigma[name] == pressure.sigma
 

@@ -23,7 +23,7 @@ SHORT = 0.003
 """Distance from the age that the log has to the limit of the search [s]."""
 
 
-@pytest.mark.parametrize(("side", "word"), [(-1.0, "more"), (1.0, "less")])
+@pytest.mark.parametrize(("side", "word"), [(-1.0, "larger"), (1.0, "smaller")])
 def test_an_age_at_the_limit_of_the_search_is_not_identified(side: float, word: str) -> None:
     made = bench()
     posed, start = problem(made)

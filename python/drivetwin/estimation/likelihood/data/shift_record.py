@@ -34,17 +34,26 @@ OUTPUTS = (OUTPUT_TORQUE, "engine_speed", "output_speed", "wheel_speed")
 """Compared signals, in the order in which residuals are stacked."""
 ESSENTIAL = ("engine_speed", "output_speed")
 """Outputs without which no shift can be fitted."""
-MAX_DELAY_S = 0.06
-"""Greatest age of an engine torque value [s]: so much of the end of a log has no input."""
-GRID_STEP_S = 1e-3
-"""Step of the simulation's grid [s] where outputs are sampled more slowly."""
-MAX_GRID_GAP_S = 1.5 * GRID_STEP_S
-"""Distance of outputs' stamps [s] above which there are points of the grid between them."""
-MIN_OUTPUT_S = 0.1
-"""Time [s] that an output must cover of a shift's span to be compared there."""
-MIN_RELATIVE_NOISE = 2e-5
-"""Least noise of a compared signal as a share of its range, and of an input as a share of its
-largest value: what an ideal sensor is given. With none at all the weighting loses its digits."""
+
+
+@dataclass(frozen=True)
+class RecordSettings:
+    """Settings of the data of a shift in the likelihood."""
+
+    max_delay: float = 0.06
+    """Largest delay of the engine torque [s]; the end of a log has no input for as long."""
+    grid_step: float = 1e-3
+    """Step of the simulation grid where outputs are sampled more slowly [s]."""
+    max_grid_gap: float = 1.5 * grid_step
+    """Distance of output stamps above which grid points lie between them [s]."""
+    min_output: float = 0.1
+    """Time of a shift that an output must cover to be compared [s]."""
+    min_noise: float = 2e-5
+    """Smallest noise of a compared signal over its range, and of an input over its largest value
+    [ratio]; without noise the weighting is singular."""
+
+
+RECORD = RecordSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +230,7 @@ class ShiftRecord:
         time, sigma = self.engine_torque.time, self.input_sigma[TORQUE]
         if self.of_speeds is None:
             return np.full(time.size, sigma)
-        least = MIN_RELATIVE_NOISE * float(np.max(np.abs(self.engine_torque.values)))
+        least = RECORD.min_noise * float(np.max(np.abs(self.engine_torque.values)))
         return np.maximum(np.interp(time, self.of_speeds.time, self.of_speeds.rest), least)
 
     def compute_variance(self, name: str) -> FloatArray:
@@ -309,10 +318,10 @@ def build_record(
     }
     inputs = (signals.engine_torque, *signals.pressures.values())
     start = max(span[0], *(s.time[0] for s in inputs))
-    end = min(span[1], *(s.time[-1] for s in inputs)) - MAX_DELAY_S
+    end = min(span[1], *(s.time[-1] for s in inputs)) - RECORD.max_delay
     inside = {n: s.select_span((start, end)) for n, s in channels.items() if s is not None}
     parts = {
-        name: s for name, s in inside.items() if s.time.size and np.ptp(s.time) >= MIN_OUTPUT_S
+        name: s for name, s in inside.items() if s.time.size and np.ptp(s.time) >= RECORD.min_output
     }
     if missing := [name for name in ESSENTIAL if name not in parts]:
         raise IdentificationError(
@@ -331,7 +340,7 @@ def build_record(
             name,
             np.searchsorted(time, part.time),
             part.values,
-            max(part.sigma, MIN_RELATIVE_NOISE * float(np.ptp(part.values))),
+            max(part.sigma, RECORD.min_noise * float(np.ptp(part.values))),
         ).drop_first_period(time)
         for name, part in parts.items()
     )
@@ -370,14 +379,17 @@ def _collect_quantization(signals: ShiftSignals) -> dict[str, Quantization]:
 
 def _bound_noise(of_input: MeasuredSignal) -> float:
     """Return the noise of an input's samples, at least that of an ideal sensor."""
-    return max(of_input.sigma, MIN_RELATIVE_NOISE * float(np.max(np.abs(of_input.values))))
+    return max(of_input.sigma, RECORD.min_noise * float(np.max(np.abs(of_input.values))))
 
 
 def _fill_grid(time: FloatArray) -> FloatArray:
     """Insert grid points between output stamps that are further apart than SLOW."""
-    wide = np.flatnonzero(np.diff(time) > MAX_GRID_GAP_S)
+    wide = np.flatnonzero(np.diff(time) > RECORD.max_grid_gap)
     steps = [
-        np.arange(time[k] + GRID_STEP_S, time[k + 1] - 0.5 * GRID_STEP_S, GRID_STEP_S) for k in wide
+        np.arange(
+            time[k] + RECORD.grid_step, time[k + 1] - 0.5 * RECORD.grid_step, RECORD.grid_step
+        )
+        for k in wide
     ]
     return np.sort(np.concatenate([time, *steps]))
 
@@ -409,7 +421,7 @@ def _build_interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int,
 
 def _extend_ends(signal: MeasuredSignal) -> Signal:
     """Extend a signal by its end values over any plausible delay."""
-    beyond = 2.0 * MAX_DELAY_S
+    beyond = 2.0 * RECORD.max_delay
     time = np.concatenate([[signal.time[0] - beyond], signal.time, [signal.time[-1] + beyond]])
     values = np.concatenate([signal.values[:1], signal.values, signal.values[-1:]])
     return Signal(time, values)

@@ -15,7 +15,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.coloured_noise import (
-    BLOCK,
+    COLOURED_NOISE,
     compute_block_means,
     split_whitened,
 )
@@ -47,7 +47,11 @@ class ResidualTest:
         name, found = self.output.replace("_", " "), []
         if self.excess > MAX_EXCESS_POWER:
             code = Code.RESIDUAL_COLOURED
-            found.append(report(code, channel=name, block=Number(BLOCK, "s"), power=self.excess))
+            found.append(
+                report(
+                    code, channel=name, block=Number(COLOURED_NOISE.block, "s"), power=self.excess
+                )
+            )
         found += [
             report(
                 Code.RESIDUAL_CORRELATED, channel=name, source=source.replace("_", " "), size=size

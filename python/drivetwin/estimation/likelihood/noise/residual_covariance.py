@@ -39,9 +39,17 @@ from drivetwin.estimation.likelihood.noise.linear_response import (
 )
 from drivetwin.simulation.dual_clutch import DualClutch
 
-MIN_PROCESS_NOISE = 1e-4
-"""Process noise per step given to every state, as a share of a sensor's noise: W stays finite and
-the random walk over a log stays below what the sensors show of the state."""
+
+@dataclass(frozen=True)
+class ResidualCovarianceSettings:
+    """Settings of the covariance of the residuals."""
+
+    min_process_noise: float = 1e-4
+    """Process noise per step of every state over the noise of a sensor [ratio]: W stays finite, and
+    the random walk over a log stays below what the sensors determine."""
+
+
+RESIDUAL_COVARIANCE = ResidualCovarianceSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +198,7 @@ def _compute_process_noise(
     wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
     impedance = float(np.sqrt(model.k_o * model.J_out))
     torque = sigma.get("output_torque", impedance * sigma["output_speed"])
-    quiet = MIN_PROCESS_NOISE * np.array(
+    quiet = RESIDUAL_COVARIANCE.min_process_noise * np.array(
         [sigma["engine_speed"], sigma["output_speed"], wheel, torque / model.k_o]
     )
     noise = np.zeros((record.time.size, STATES, STATES)) + np.diag(quiet**2)

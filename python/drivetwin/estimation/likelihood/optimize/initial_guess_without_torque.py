@@ -16,7 +16,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.segments import MomentumSettings
+from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import (
     PLAUSIBLE_ETA,
     DesignData,
@@ -64,7 +64,7 @@ def estimate_without_torque(
         "J_out": max(J_out, 0.05 * J_e),
         "J_vehicle": J_vehicle,
         "Tv_over_if": load,
-        "te_delay": MomentumSettings().delay_prior.value,
+        "te_delay": MOMENTUM.delay_prior.value,
         "k_o": J * (rate**2 + omega**2),
         "c_o": 2.0 * rate * J,
     }
@@ -86,7 +86,7 @@ def _estimate_inertias(
     expect are their instruments.
     """
     J_e = compute_middle(design.J_prime_range)
-    shift, age = signals.shift, MomentumSettings().delay_prior.value
+    shift, age = signals.shift, MOMENTUM.delay_prior.value
     spans = ((shift.before, driveline.i_before), (shift.after, driveline.i_after))
     ratios, slopes, torques = [], [], []
     for span, gear in spans:

@@ -14,7 +14,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.linear.load_balance import AERO, SIGNIFICANT
+from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate_set import report_growth
 from drivetwin.findings import Finding
@@ -23,7 +23,7 @@ from drivetwin.findings import Finding
 def is_significant(point: ParameterVector, covariance: FloatArray) -> bool:
     """Return whether the growing part of the load is significant against its noise."""
     k = point.names.index(AERO)
-    return bool(point[AERO] > SIGNIFICANT * np.sqrt(covariance[k, k]))
+    return bool(point[AERO] > LOAD_BALANCE.significant * np.sqrt(covariance[k, k]))
 
 
 def report_aero_load(best: LikelihoodFit) -> list[Finding]:

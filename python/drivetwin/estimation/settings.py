@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""Settings of all stages of a method, as the result records them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from drivetwin.estimation.data import noise, segments, select_shifts
+from drivetwin.estimation.likelihood import coloured_noise, objective
+from drivetwin.estimation.likelihood import pipeline as likelihood
+from drivetwin.estimation.likelihood.data import input_smoothing, shift_record, slipping_elements
+from drivetwin.estimation.likelihood.effects import causes, correction, joint_step, withdrawal
+from drivetwin.estimation.likelihood.noise import residual_covariance
+from drivetwin.estimation.likelihood.optimize import (
+    initial_guess_without_torque,
+    multistart,
+    staged_start,
+)
+from drivetwin.estimation.linear import (
+    combine_shifts,
+    estimates,
+    friction_points,
+    load_balance,
+    momentum_balance,
+    ringdown,
+)
+from drivetwin.estimation.optimize import gauss_newton
+from drivetwin.estimation.result import multi_log, prior_update, verdict
+from drivetwin.estimation.result.method import Method
+
+_LINEAR = (
+    *(noise, select_shifts, segments, momentum_balance, load_balance, ringdown, friction_points),
+    *(combine_shifts, gauss_newton, estimates, verdict, prior_update),
+)
+"""Stages of the integral method, with which the likelihood method starts."""
+_LIKELIHOOD = (
+    *(likelihood, shift_record, input_smoothing, slipping_elements, initial_guess_without_torque),
+    *(staged_start, multistart, objective, residual_covariance, coloured_noise),
+    *(causes, joint_step, correction, withdrawal, multi_log),
+)
+"""Stages that the likelihood method adds."""
+
+
+def collect_settings(method: Method) -> dict[str, Any]:
+    """Collect the settings of a method by stage; the paper's method has none beside its tables.
+
+    The settings of a stage are the constants of its module whose class is named `...Settings`.
+    """
+    if method is Method.PAPER:
+        return {}
+    return {
+        name.lower(): asdict(value)
+        for stage in (_LINEAR if method is Method.INTEGRAL else _LINEAR + _LIKELIHOOD)
+        for name, value in vars(stage).items()
+        if type(value).__name__.endswith("Settings")
+    }
