@@ -29,6 +29,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy reads it: one core is m
 import numpy as np
 
 from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.formats.guarded import trust_parsers
 
 CHANNELS, BLOCK, STEP = 58, 200_000, 1e-3
 RECORD = 8 + 4 * CHANNELS
@@ -158,6 +159,7 @@ def _write_mdf(path: Path, gigabytes: float) -> None:
 
 def _read_mdf(path: Path) -> None:
     """Read channels in a window and print the largest memory of this process in bytes."""
+    trust_parsers()  # else it is a child that reads
     with open_recording(path) as recording:
         for index in WANTED:
             recording.load(index, WINDOW)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # The matrices are small: threads that wait for each other take several times as much CPU time.
@@ -15,3 +16,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("ci", settings.get_profile("default"), derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "default")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _read_in_process() -> None:
+    """Read binary logs in this process; the guard of hostile files has tests of its own."""
+    from drivetwin.logs.formats.guarded import trust_parsers
+
+    trust_parsers()

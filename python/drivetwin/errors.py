@@ -59,6 +59,10 @@ class FileFormatError(InputError):
     """The file is empty, binary where text is expected, cut, or not of the format it claims."""
 
 
+class ReaderFailureError(FileFormatError):
+    """The library that reads a format crashes on a file, hangs, or takes too much memory."""
+
+
 class MissingChannelError(InputError):
     """A quantity that is needed has no channel in the log, or more than one candidate."""
 

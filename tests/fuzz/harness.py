@@ -20,6 +20,8 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from drivetwin.logs.formats.guarded import trust_parsers
+
 LONGEST = 10.0
 """Seconds of CPU time for one case."""
 
@@ -85,6 +87,7 @@ def _follow(here: Connection, worker: multiprocessing.Process, tally: Tally, see
 
 def _work(there: Connection, prepare: Prepare, first: int, end: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
+        trust_parsers()  # this process is itself guarded, and a crash is what is looked for
         outcome = prepare(Path(folder))
         before = _memory()
         background: list[str] = []

@@ -9,12 +9,11 @@ import pytest
 
 from drivetwin.channels.mapping import ChannelSpec
 from drivetwin.errors import InputError
+from drivetwin.logs.formats.parser_limits import BASE_TIME
 from drivetwin.workbench.jobs import call
 from drivetwin.workbench.sandboxed_parse import (
-    LONGEST,
     Opened,
     Request,
-    compute_time_limit,
     open_gearbox,
     open_log,
 )
@@ -24,7 +23,7 @@ from tests.workbench.conftest import CARD, LOG
 
 def _open(place: Path, scratch: Path, **changes: object) -> Opened:
     request = Request(place / LOG, LOG, place / CARD, CARD, **changes)  # type: ignore[arg-type]
-    found: Opened = call(open_log, request, scratch / "mapping.toml", limit=LONGEST)
+    found: Opened = call(open_log, request, scratch / "mapping.toml", limit=BASE_TIME)
     return found
 
 
@@ -77,7 +76,7 @@ def test_a_file_that_expands_beyond_memory_is_refused(
     path.write_bytes(bomb())  # type: ignore[operator]
     request = Request(path, "bomb.mat", place / CARD, CARD)
     with pytest.raises(InputError) as caught:
-        call(open_log, request, tmp_path / "mapping.toml", limit=LONGEST)
+        call(open_log, request, tmp_path / "mapping.toml", limit=BASE_TIME)
     assert str(caught.value)
 
 
@@ -85,7 +84,7 @@ def test_a_gearbox_card_is_named_by_its_label(tmp_path: Path) -> None:
     path = tmp_path / "a1b2c3"
     path.write_text("name = 3\n")
     with pytest.raises(InputError) as caught:
-        call(open_gearbox, path, "box.toml", limit=LONGEST)
+        call(open_gearbox, path, "box.toml", limit=BASE_TIME)
     assert "box.toml" in str(caught.value)
     assert "a1b2c3" not in str(caught.value)
 
@@ -98,14 +97,6 @@ def test_faults_of_an_upload_call_it_by_its_label(place: Path, tmp_path: Path) -
         (Request(path, "log.csv", place / CARD, CARD), "log.csv"),
     ):
         with pytest.raises(InputError) as caught:
-            call(open_log, request, tmp_path / "mapping.toml", limit=LONGEST)
+            call(open_log, request, tmp_path / "mapping.toml", limit=BASE_TIME)
         assert label in str(caught.value)
         assert "a1b2c3" not in str(caught.value)
-
-
-def test_a_long_log_gets_more_time_within_bounds(tmp_path: Path) -> None:
-    log = tmp_path / "log.csv"
-    for size, limit in ((1000, LONGEST + 0.002), (160_000_000, LONGEST + 320.0), (10**9, 600.0)):
-        with log.open("wb") as file:
-            file.truncate(size)
-        assert compute_time_limit(log) == pytest.approx(limit)

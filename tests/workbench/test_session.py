@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.result.method import Method
-from drivetwin.workbench import sandboxed_parse
+from drivetwin.logs.formats import parser_limits
 from drivetwin.workbench.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
 from drivetwin.workbench.phases import Boundary, get_boundary_times
@@ -74,7 +74,7 @@ def test_why_an_identification_ended_early_is_kept_until_the_next(session: Sessi
 def test_a_log_is_given_up_after_the_time_for_its_size(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sandboxed_parse, "PER_BYTE", -1.0)
+    monkeypatch.setattr(parser_limits, "TIME_PER_BYTE", -1.0)
     with pytest.raises(InputError, match="was stopped"):
         _open(session)
 

@@ -9,7 +9,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::network::{ModeKey, Network};
 use drivetwin_core::simulate::{
-    Keep, Plan, dual_clutch_batch, dual_clutch_outputs, dual_clutch_sensitivities,
+    Keep, Plan, RunOptions, Sampled, dual_clutch_batch, dual_clutch_outputs,
+    dual_clutch_sensitivities,
 };
 use drivetwin_core::solver::{Settings, Signal, SolverCache};
 use std::hint::black_box;
@@ -42,7 +43,7 @@ fn kernels(criterion: &mut Criterion) {
         ("B3", Signal::samples(&time, &on)),
     ];
     let outputs = dual_clutch_outputs(&model);
-    let options = (Settings::default(), false);
+    let options = RunOptions { settings: Settings::default(), audit: false };
     let plan = Plan::new(&network, &signals, &time, &outputs[4..5], options).expect("a plan");
     let begin = second_gear();
     let state = begin.state(&network).expect("a start");
@@ -63,7 +64,7 @@ fn kernels(criterion: &mut Criterion) {
         b.iter(|| plan.run_again(&mut known, black_box(&state)));
     });
     let sampled = [("engine torque", &torque), ("B2", &off), ("B3", &on)]
-        .map(|(n, v)| (n, &time[..], &v[..], 0.0));
+        .map(|(name, values)| Sampled { name, times: &time, values, delay: 0.0 });
     let names = ["eta", "J1", "k_o", "B3.P0", "B3.mu_c", "B3.mu_s", "start.twist", "delay.B3"];
     criterion.bench_function("8 derivatives", |b| {
         let (settings, time) = (Settings::default(), &time);

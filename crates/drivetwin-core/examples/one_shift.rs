@@ -6,7 +6,7 @@
 
 use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::network::Network;
-use drivetwin_core::simulate::{Output, Plan, Start};
+use drivetwin_core::simulate::{Output, Plan, RunOptions, Start};
 use drivetwin_core::solver::{Settings, Signal, SolverCache};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -50,7 +50,7 @@ fn main() {
     let driveline = Driveline { elements: scenario.elements };
     let prepare = || {
         let network = Network::compile(&driveline).expect("a driveline");
-        let options = (Settings::default(), false);
+        let options = RunOptions { settings: Settings::default(), audit: false };
         let plan = Plan::new(&network, &signals, &scenario.time, &scenario.outputs, options);
         let state = start.state(&network).expect("a start");
         (network, plan.expect("a scenario"), state)

@@ -19,7 +19,7 @@ use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::torque_map::TorqueMap;
 use drivetwin_core::network::{CompileError, Network};
 use drivetwin_core::number::{Dual, Number as _};
-use drivetwin_core::simulate::{Output, Start, run};
+use drivetwin_core::simulate::{Output, RunOptions, Start, run};
 use drivetwin_core::solver::{Settings, Signal, Status};
 use std::marker::PhantomData;
 
@@ -50,7 +50,7 @@ fn rolling_resistance_stops_a_wheel_and_holds_it() {
 fn without_inputs_fine_samples_are_passed_up_to_rest_and_at_rest() {
     let network = compile(vec![inertia("wheel", 2.0), load("wheel", 3.0, 10.0, 0.0)]);
     let start = start(&[("wheel", 6.5)], &[]);
-    let how = (Settings::default(), false);
+    let how = RunOptions { settings: Settings::default(), audit: false };
     let run = simulate_by(how, &network, &[], &start, &grid(2.0, 2001), &[speed("wheel")]);
     assert_eq!(run.status, Status::Completed);
     assert!((run.events[0].time - 1.0).abs() < 1e-12);
@@ -248,7 +248,7 @@ fn a_sine_without_amplitude_is_differentiated_by_it() {
     };
     let begin =
         Start { speeds: vec![("a".into(), Number::of(10.0))], twists: vec![], locked: vec![] };
-    let options = (Settings::default(), false);
+    let options = RunOptions { settings: Settings::default(), audit: false };
     let run = run(&network, &[("T", signal)], &begin, &grid(1.0, 41), &[speed("a")], options);
     let run = run.expect("a scenario");
     let omega = 2.0 * std::f64::consts::PI * f;
@@ -273,7 +273,7 @@ fn stiction_is_found_at_the_end_of_one_long_step() {
         for settings in [Settings::default(), Settings::exact()] {
             let start = start(&[("rotor", from)], &[]);
             let (pressure, span) = (constant("P B", capacity, end), [0.0, end]);
-            let how = (settings, false);
+            let how = RunOptions { settings, audit: false };
             let run = simulate_by(how, &network, &[pressure], &start, &span, &[speed("rotor")]);
             let error = run.columns[0][1] - v_s * u.ln();
             assert!(error.abs() < 1e-6, "{error} rad/s from {distance} Stribeck speeds");

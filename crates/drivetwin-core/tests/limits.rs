@@ -11,7 +11,7 @@ use common::{
 use drivetwin_core::model::elements::{Clutch, Element, Gear, GearLoss};
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::{FrictionLaw, Stribeck};
-use drivetwin_core::simulate::Output;
+use drivetwin_core::simulate::{Output, RunOptions};
 use drivetwin_core::solver::{Settings, Status};
 
 fn friction_torque(name: &str) -> Output {
@@ -71,7 +71,7 @@ fn of_equal_clutches_in_series_one_slips_and_the_other_holds_at_its_capacity() {
         let signals = [constant("T", 90.0, 1.0), first, second];
         let rest = start(&[("a", 0.0), ("b", 0.0)], &[]);
         for settings in [Settings::default(), Settings::exact()] {
-            let (times, options) = (grid(0.5, 51), (settings, false));
+            let (times, options) = (grid(0.5, 51), RunOptions { settings, audit: false });
             let run = simulate_by(options, &network, &signals, &rest, &times, &[speed("b")]);
             assert_eq!(run.status, Status::Completed);
             assert_eq!(run.columns[0][50] > 0.1, also_slips, "{} rad/s", run.columns[0][50]);
@@ -101,7 +101,14 @@ fn what_breaks_away_one_after_the_other_at_one_instant_goes_on_slipping() {
     let coasting = start(&[("a", 0.1), ("b", 0.1), ("c", 0.1)], &["first", "second"]);
     for settings in [Settings::default(), Settings::exact()] {
         let (times, outputs) = (grid(0.5, 51), ["a", "b", "c"].map(speed));
-        let run = simulate_by((settings, false), &network, &signals, &coasting, &times, &outputs);
+        let run = simulate_by(
+            RunOptions { settings, audit: false },
+            &network,
+            &signals,
+            &coasting,
+            &times,
+            &outputs,
+        );
         assert_eq!(run.status, Status::Completed);
         let [a, b, c] = [0, 1, 2].map(|column: usize| run.columns[column][50]);
         assert!(a < b && b < c && c < 0.0, "{a} {b} {c}");
@@ -122,7 +129,14 @@ fn what_creeps_towards_the_torque_that_friction_holds_comes_to_rest() {
             for settings in [Settings::default(), Settings::exact()] {
                 let times = grid(300.0, points);
                 let outputs = [Output::Twist("shaft b ground".into())];
-                let run = simulate_by((settings, false), &network, &[], &drawn, &times, &outputs);
+                let run = simulate_by(
+                    RunOptions { settings, audit: false },
+                    &network,
+                    &[],
+                    &drawn,
+                    &times,
+                    &outputs,
+                );
                 assert_eq!(run.status, Status::Completed);
                 let left = run.columns[0][points - 1] - 0.1;
                 assert!(left.abs() < 1e-9, "{left} rad");
@@ -203,7 +217,7 @@ fn of_two_drags_that_no_efficiency_tells_apart_the_larger_counts_either_way() {
             for (drive, rest) in [(10.0, 3.0), (0.0, -2.0), (-10.0, -7.0), (1.0, -1.5)] {
                 let signals = [constant("T", drive, 1.0)];
                 let (from, times) = (start(&[("a", 50.0), ("b", 50.0)], &[]), grid(1.0, 11));
-                let how = (settings, false);
+                let how = RunOptions { settings, audit: false };
                 let run = simulate_by(how, &network, &signals, &from, &times, &[speed("b")]);
                 assert_eq!(run.status, Status::Completed);
                 assert!((run.columns[0][10] - 50.0 - rest).abs() < 1e-9, "{:?}", run.columns[0]);

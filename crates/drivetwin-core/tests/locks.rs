@@ -8,7 +8,7 @@ use common::{
 };
 use drivetwin_core::model::elements::{Clutch, Element, Gear, GearLoss, OneWayClutch};
 use drivetwin_core::model::mechanism::LossLaw;
-use drivetwin_core::simulate::Output;
+use drivetwin_core::simulate::{Output, RunOptions};
 use drivetwin_core::solver::{EventKind, Settings, Status};
 
 fn friction_torque(name: &str) -> Output {
@@ -226,7 +226,7 @@ fn capacities_that_pass_through_nothing_together_leave_the_lock_as_it_is() {
     // The lock passes on 1.559 / 2.12 of the slipping torque, at most 0.84 of what it can hold.
     let start = start(&[("a", -38.5), ("b", 0.0), ("c", 0.0)], &[]);
     let slip = [Output::Slip("held".into())];
-    let how = (Settings::default(), false);
+    let how = RunOptions { settings: Settings::default(), audit: false };
     let run = simulate_by(how, &network, &signals, &start, &grid(1.0, 501), &slip);
     assert_eq!(run.status, Status::Completed);
     assert!(run.events.iter().all(|e| e.kind != EventKind::BreakAway), "{:?}", run.events);
@@ -292,7 +292,7 @@ fn a_load_that_ends_at_nothing_is_vented_there() {
         let signals = [constant("T", 1.0, 1.0), pressure];
         let start = start(&[("shaft", 20.0)], &[]);
         for settings in [Settings::default(), Settings::exact()] {
-            let how = (settings, false);
+            let how = RunOptions { settings, audit: false };
             let run = simulate_by(how, &network, &signals, &start, &time, &[speed("shaft")]);
             let kinds: Vec<_> = run.events.iter().map(|event| event.kind).collect();
             assert_eq!(
@@ -358,7 +358,7 @@ fn a_freewheel_that_hardly_lets_go_leaves_its_torque_to_the_clutch_beside_it() {
     let outputs = [Output::Slip("C".into()), friction_torque("F")];
     for settings in [Settings::default(), Settings::exact()] {
         let signals = [constant("P C", 500.0, 4.0)];
-        let how = (settings, false);
+        let how = RunOptions { settings, audit: false };
         let run = simulate_by(how, &network, &signals, &start, &grid(4.0, 4001), &outputs);
         assert_eq!(run.status, Status::Completed, "{settings:?}");
         assert!(run.columns[0].iter().all(|slip| slip.abs() < 1e-9));
@@ -396,7 +396,7 @@ fn what_swings_through_a_lossy_gear_comes_to_rest() {
         let start = start(&[("a", between(8, -50.0, 50.0)), ("f", between(9, -50.0, 50.0))], &[]);
         for settings in [Settings::default(), Settings::exact()] {
             let run = simulate_by(
-                (settings, false),
+                RunOptions { settings, audit: false },
                 &network,
                 &[],
                 &start,
@@ -433,7 +433,10 @@ fn a_start_locks_as_a_clutch_that_is_strong_beyond_measure_does() {
         ]);
         let begun = |locked: &[&str]| {
             let start = start(&[("input", from), ("output", 50.0)], locked);
-            let (strong, how) = ([constant("P C", 1e13, 1.0)], (Settings::exact(), false));
+            let (strong, how) = (
+                [constant("P C", 1e13, 1.0)],
+                RunOptions { settings: Settings::exact(), audit: false },
+            );
             simulate_by(how, &network, &strong, &start, &grid(1.0, 2), &outputs)
         };
         let (locked, slipping) = (begun(&["C"]), begun(&[]));

@@ -8,7 +8,7 @@ use common::{clutch, compile, inertia, shaft, start, torque};
 use drivetwin_core::model::elements::{Clutch, Element, OneWayClutch};
 use drivetwin_core::model::{FrictionLaw, Stribeck};
 use drivetwin_core::network::Network;
-use drivetwin_core::simulate::{Output, Start, Trajectory, run};
+use drivetwin_core::simulate::{Output, RunOptions, Start, Trajectory, run};
 use drivetwin_core::solver::{EventKind, Settings, Signal, Status};
 
 type Column = (&'static str, Vec<f64>);
@@ -24,7 +24,9 @@ fn both(
         let signals: Vec<(&str, Signal<'_, f64>)> =
             columns.iter().map(|(name, values)| (*name, Signal::samples(time, values))).collect();
         let outputs = std::slice::from_ref(output);
-        let run = run(network, &signals, start, time, outputs, (settings, false)).unwrap();
+        let run =
+            run(network, &signals, start, time, outputs, RunOptions { settings, audit: false })
+                .unwrap();
         assert_eq!(run.status, Status::Completed);
         run
     })
@@ -253,7 +255,8 @@ fn outputs_between_late_samples_are_those_of_the_exact_motion() {
     let begin = start(&[("a", 80.0), ("b", 50.0)], &[]);
     let outputs = [Output::Speed("a".into())];
     let runs = [Settings::default(), Settings::exact()].map(|settings| {
-        run(&network, &signals, &begin, &grid, &outputs, (settings, false)).unwrap()
+        run(&network, &signals, &begin, &grid, &outputs, RunOptions { settings, audit: false })
+            .unwrap()
     });
     assert!(runs.iter().all(|run| run.time == grid && run.status == Status::Completed));
     assert_eq!(kinds(&runs[0]), [EventKind::Lock]);

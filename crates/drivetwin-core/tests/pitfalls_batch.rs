@@ -8,9 +8,9 @@ use common::{compile, inertia, paper_driveline, second_gear, shaft, start, torqu
 use drivetwin_core::model::dual_clutch::DualClutch;
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::network::Network;
-use drivetwin_core::number::{Lane, Pack};
+use drivetwin_core::number::{KernelFloat, SimdVector};
 use drivetwin_core::simulate::{
-    Batch, Keep, Outcome, Output, Plan, dual_clutch_batch, dual_clutch_outputs, run,
+    Batch, Keep, Outcome, Output, Plan, RunOptions, dual_clutch_batch, dual_clutch_outputs, run,
 };
 use drivetwin_core::solver::{LANES, Settings, Signal, Status};
 use proptest::prelude::*;
@@ -53,7 +53,8 @@ fn shifts_of(names: &[&str], sets: &[f64], settings: Settings) -> Kept {
         columns.iter().map(|(name, t, v)| (*name, Signal::samples(t, v))).collect();
     let outputs = &dual_clutch_outputs(&model)[4..5];
     let grid = &columns[0].1;
-    let plan = Plan::new(&network, &signals, grid, outputs, (settings, false)).expect("a plan");
+    let plan = Plan::new(&network, &signals, grid, outputs, RunOptions { settings, audit: false })
+        .expect("a plan");
     columns_of(&model, plan, names, sets, grid.len())
 }
 
@@ -73,13 +74,13 @@ proptest! {
         a in prop::array::uniform8(-5.0..5.0_f64),
         b in prop::array::uniform8(-5.0..5.0_f64),
     ) {
-        prop_assert_eq!(size_of::<Pack<LANES>>(), LANES * size_of::<f64>());
-        let (x, y) = (Pack::<LANES>(a), Pack::<LANES>(b));
-        let lanes = (x.fma::<true>(y, x) - y).exponential::<true>().grown::<true>(y);
+        prop_assert_eq!(size_of::<SimdVector<LANES>>(), LANES * size_of::<f64>());
+        let (x, y) = (SimdVector::<LANES>(a), SimdVector::<LANES>(b));
+        let lanes = (x.fma::<true>(y, x) - y).exponential::<true>().times_small_exp::<true>(y);
         let lanes = lanes.replace_where(0b0110, x);
         for i in 0..LANES {
             let alone = (a[i].fma::<true>(b[i], a[i]) - b[i]).exponential::<true>();
-            let alone = alone.grown::<true>(b[i]).replace_where(0b0110 >> i, a[i]);
+            let alone = alone.times_small_exp::<true>(b[i]).replace_where(0b0110 >> i, a[i]);
             prop_assert_eq!(lanes.0[i].to_bits(), alone.to_bits());
         }
     }
@@ -96,7 +97,9 @@ fn ten_thousand_samples_keep_double_precision() {
         let signals = [("T", Signal::samples(&time, &pull))];
         let begin = start(&[("a", 100.0), ("b", 100.0)], &[]);
         let outputs = [Output::Speed("a".into())];
-        let run = run(&network, &signals, &begin, &time, &outputs, (settings, false)).unwrap();
+        let run =
+            run(&network, &signals, &begin, &time, &outputs, RunOptions { settings, audit: false })
+                .unwrap();
         assert_eq!((run.status, run.events.len()), (Status::Completed, 0));
         run.columns[0].clone()
     });
@@ -193,7 +196,8 @@ fn jumps_between_samples_are_met_together_and_alone() {
     let outputs = &dual_clutch_outputs(&model)[4..5];
     let run = |settings, eta: &[f64]| {
         let plan =
-            Plan::new(&network, &signals, &grid, outputs, (settings, false)).expect("a plan");
+            Plan::new(&network, &signals, &grid, outputs, RunOptions { settings, audit: false })
+                .expect("a plan");
         columns_of(&model, plan, &["eta"], eta, grid.len())
     };
     let eta = efficiencies(LANES);
@@ -224,7 +228,13 @@ fn a_coarse_grid_is_met_at_its_points() {
     let outputs = &dual_clutch_outputs(&model)[3..5];
     let run = |every: usize| {
         let grid: Vec<f64> = columns[0].1.iter().copied().step_by(every).collect();
-        let plan = Plan::new(&network, &signals, &grid, outputs, (Settings::default(), false));
+        let plan = Plan::new(
+            &network,
+            &signals,
+            &grid,
+            outputs,
+            RunOptions { settings: Settings::default(), audit: false },
+        );
         let (plan, size) = (plan.expect("a plan"), outputs.len() * grid.len());
         let batch = columns_of(&model, plan, &["eta"], &efficiencies(LANES), size);
         (batch.values, grid.len())

@@ -13,7 +13,7 @@ use drivetwin_core::model::elements::{
 };
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::{FrictionLaw, Name, Stribeck};
-use drivetwin_core::simulate::{Output, Start, Trajectory, run};
+use drivetwin_core::simulate::{Output, RunOptions, Start, Trajectory, run};
 use drivetwin_core::solver::{EventKind, Settings, Signal, Status};
 use proptest::prelude::*;
 
@@ -222,7 +222,7 @@ fn renamed(mut element: Element<f64>, name: Name) -> Element<f64> {
 fn simulate(
     case: &Case,
     points: usize,
-    (settings, audit): (Settings, bool),
+    RunOptions { settings, audit }: RunOptions,
 ) -> Option<Trajectory<f64>> {
     let network = compile_or_refuse(elements(case))?;
     let times: Vec<f64> = (0..5).map(|i| SECONDS * i as f64 / 4.0).collect();
@@ -242,7 +242,7 @@ fn simulate(
         ..Start::default()
     };
     let grid = common::grid(SECONDS, points);
-    run(&network, &signals, &start, &grid, &outputs, (settings, audit)).ok()
+    run(&network, &signals, &start, &grid, &outputs, RunOptions { settings, audit }).ok()
 }
 
 fn interpolated(values: &[f64], t: f64) -> f64 {
@@ -288,14 +288,14 @@ proptest! {
 
     #[test]
     fn every_run_ends_and_obeys_the_friction_laws(case in case()) {
-        if let Some(trajectory) = simulate(&case, SAMPLES, (Settings::default(), true)) {
+        if let Some(trajectory) = simulate(&case, SAMPLES, RunOptions { settings: Settings::default(), audit: true }) {
             check(&case, &trajectory);
         }
     }
 
     #[test]
     fn passing_samples_by_operators_changes_a_run_but_little(case in case()) {
-        let run = |settings| simulate(&case, FINE_SAMPLES, (settings, false));
+        let run = |settings| simulate(&case, FINE_SAMPLES, RunOptions { settings, audit: false });
         let both = run(Settings::default()).zip(run(Settings::exact()));
         let completed = |run: &Trajectory<f64>| run.status == Status::Completed;
         let Some((fast, exact)) = both.filter(|(a, b)| completed(a) && completed(b)) else {
@@ -313,7 +313,7 @@ proptest! {
     #[test]
     fn what_happens_at_one_instant_is_decided_and_not_again_and_again(case in case_by_hand()) {
         for settings in [Settings::default(), Settings::exact()] {
-            if let Some(trajectory) = simulate(&case, SAMPLES, (settings, true)) {
+            if let Some(trajectory) = simulate(&case, SAMPLES, RunOptions { settings, audit: true }) {
                 prop_assert_eq!(&trajectory.status, &Status::Completed);
                 check(&case, &trajectory);
             }

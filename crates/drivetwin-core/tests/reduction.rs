@@ -6,7 +6,7 @@ mod common;
 use common::{clutch, gear};
 use drivetwin_core::model::elements::{Clutch, Element, Inertia, Planetary};
 use drivetwin_core::model::{Driveline, Mechanism};
-use drivetwin_core::network::engaged::EngagedError;
+use drivetwin_core::network::mobility::EngagedError;
 use drivetwin_core::network::reduction::{Exchange, Reduction, ReductionError};
 use drivetwin_core::network::statics::Statics;
 use drivetwin_core::number::Dual;
@@ -199,7 +199,7 @@ fn wrong_names_and_wrong_counts_are_refused_by_name() {
     let repeated = Statics::solve(&m, &all, "input", "output").unwrap_err();
     assert!(matches!(repeated, EngagedError::Dependent { .. }), "{repeated}");
     let held = Statics::solve(&m, &names(&["C4", "C5"]), "main", "output").unwrap_err();
-    assert!(matches!(held, EngagedError::Held { .. }), "{held}");
+    assert!(matches!(held, EngagedError::NotFree { .. }), "{held}");
 }
 
 /// Two input shafts, each with one synchronised gear on the output.

@@ -8,7 +8,7 @@ use drivetwin_core::model::DualClutch;
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::number::Dual;
 use drivetwin_core::number::Real;
-use drivetwin_core::simulate::{DualClutchRun, simulate_dual_clutch};
+use drivetwin_core::simulate::{DualClutchRun, RunOptions, simulate_dual_clutch};
 use drivetwin_core::solver::{EventKind, Settings, Signal, Status};
 
 const SHAFT_TORQUE: usize = 4;
@@ -18,7 +18,14 @@ fn shift<T: Real>(model: &DualClutch<T>, weak: f64, settings: Settings) -> DualC
     let borrowed: Vec<(&str, Signal<'_, T>)> =
         signals.iter().map(|s| (s.0, Signal::samples(&s.1, &s.2))).collect();
     let grid = signals[0].1.clone();
-    simulate_dual_clutch(model, &borrowed, &second_gear(), &grid, (settings, true)).unwrap()
+    simulate_dual_clutch(
+        model,
+        &borrowed,
+        &second_gear(),
+        &grid,
+        RunOptions { settings, audit: true },
+    )
+    .unwrap()
 }
 
 #[test]
@@ -141,5 +148,12 @@ fn unaudited(model: &DualClutch<f64>, settings: Settings) -> DualClutchRun<f64> 
     let signals = upshift(1.0);
     let inputs: Vec<(&str, Signal<'_, f64>)> =
         signals.iter().map(|s| (s.0, Signal::samples(&s.1, &s.2))).collect();
-    simulate_dual_clutch(model, &inputs, &second_gear(), &signals[0].1, (settings, false)).unwrap()
+    simulate_dual_clutch(
+        model,
+        &inputs,
+        &second_gear(),
+        &signals[0].1,
+        RunOptions { settings, audit: false },
+    )
+    .unwrap()
 }

@@ -4,7 +4,8 @@
 use crate::dual_clutch::{Delayed, Start, model_of, start_of};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{
-    Batch, Keep, Outcome, Output, Plan, Sampled, dual_clutch_batch, dual_clutch_batch_sensitivities,
+    Batch, Keep, Outcome, Output, ParameterSets, Plan, Recording, RunOptions, Sampled,
+    dual_clutch_batch, dual_clutch_batch_sensitivities,
 };
 use drivetwin_core::solver::{Settings, Signal, Status};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
@@ -47,9 +48,17 @@ pub fn simulate_batch<'py>(
     for (signals, start) in &scenarios {
         let signals: Vec<_> = sampled(signals)?
             .into_iter()
-            .map(|(name, times, values, delay)| (name, Signal::Samples { times, values, delay }))
+            .map(|Sampled { name, times, values, delay }| {
+                (name, Signal::Samples { times, values, delay })
+            })
             .collect();
-        let plan = Plan::new(&network, &signals, grid, &outputs, (Settings::default(), false));
+        let plan = Plan::new(
+            &network,
+            &signals,
+            grid,
+            &outputs,
+            RunOptions { settings: Settings::default(), audit: false },
+        );
         plans.push((plan.map_err(|e| refused(&e))?, start_of(start.clone())));
     }
     let (names, sets) = (names_of(&sets.0), sets.1.as_slice()?);
@@ -83,9 +92,12 @@ pub fn batch_sensitivities<'py>(
     let (names, sets) = (names_of(&sets.0), sets.1.as_slice()?);
     let measured = rows_of(&wanted.0);
     let keep = keep_of(&wanted.1, &measured)?;
-    let (sets, grid, how) = ((&names[..], sets), (grid, &outputs[..]), (keep, threads));
+    let sets = ParameterSets { names: &names, values: sets };
+    let recording = Recording { grid, outputs: &outputs, keep };
     let (batch, derivatives) = py
-        .detach(|| dual_clutch_batch_sensitivities(&model, &scenarios, sets, grid, &by, how))
+        .detach(|| {
+            dual_clutch_batch_sensitivities(&model, &scenarios, sets, recording, &by, threads)
+        })
         .map_err(|e| refused(&e))?;
     let grazing = derivatives.grazing.iter();
     let grazing = grazing
@@ -116,7 +128,8 @@ fn sampled<'a>(signals: &'a [Delayed<'_>]) -> PyResult<Vec<Sampled<'a>>> {
     signals
         .iter()
         .map(|(name, times, values, delay)| {
-            Ok((name.as_str(), times.as_slice()?, values.as_slice()?, *delay))
+            let (times, values) = (times.as_slice()?, values.as_slice()?);
+            Ok(Sampled { name, times, values, delay: *delay })
         })
         .collect()
 }

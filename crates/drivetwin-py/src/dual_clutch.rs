@@ -4,7 +4,7 @@
 use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::DualClutch;
 use drivetwin_core::simulate::{
-    DualClutchStart, Trajectory, dual_clutch_sensitivities, run_dual_clutch,
+    DualClutchStart, RunOptions, Sampled, Trajectory, dual_clutch_sensitivities, run_dual_clutch,
 };
 use drivetwin_core::solver::{Settings, Signal};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
@@ -43,7 +43,7 @@ pub fn simulate<'py>(
     let (tolerance, max_step, order, sprint, audit) = options;
     let settings = Settings { tolerance, max_step, order, exponential_steps: sprint };
     let run = py
-        .detach(|| run_dual_clutch(&model, &signals, &start, grid, (settings, audit)))
+        .detach(|| run_dual_clutch(&model, &signals, &start, grid, RunOptions { settings, audit }))
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let columns = PyArray2::from_vec2(py, &run.columns)?;
     let events = events_of(&run);
@@ -77,7 +77,8 @@ pub fn sensitivities<'py>(
     let signals = signals
         .iter()
         .map(|(name, times, values, delay)| {
-            Ok((name.as_str(), times.as_slice()?, values.as_slice()?, *delay))
+            let (times, values) = (times.as_slice()?, values.as_slice()?);
+            Ok(Sampled { name, times, values, delay: *delay })
         })
         .collect::<PyResult<Vec<_>>>()?;
     let start = start_of(start);

@@ -4,7 +4,7 @@
 use crate::plain::{Audit, Event, as_tuple, events_of};
 use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::network::Network;
-use drivetwin_core::simulate::{Output, Start, run_network};
+use drivetwin_core::simulate::{Output, RunOptions, Start, run_network};
 use drivetwin_core::solver::{Settings, Signal};
 use numpy::{PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -55,7 +55,7 @@ pub fn simulate_network<'py>(
     let trajectory = py
         .detach(|| {
             let network = Network::compile(&driveline)?;
-            run_network(&network, &inputs, &start, grid, &outputs, (settings, audit))
+            run_network(&network, &inputs, &start, grid, &outputs, RunOptions { settings, audit })
         })
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let columns = PyArray2::from_vec2(py, &trajectory.columns)?;

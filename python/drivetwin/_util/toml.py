@@ -6,12 +6,12 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import InputError, Where
 
 
@@ -74,16 +74,6 @@ def raise_faults(faults: Iterable[Fault], error: type[InputError], file: str, re
     if found:
         listed = "".join(f"\n  - {fault}" for fault in found)
         raise error(f"{len(found)} faults{listed}", remedy, Where(file=file))
-
-
-def suggest_spelling(word: str, known: Iterable[str]) -> str:
-    """Return `; did you mean 'x'?` for the nearest of the `known` words, else what is known."""
-    words = list(known)
-    by_folded = {each.casefold(): each for each in words}
-    near = get_close_matches(word.casefold(), by_folded, n=1)
-    if near:
-        return f"; did you mean {by_folded[near[0]]!r}?"
-    return f"; known here: {', '.join(words)}" if words else ""
 
 
 def format_key_path(location: Iterable[int | str]) -> str:

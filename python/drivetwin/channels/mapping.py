@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from drivetwin._util.toml import suggest_spelling
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS

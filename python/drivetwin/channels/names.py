@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from drivetwin._util.toml import suggest_spelling
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.units import find_unit, is_time_unit, is_unit
 from drivetwin.errors import MappingError, MissingChannelError, Where

@@ -6,7 +6,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from drivetwin._util.toml import raise_faults, read_toml, suggest_spelling, validate_schema
+from drivetwin._util.spelling import suggest_spelling
+from drivetwin._util.toml import raise_faults, read_toml, validate_schema
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schema import PowertrainFile
 from drivetwin.errors import CardError

@@ -13,7 +13,8 @@ import tomlkit
 from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from drivetwin._util.atomic import write_text
-from drivetwin._util.toml import Fault, raise_faults, suggest_spelling
+from drivetwin._util.spelling import suggest_spelling
+from drivetwin._util.toml import Fault, raise_faults
 from drivetwin.errors import InputError, ResultFileError
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.read import read_record

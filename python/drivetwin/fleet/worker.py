@@ -19,11 +19,13 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Any
 
+from drivetwin._util.process_limits import limit_memory
 from drivetwin._util.version import get_program_version
 from drivetwin.errors import DrivetwinError, StoreError
 from drivetwin.fleet.parts import convert_write_errors, write_part
 from drivetwin.fleet.rows import Found
 from drivetwin.fleet.task import Outcome, State, Task, make_memory_outcome
+from drivetwin.logs.formats.guarded import trust_parsers
 
 Work = Callable[[Task], Found]
 
@@ -85,23 +87,6 @@ def _make_crash_outcome(fault: Exception) -> Outcome:
     return Outcome(State.BAD, error=type(fault).__name__, what=str(fault), remedy=remedy)
 
 
-def limit_memory(memory: int) -> None:
-    """Make allocations beyond the limit [bytes] fail, if the system supports it."""
-    try:
-        import resource
-    except ImportError:
-        return
-    held = 0
-    status = Path("/proc/self/status")
-    if status.exists():
-        lines = dict(line.split(":", 1) for line in status.read_text().splitlines())
-        held = 1024 * int(lines["VmData"].split()[0])
-    wall = held + int(_ROOM * memory)
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    if hard == resource.RLIM_INFINITY or wall < hard:
-        resource.setrlimit(resource.RLIMIT_DATA, (wall, hard))
-
-
 def _read_tasks(tasks: SimpleQueue[str]) -> None:
     for line in sys.stdin:
         tasks.put(line)
@@ -116,7 +101,8 @@ def main() -> None:
     memory = int(sys.argv[2])
     work: Work = getattr(import_module(module), name)
     import_module("pyarrow.parquet")  # or the first log would pay for it
-    limit_memory(memory)
+    limit_memory(int(_ROOM * memory))
+    trust_parsers()  # the coordinator guards this process
     tasks: SimpleQueue[str] = SimpleQueue()
     threading.Thread(target=_read_tasks, args=(tasks,), daemon=True).start()
     reply: dict[str, Any] = {"ready": os.getpid()}

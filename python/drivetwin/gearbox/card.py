@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.toml import raise_faults, read_toml, suggest_spelling
+from drivetwin._util.spelling import suggest_spelling
+from drivetwin._util.toml import raise_faults, read_toml
 from drivetwin.errors import CardError
 from drivetwin.gearbox.check import find_gearbox_faults
 from drivetwin.gearbox.schema import GearboxFile

@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from drivetwin._util.toml import Fault, suggest_spelling, validate_schema
+from drivetwin._util.spelling import suggest_spelling
+from drivetwin._util.toml import Fault, validate_schema
 from drivetwin.gearbox.schema import GearboxFile
 from drivetwin.gearbox.spec import GROUND
 

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from drivetwin._util.toml import suggest_spelling
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import CardError, InputError, ReductionError
 from drivetwin.gearbox.drive import Drive
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck

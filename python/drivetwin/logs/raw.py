@@ -7,15 +7,20 @@ memory is bounded by what is selected. Text files are in memory anyway: `RawLog`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
-from drivetwin.channels.read_options import Column
+from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray, compute_gap_limit
 from drivetwin.errors import DamagedChannelError, Where
+
+MIN_SAMPLES = 10
+"""Fewer samples of a channel cannot show a shift."""
 
 Window = tuple[float, float]
 """First and last time [s] wanted of a recording."""
@@ -97,6 +102,10 @@ class Recording(Protocol):
         Raises DamagedChannelError where it holds no numbers.
         """
         ...
+
+
+Opener = Callable[[Path, ReadOptions], AbstractContextManager[Recording]]
+"""Function that opens a file of one format."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from drivetwin._util.toml import Fault, suggest_spelling, validate_schema
+from drivetwin._util.spelling import suggest_spelling
+from drivetwin._util.toml import Fault, validate_schema
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.schema import CardFile, ElementTable, GearTable
 

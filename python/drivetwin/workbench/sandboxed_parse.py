@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Files of a user are parsed here, in a child process with a bound on its memory.
+"""Parsing of a user's files in a child process with a limit on its memory.
 
-A compressed file of a few kilobytes may claim gigabytes: then the child fails, not the program.
+A file of a few kilobytes may claim gigabytes. Then the child fails, not the program.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from drivetwin._util.process_limits import limit_memory
 from drivetwin.channels.mapping import ChannelSpec, Mapped
 from drivetwin.channels.mapping_file import format_mapping, read_mapping
 from drivetwin.channels.read_options import ReadOptions
@@ -19,22 +19,12 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError, InputError
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.formats.parser_limits import compute_parser_limits
 from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Survey, survey_recording
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
-from drivetwin.workbench.decompression_limit import refuse_expansion
 from drivetwin.workbench.jobs import Emit
-
-MEMORY = 2 * 2**30
-"""Bytes that reading a file may take beyond what the libraries hold."""
-LONGEST = 60.0
-"""Time limit [s] for reading a small file."""
-PER_BYTE = 2e-6
-"""Time [s] that a log may take besides for each of its bytes: half an hour at 1 kHz, 160 MB of
-text, takes a minute on an idle machine and a multiple of it on a busy one."""
-AT_ALL = 600.0
-"""Time limit [s] for reading a file of any size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +62,9 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     `scratch` is a file of our own for the corrected mapping. Raises the errors of card and file;
     those of the mapping become `fault`, so that it can be corrected.
     """
-    limit_parser_memory()
+    limit_memory(compute_parser_limits(request.log).memory)
     labels = {request.log: request.label, request.card: request.card_label}
     with _apply_labels(labels):
-        refuse_expansion(request.log, request.label, MEMORY)
         card = replace(load_card(request.card), source=request.card_label)
         stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
         stated = replace(stated, channels={**stated.channels, **request.channels})
@@ -93,28 +82,10 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     emit(Opened(looked, card, log, found))
 
 
-def compute_time_limit(log: Path) -> float:
-    """Compute the time limit [s] for reading a log from the size of its file."""
-    size = log.stat().st_size if log.exists() else 0
-    return min(LONGEST + PER_BYTE * size, AT_ALL)
-
-
 def open_gearbox(emit: Emit, path: Path, label: str) -> None:
     """Read a gearbox card, called `label` in messages; emits it. Raises CardError."""
-    limit_parser_memory()
     with _apply_labels({path: label}):
         emit(load_gearbox(str(path)))
-
-
-def limit_parser_memory() -> None:
-    """Limit the memory of this process to `MEMORY` more than its present use, if supported."""
-    status = Path("/proc/self/statm")
-    if sys.platform == "win32" or not status.exists():
-        return
-    import resource
-
-    held = int(status.read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (held + MEMORY, held + MEMORY))
 
 
 @contextmanager

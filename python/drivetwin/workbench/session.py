@@ -20,6 +20,7 @@ from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
+from drivetwin.logs.formats.parser_limits import BASE_TIME, compute_parser_limits
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
 from drivetwin.workbench.identifying import Task, identify_all
 from drivetwin.workbench.locks import Lock
@@ -191,7 +192,7 @@ class Session:
                 raise InputError("no gearbox is named", "choose a built-in one, or name a card")
             self.gearbox = load_gearbox(card)
         else:
-            limit = sandboxed_parse.LONGEST
+            limit = BASE_TIME
             self.gearbox = jobs.call(
                 sandboxed_parse.open_gearbox, card.path, card.name, limit=limit
             )
@@ -241,7 +242,7 @@ class Session:
             sandboxed_parse.open_log,
             request,
             scratch,
-            limit=sandboxed_parse.compute_time_limit(request.log),
+            limit=compute_parser_limits(request.log).seconds,
         )
         return opened
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 //! From the stated mechanism to matrices in minimal coordinates.
 
-use super::channel::{Channel, Law};
 use super::constraints::{Coordinates, coordinates};
 use super::error::CompileError;
 use super::linalg::{Matrix, independent_rows, is_nothing, solve};
 use super::mode::{ModeKey, Motion};
+use super::nonlinear_torque::{NonlinearTorque, TorqueLaw};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
 use crate::model::{Driveline, FrictionLaw, Name};
 use crate::number::Number;
@@ -20,7 +20,7 @@ const MASSLESS: f64 = 1e-12;
 
 /// Compiled friction element.
 #[derive(Clone, Debug)]
-pub struct FrictionRow<T> {
+pub struct FrictionElement<T> {
     /// Name for messages and events.
     pub element: Name,
     /// Slip over the independent speeds.
@@ -52,7 +52,7 @@ pub struct LossyGear<T> {
 
 /// A torque that is a channel or a lagging state.
 #[derive(Clone, Debug)]
-pub struct Drive<T> {
+pub struct AppliedTorque<T> {
     /// Position of its value in the basis.
     pub basis: usize,
     /// Nodes it acts on.
@@ -63,7 +63,7 @@ pub struct Drive<T> {
 
 /// A first-order lag: `y' = (target - y) / time`.
 #[derive(Clone, Debug)]
-pub struct Lag<T> {
+pub struct FirstOrderLag<T> {
     /// Position of the target in the basis.
     pub target: usize,
     /// Time constant, s.
@@ -86,17 +86,17 @@ pub struct Network<T> {
     /// Rates of twist over the independent speeds, springs × speeds.
     pub twist_rates: Matrix<T>,
     /// Friction elements; element j is channel j.
-    pub frictions: Vec<FrictionRow<T>>,
+    pub frictions: Vec<FrictionElement<T>>,
     /// Lossy gears.
     pub losses: Vec<LossyGear<T>>,
     /// Prescribed speeds over the independent speeds, and their inputs.
     pub prescribed: Vec<(Vec<T>, usize)>,
     /// Scalar channels: frictions first.
-    pub channels: Vec<Channel<T>>,
+    pub channels: Vec<NonlinearTorque<T>>,
     /// Torques that are channels other than friction, or lagging states.
-    pub drives: Vec<Drive<T>>,
+    pub applied_torques: Vec<AppliedTorque<T>>,
     /// Lags; their states come after speeds and twists.
-    pub lags: Vec<Lag<T>>,
+    pub lags: Vec<FirstOrderLag<T>>,
     /// Node torques of everything but rigid couplings and stuck friction, over the basis: nodes ×
     /// basis.
     pub node_torques: Matrix<T>,
@@ -132,7 +132,7 @@ impl<T: Number> Network<T> {
             losses: Vec::new(),
             prescribed: Vec::new(),
             channels: Vec::new(),
-            drives: Vec::new(),
+            applied_torques: Vec::new(),
             lags: Vec::new(),
             motion: None,
         };
@@ -143,7 +143,7 @@ impl<T: Number> Network<T> {
         network.refuse_massless()?;
         network.add_rows();
         network.refuse_prescribed_twice()?;
-        network.add_drives();
+        network.add_applied_torques();
         network.node_torques = network.assemble_node_torques();
         if !network.losses.iter().any(|gear| gear.loss.is_directional()) {
             network.motion = network.motion(ModeKey::default());
@@ -279,11 +279,11 @@ impl<T: Number> Network<T> {
         for f in &self.mechanism.frictions {
             let slip = self.over_speeds(&f.row);
             let (mu, normal) = (f.law.clone(), f.normal.clone());
-            self.channels.push(Channel {
-                law: Law::Friction { mu, normal, peak: f.peak },
+            self.channels.push(NonlinearTorque {
+                law: TorqueLaw::Friction { mu, normal, peak: f.peak },
                 arguments: vec![self.over_states(&slip)],
             });
-            self.frictions.push(FrictionRow {
+            self.frictions.push(FrictionElement {
                 element: f.element.clone(),
                 slip,
                 nodes: f.row.clone(),
@@ -313,16 +313,17 @@ impl<T: Number> Network<T> {
 
     /// Torques that are no linear function of the state and inputs become channels; lags become
     /// states.
-    fn add_drives(&mut self) {
+    fn add_applied_torques(&mut self) {
         for (i, spring) in self.mechanism.springs.iter().enumerate() {
             if let SpringLaw::Regions { regions, .. } = &spring.law {
                 let mut twist = vec![T::zero_(); self.states()];
                 twist[self.speeds() + i] = T::of(1.0);
                 let arguments = vec![twist, self.over_states(self.twist_rates.row(i))];
                 let basis = self.basis();
-                self.channels.push(Channel { law: Law::Regions(regions.clone()), arguments });
+                self.channels
+                    .push(NonlinearTorque { law: TorqueLaw::Regions(regions.clone()), arguments });
                 let nodes = spring.row.iter().map(|&(node, c)| (node, -c)).collect();
-                self.drives.push(Drive { basis, nodes, account: None });
+                self.applied_torques.push(AppliedTorque { basis, nodes, account: None });
             }
         }
         for force in &self.mechanism.forces {
@@ -334,38 +335,39 @@ impl<T: Number> Network<T> {
             };
             self.channels.extend(self.channel_of(&force.law));
             if let Some(time) = force.lag {
-                self.lags.push(Lag { target: basis, time });
+                self.lags.push(FirstOrderLag { target: basis, time });
                 basis = self.first_lag() + self.lags.len() - 1;
             }
             if let ForceLaw::Constant(_) = force.law {
                 continue;
             }
             let nodes = smallvec![(force.node, T::of(1.0))];
-            self.drives.push(Drive { basis, nodes, account: Some(force.account) });
+            self.applied_torques.push(AppliedTorque { basis, nodes, account: Some(force.account) });
         }
     }
 
     /// The channel of a force law, where it needs one.
-    fn channel_of(&self, law: &ForceLaw<T>) -> Option<Channel<T>> {
+    fn channel_of(&self, law: &ForceLaw<T>) -> Option<NonlinearTorque<T>> {
         let over = |node| self.over_states(&self.node_speed(node));
         Some(match law {
             ForceLaw::Input(_) | ForceLaw::Constant(_) => return None,
-            ForceLaw::Quadratic { coefficient, node } => {
-                Channel { law: Law::Quadratic(*coefficient), arguments: vec![over(*node)] }
-            }
-            ForceLaw::Map { input, node, map } => Channel {
-                law: Law::Map { input: *input, map: map.clone() },
+            ForceLaw::Quadratic { coefficient, node } => NonlinearTorque {
+                law: TorqueLaw::Quadratic(*coefficient),
                 arguments: vec![over(*node)],
             },
-            ForceLaw::Converter { pump, turbine, map, at_turbine } => Channel {
-                law: Law::Converter { map: map.clone(), at_turbine: *at_turbine },
+            ForceLaw::Map { input, node, map } => NonlinearTorque {
+                law: TorqueLaw::Map { input: *input, map: map.clone() },
+                arguments: vec![over(*node)],
+            },
+            ForceLaw::Converter { pump, turbine, map, at_turbine } => NonlinearTorque {
+                law: TorqueLaw::Converter { map: map.clone(), at_turbine: *at_turbine },
                 arguments: vec![over(*pump), over(*turbine)],
             },
             ForceLaw::Slip { wheel, road, stiffness, least_speed } => {
                 let (wheel, road) = (over(*wheel), over(*road));
                 let slip = wheel.iter().zip(&road).map(|(&w, &r)| w - r).collect();
-                let law = Law::Slip { stiffness: *stiffness, least_speed: *least_speed };
-                Channel { law, arguments: vec![slip, road] }
+                let law = TorqueLaw::Slip { stiffness: *stiffness, least_speed: *least_speed };
+                NonlinearTorque { law, arguments: vec![slip, road] }
             }
         })
     }
@@ -392,7 +394,7 @@ impl<T: Number> Network<T> {
                 f[(force.node, self.one())] += torque;
             }
         }
-        for drive in &self.drives {
+        for drive in &self.applied_torques {
             for &(node, direction) in &drive.nodes {
                 f[(node, drive.basis)] += direction;
             }

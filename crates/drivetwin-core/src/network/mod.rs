@@ -11,23 +11,21 @@
 //! with inputs u and scalar channels φ: the torque of every slipping friction element and of every
 //! force law that is not linear.
 
-pub mod cell;
-pub mod channel;
 mod compile;
+mod constraint_forces;
 mod constraints;
-pub mod engaged;
 mod error;
-mod hold;
 pub mod linalg;
+pub mod mobility;
 mod mode;
-mod radius;
+pub mod nonlinear_torque;
 pub mod reduction;
-pub mod smooth;
+pub mod smooth_law;
+mod spectral_radius;
 pub mod statics;
 
-pub use cell::Cell;
-pub use channel::Channel;
-pub use compile::{FrictionRow, LossyGear, Network};
+pub use compile::{FrictionElement, LossyGear, Network};
+pub(crate) use constraint_forces::ConstraintSolver;
 pub use error::CompileError;
-pub(crate) use hold::Hold;
-pub use mode::{GearBounds, GearState, Mode, ModeKey, Row};
+pub use mode::{GearBounds, GearState, Mode, ModeKey, RowId};
+pub use nonlinear_torque::{Branch, NonlinearTorque};

@@ -3,10 +3,10 @@
 //! stuck, their torques, and the torques through lossy gears.
 
 use super::compile::Network;
+use super::constraint_forces::{ConstraintForces, ConstraintSolver};
 use super::constraints::{constraint_matrix, force_map};
-use super::hold::{Held, Hold};
 use super::linalg::{Matrix, SparseRows, is_nothing, is_zero, solve};
-use super::radius::radius;
+use super::spectral_radius::spectral_radius_bound;
 use crate::model::mechanism::{self, Loss, LossLaw};
 use crate::number::{Number, Values};
 use std::borrow::Cow;
@@ -26,9 +26,9 @@ pub enum GearState {
     Locked,
 }
 
-/// Something that keeps a speed at zero: friction element or lossy gear, by index.
+/// Row that can keep a speed at zero: friction element or lossy gear, by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Row {
+pub enum RowId {
     /// Friction element.
     Friction(usize),
     /// Lossy gear.
@@ -39,7 +39,7 @@ pub enum Row {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ModeKey {
     stuck: u32,
-    held: u32,
+    locked: u32,
     power_reversed: u32,
     reverse: u32,
 }
@@ -51,7 +51,7 @@ impl ModeKey {
         stuck.for_each(|j| key.stuck |= 1 << j);
         for (i, gear) in gears.iter().enumerate() {
             match *gear {
-                GearState::Locked => key.held |= 1 << i,
+                GearState::Locked => key.locked |= 1 << i,
                 GearState::Meshing { sign, power_reversed } => {
                     key.power_reversed |= u32::from(power_reversed) << i;
                     key.reverse |= u32::from(sign < 0.0) << i;
@@ -62,8 +62,8 @@ impl ModeKey {
     }
 
     /// Rows that keep a speed at zero: friction elements, then gears.
-    pub fn rows(self) -> Vec<Row> {
-        bits(self.stuck).map(Row::Friction).chain(bits(self.held).map(Row::Gear)).collect()
+    pub fn rows(self) -> Vec<RowId> {
+        bits(self.stuck).map(RowId::Friction).chain(bits(self.locked).map(RowId::Gear)).collect()
     }
 }
 
@@ -77,9 +77,9 @@ pub struct Mode<T> {
     /// Its entries that are not zero, for products with the basis.
     pub rates: SparseRows<T>,
     /// About the spectral radius of the motion, 1/s, without derivatives.
-    pub radius: T,
+    pub spectral_radius: T,
     /// Rows at rest.
-    pub stuck: Vec<Row>,
+    pub stuck: Vec<RowId>,
     /// Their torques in that order (a held gear's is its loss torque), then the torques of
     /// prescribed speeds; rows × basis.
     pub stuck_torque: Matrix<T>,
@@ -155,18 +155,18 @@ impl<T: Number> Loss<T> {
 
 impl<T: Number> Network<T> {
     /// Speed that a row keeps at zero, over the independent speeds.
-    pub fn slip_of(&self, row: Row) -> &[T] {
+    pub fn slip_of(&self, row: RowId) -> &[T] {
         match row {
-            Row::Friction(j) => &self.frictions[j].slip,
-            Row::Gear(i) => &self.losses[i].speed,
+            RowId::Friction(j) => &self.frictions[j].slip,
+            RowId::Gear(i) => &self.losses[i].speed,
         }
     }
 
     /// Name of a row's element.
-    pub fn element_of(&self, row: Row) -> &str {
+    pub fn element_of(&self, row: RowId) -> &str {
         match row {
-            Row::Friction(j) => &self.frictions[j].element,
-            Row::Gear(i) => &self.losses[i].element,
+            RowId::Friction(j) => &self.frictions[j].element,
+            RowId::Gear(i) => &self.losses[i].element,
         }
     }
 
@@ -177,18 +177,18 @@ impl<T: Number> Network<T> {
         let stuck = key.rows();
         let found = if stuck.is_empty() && self.prescribed.is_empty() {
             let (acceleration, torque) = (motion.free.clone(), Matrix::zeros(0, self.basis()));
-            Held { acceleration, torque, redundant: false }
+            ConstraintForces { acceleration, torque, redundant: false }
         } else {
             let (speeds, nodes) = self.held_speeds(&stuck);
             let hold = self.hold(&motion, speeds, &nodes, stuck.len());
             let rates = self.rates(stuck.len());
-            hold.solve((&motion.forces, rates.as_ref()), || self.weights(&stuck, capacity))?
+            hold.solve(&motion.forces, rates.as_ref(), || self.weights(&stuck, capacity))?
         };
         let derivative = self.with_other_states(&found.acceleration);
         Some(Mode {
             key,
             rates: SparseRows::of(&derivative),
-            radius: T::promote(radius(&derivative)),
+            spectral_radius: T::promote(spectral_radius_bound(&derivative)),
             derivative,
             gear_torque: OnceLock::new(),
             stuck_torque: found.torque,
@@ -204,9 +204,9 @@ impl<T: Number> Network<T> {
         rows: Matrix<T>,
         nodes: &[mechanism::Row<T>],
         resting: usize,
-    ) -> Hold<'m, T> {
+    ) -> ConstraintSolver<'m, T> {
         let acting = (!self.losses.is_empty()).then(|| motion.force_map.times_columns(nodes));
-        Hold { inertia: &motion.mass, acting, rows, resting }
+        ConstraintSolver { inertia: &motion.mass, acting, rows, resting }
     }
 
     /// Accelerations of held speeds over the basis, where some behind those at rest are prescribed.
@@ -244,7 +244,7 @@ impl<T: Number> Network<T> {
     fn force_rows(&self, key: ModeKey) -> Matrix<T> {
         constraint_matrix(&self.mechanism, |constraint| {
             let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
-            let held = key.held >> i & 1 == 1;
+            let held = key.locked >> i & 1 == 1;
             let power_reversed = key.power_reversed >> i & 1 == 1;
             (!held).then(|| self.losses[i].loss.factor(1.0, power_reversed).0)
         })
@@ -254,7 +254,7 @@ impl<T: Number> Network<T> {
     fn with_drag(&self, key: ModeKey) -> Cow<'_, Matrix<T>> {
         let mut torques = Cow::Borrowed(&self.node_torques);
         for (i, gear) in self.losses.iter().enumerate() {
-            if key.held >> i & 1 == 1 {
+            if key.locked >> i & 1 == 1 {
                 continue;
             }
             let sign = if key.reverse >> i & 1 == 1 { -1.0 } else { 1.0 };
@@ -270,7 +270,7 @@ impl<T: Number> Network<T> {
     }
 
     /// Speeds kept at zero or prescribed, over the independent speeds and over the nodes.
-    fn held_speeds(&self, stuck: &[Row]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
+    fn held_speeds(&self, stuck: &[RowId]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
         let count = stuck.len() + self.prescribed.len();
         let mut speeds = Matrix::zeros(count, self.speeds());
         let mut nodes = Vec::with_capacity(count);
@@ -278,8 +278,8 @@ impl<T: Number> Network<T> {
         for (i, &row) in stuck.iter().enumerate() {
             speeds.row_mut(i).copy_from_slice(self.slip_of(row));
             nodes.push(match row {
-                Row::Friction(j) => self.frictions[j].nodes.clone(),
-                Row::Gear(g) => one(self.losses[g].loss.driving),
+                RowId::Friction(j) => self.frictions[j].nodes.clone(),
+                RowId::Gear(g) => one(self.losses[g].loss.driving),
             });
         }
         for (i, (speed, _)) in self.prescribed.iter().enumerate() {
@@ -291,19 +291,19 @@ impl<T: Number> Network<T> {
 
     /// Torque capacities of the held speeds, as weights of the split among redundant locks. One-way
     /// clutches and the prescribed speeds, which come last, get a large weight: they carry the remainder.
-    fn weights(&self, stuck: &[Row], capacity: &[T]) -> Vec<T> {
+    fn weights(&self, stuck: &[RowId], capacity: &[T]) -> Vec<T> {
         let one = T::Values::of(1.0);
         let largest = capacity.iter().fold(one, |largest, c| c.re().larger(largest));
         let unbounded = T::promote(largest * 1e2);
-        let weight = |&row: &Row| match row {
-            Row::Friction(j) if !self.frictions[j].one_way => {
+        let weight = |&row: &RowId| match row {
+            RowId::Friction(j) if !self.frictions[j].one_way => {
                 let least = largest * 1e-3;
                 let enough =
                     capacity[j].re().decide_with(least, |capacity, least| capacity > least);
                 if enough { capacity[j] } else { T::promote(least) }
             }
-            Row::Friction(_) => unbounded,
-            Row::Gear(_) => T::of(1.0),
+            RowId::Friction(_) => unbounded,
+            RowId::Gear(_) => T::of(1.0),
         };
         let prescribed = std::iter::repeat_n(unbounded, self.prescribed.len());
         stuck.iter().map(weight).chain(prescribed).collect()
@@ -327,7 +327,7 @@ impl<T: Number> Network<T> {
     pub fn impulse(
         &self,
         key: ModeKey,
-        rows: &[Row],
+        rows: &[RowId],
         excess: &Matrix<T>,
     ) -> Option<(Matrix<T>, Matrix<T>)> {
         let motion = self.motion_of(key)?;
@@ -375,7 +375,7 @@ impl<T: Number> Mode<T> {
             residual.subtract(&inertia.times(&acceleration));
             let mut entering = network.entering(self.key, &residual);
             for (position, &row) in self.stuck.iter().enumerate() {
-                if let Row::Gear(i) = row {
+                if let RowId::Gear(i) = row {
                     let loss = self.stuck_torque.row(position);
                     entering.row_mut(i).iter_mut().zip(loss).for_each(|(total, &l)| *total += l);
                 }

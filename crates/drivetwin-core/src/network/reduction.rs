@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! A gearbox in the middle of a shift as a dual clutch (THEORY section 2).
 
-use super::engaged::{Engaged, EngagedError, friction_index, member_index};
+use super::mobility::{EngagedError, EngagedMechanism, friction_index, member_index};
 use crate::model::Mechanism;
 use crate::number::Real;
 use thiserror::Error;
@@ -11,7 +11,7 @@ use thiserror::Error;
 pub enum ReductionError {
     /// Members or elements without definite speeds.
     #[error(transparent)]
-    Engaged(#[from] EngagedError),
+    EngagedMechanism(#[from] EngagedError),
     /// Not one element off and one on, such as a double transition.
     #[error(
         "not one element off and one on: released {}; applied {}",
@@ -133,14 +133,14 @@ impl<T: Real> Reduction<T> {
         output: &str,
     ) -> Result<Self, ReductionError> {
         let free = [member_index(m, input)?, member_index(m, output)?];
-        let middle = Engaged::new(m, &exchange.common, &free)?;
+        let middle = EngagedMechanism::new(m, &exchange.common, &free)?;
         let members = m
             .inertias
             .iter()
             .filter(|term| term.inertia.re() != 0.0)
             .filter(|term| term.row.iter().any(|(node, _)| middle.connected.contains(node)))
             .map(|term| {
-                let speed = middle.over_free(&term.row);
+                let speed = middle.in_free_coordinates(&term.row);
                 let names: Vec<&str> =
                     term.row.iter().map(|&(node, _)| m.nodes[node].as_str()).collect();
                 let (a, b) = (speed[0], -speed[1]);
@@ -183,10 +183,10 @@ const NO_SHARE: f64 = 1e-9;
 
 fn ratios<T: Real>(
     m: &Mechanism<T>,
-    middle: &Engaged<T>,
+    middle: &EngagedMechanism<T>,
     element: &str,
 ) -> Result<ElementRatios<T>, ReductionError> {
-    let slip = middle.over_free(&m.frictions[friction_index(m, element)?].row);
+    let slip = middle.in_free_coordinates(&m.frictions[friction_index(m, element)?].row);
     let (share, other) = (slip[0].re(), slip[1].re());
     if share.abs() <= NO_SHARE * share.abs().max(other.abs()) {
         return Err(ReductionError::NoInputShare { element: element.to_owned() });

@@ -2,8 +2,8 @@
 //! A gear at steady speed: speed and torque of every member per unit at the input (virtual work,
 //! THEORY section 1), lossless.
 
-use super::engaged::{Engaged, EngagedError, member_index};
 use super::linalg::{Matrix, least_norm};
+use super::mobility::{EngagedError, EngagedMechanism, member_index};
 use crate::model::Mechanism;
 use crate::number::Real;
 
@@ -38,11 +38,11 @@ impl<T: Real> Statics<T> {
         output: &str,
     ) -> Result<Self, EngagedError> {
         let (input, output) = (member_index(m, input)?, member_index(m, output)?);
-        let held = Engaged::new(m, engaged, &[input])?;
+        let held = EngagedMechanism::new(m, engaged, &[input])?;
         let output_speed = held.speeds[(output, 0)];
         if !held.connected.contains(&output) || output_speed.re().abs() < STANDSTILL {
             let members = vec![m.nodes[output].to_string()];
-            return Err(EngagedError::Held { members, engaged: engaged.to_vec() });
+            return Err(EngagedError::NotFree { members, engaged: engaged.to_vec() });
         }
         let load_torque = -output_speed.recip();
         let mut external = Matrix::zeros(m.nodes.len(), 1);
@@ -85,7 +85,11 @@ impl<T: Real> Statics<T> {
 const STANDSTILL: f64 = 1e-9;
 
 /// `Cᵀ λ = -f`: the torque that row i exerts on a node is `λ_i` times its coefficient there.
-fn flanges<T: Real>(m: &Mechanism<T>, held: &Engaged<T>, external: &Matrix<T>) -> Vec<Flange<T>> {
+fn flanges<T: Real>(
+    m: &Mechanism<T>,
+    held: &EngagedMechanism<T>,
+    external: &Matrix<T>,
+) -> Vec<Flange<T>> {
     let mut balance = Matrix::zeros(m.nodes.len(), held.rows.len());
     for (i, rigid) in held.rows.iter().enumerate() {
         for &(node, coefficient) in &rigid.row {

@@ -167,7 +167,7 @@ impl<const P: usize> Number for Dual<P> {
     fn promote(value: f64) -> Self {
         Self::of(value)
     }
-    fn gathered(value: impl Fn(usize) -> f64) -> Self {
+    fn from_lanes(value: impl Fn(usize) -> f64) -> Self {
         Self::of(value(0))
     }
     fn is_constant(&self) -> bool {
@@ -196,7 +196,7 @@ impl<const P: usize> Real for Dual<P> {
     const NO_SLOPES: [f64; P] = [f64::NAN; P];
 
     #[inline(always)]
-    fn sloped(slopes: [f64; P]) -> Self {
+    fn from_slopes(slopes: [f64; P]) -> Self {
         Self { re: 0.0, eps: slopes }
     }
     #[inline(always)]

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-//! The number types the physics is written over: `f64` for values, [`Dual`] for derivatives, [`Pack`]
+//! The number types the physics is written over: `f64` for values, [`Dual`] for derivatives, [`SimdVector`]
 //! for several runs side by side that move as one.
 
+mod consensus;
 mod dual;
-mod lane;
-mod pack;
+mod kernel_float;
 mod series;
+mod simd_vector;
 mod transpose;
-mod vote;
 
+pub use consensus::with_consensus;
 pub use dual::Dual;
-pub use lane::{Factor, Lane, SMALL, Values};
-pub use pack::Pack;
+pub use kernel_float::{Coefficient, KernelFloat, SMALL, Values};
 pub use series::{INVERSE, Series, TERMS, evaluate, product_term, slope};
+pub use simd_vector::SimdVector;
 pub use transpose::{FOUR, transpose};
-pub use vote::together;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Sub, SubAssign};
@@ -22,7 +22,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Sub, SubAssign};
 /// A number that mechanisms are stated, compiled and moved in: of one run, with or without derivatives, or
 /// of several runs side by side. Decisions are taken on [`Number::re`], see [`Values::decide`].
 pub trait Number:
-    Factor<Self>
+    Coefficient<Self>
     + Debug
     + PartialEq
     + Send
@@ -45,7 +45,7 @@ pub trait Number:
     /// A value without derivatives, the same in every run.
     #[inline(always)]
     fn of(value: f64) -> Self {
-        Self::all(value)
+        Self::splat(value)
     }
 
     /// Zero, without derivatives.
@@ -57,7 +57,7 @@ pub trait Number:
     fn promote(values: Self::Values) -> Self;
 
     /// A value of every run by its number; that of run 0 where there is but one.
-    fn gathered(value: impl Fn(usize) -> f64) -> Self;
+    fn from_lanes(value: impl Fn(usize) -> f64) -> Self;
 
     /// The value, of every run.
     fn re(&self) -> Self::Values {
@@ -83,7 +83,7 @@ pub trait Number:
 }
 
 /// A number of one run, with or without derivatives.
-pub trait Real: Number + Factor<Self, Values = f64> {
+pub trait Real: Number + Coefficient<Self, Values = f64> {
     /// Derivatives by the parameters: an array.
     type Slopes: Copy + Debug + Send + Sync;
 
@@ -91,7 +91,7 @@ pub trait Real: Number + Factor<Self, Values = f64> {
     const NO_SLOPES: Self::Slopes;
 
     /// Number zero with derivatives by the parameters.
-    fn sloped(slopes: Self::Slopes) -> Self;
+    fn from_slopes(slopes: Self::Slopes) -> Self;
 
     /// Derivatives by the parameters.
     fn slopes(self) -> Self::Slopes;
@@ -108,7 +108,7 @@ impl Number for f64 {
     fn promote(value: f64) -> Self {
         value
     }
-    fn gathered(value: impl Fn(usize) -> f64) -> Self {
+    fn from_lanes(value: impl Fn(usize) -> f64) -> Self {
         value(0)
     }
     #[inline(always)]
@@ -132,7 +132,7 @@ impl Real for f64 {
     const NO_SLOPES: Self::Slopes = [];
 
     #[inline(always)]
-    fn sloped(_: Self::Slopes) -> Self {
+    fn from_slopes(_: Self::Slopes) -> Self {
         0.0
     }
     #[inline(always)]

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Transposition of packs: one column per run.
 
-use super::Pack;
+use super::SimdVector;
 #[cfg(target_arch = "x86_64")]
 use pulp::{cast, x86::V3};
 
@@ -19,27 +19,27 @@ pub const FOUR: usize = 4;
 /// If a column ends within a four that is asked for, or runs are not by fours.
 #[inline(always)]
 pub fn transpose<const K: usize, const N: usize>(
-    rows: impl Fn(usize) -> [Pack<K>; FOUR],
+    rows: impl Fn(usize) -> [SimdVector<K>; FOUR],
     columns: &mut [[f64; N]; K],
     count: usize,
 ) {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = V3::try_new() {
-        return by_fours(
+        return transpose_tiles(
             rows,
             columns,
             count,
             #[inline(always)]
-            |block| shuffled(simd, block),
+            |block| transpose_in_registers(simd, block),
         );
     }
-    by_fours(rows, columns, count, plain);
+    transpose_tiles(rows, columns, count, transpose_scalar);
 }
 
 /// Columns by squares of four rows and runs.
 #[inline(always)]
-fn by_fours<const K: usize, const N: usize>(
-    rows: impl Fn(usize) -> [Pack<K>; FOUR],
+fn transpose_tiles<const K: usize, const N: usize>(
+    rows: impl Fn(usize) -> [SimdVector<K>; FOUR],
     columns: &mut [[f64; N]; K],
     count: usize,
     transposed: impl Fn([[f64; FOUR]; FOUR]) -> [[f64; FOUR]; FOUR],
@@ -56,14 +56,14 @@ fn by_fours<const K: usize, const N: usize>(
 }
 
 #[inline(always)]
-fn plain(rows: [[f64; FOUR]; FOUR]) -> [[f64; FOUR]; FOUR] {
+fn transpose_scalar(rows: [[f64; FOUR]; FOUR]) -> [[f64; FOUR]; FOUR] {
     std::array::from_fn(|run| rows.map(|row| row[run]))
 }
 
-/// [`plain`], in registers.
+/// [`transpose_scalar`], in registers.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn shuffled(simd: V3, [a, b, c, d]: [[f64; FOUR]; FOUR]) -> [[f64; FOUR]; FOUR] {
+fn transpose_in_registers(simd: V3, [a, b, c, d]: [[f64; FOUR]; FOUR]) -> [[f64; FOUR]; FOUR] {
     let (avx, [a, b, c, d]) = (simd.avx, [cast(a), cast(b), cast(c), cast(d)]);
     let even = [avx._mm256_unpacklo_pd(a, b), avx._mm256_unpacklo_pd(c, d)];
     let odd = [avx._mm256_unpackhi_pd(a, b), avx._mm256_unpackhi_pd(c, d)];
@@ -81,12 +81,12 @@ mod tests {
 
     #[test]
     fn every_run_gets_its_column() {
-        let row = |k: usize| Pack::<8>(std::array::from_fn(|run| (100 * run + k) as f64));
+        let row = |k: usize| SimdVector::<8>(std::array::from_fn(|run| (100 * run + k) as f64));
         let rows = |at: usize| std::array::from_fn(|k| row(at + k));
         for count in [0, 1, 4, 6, 12] {
             let (mut columns, mut expected) = ([[0.0; 12]; 8], [[0.0; 12]; 8]);
             transpose(rows, &mut columns, count);
-            by_fours(rows, &mut expected, count, plain);
+            transpose_tiles(rows, &mut expected, count, transpose_scalar);
             assert_eq!(columns, expected);
             for (run, column) in columns.iter().enumerate() {
                 let there = column[..count].iter().enumerate();

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
 //! Many runs over the same samples: parameter sets on one scenario, or scenarios on one driveline.
 
-use super::abreast;
 use super::dual_clutch::DualClutchStart;
+use super::lockstep_recorder::{GridPoints, Recorder};
 use super::run::{Plan, SimulateError};
 use super::sensitivity::SensitivityError;
 use super::start::State;
 use super::threads::share_out;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
-use crate::number::{Number, Real, together};
+use crate::number::{Number, Real, with_consensus};
 use crate::solver::{
     Event, EventKind, Inputs, LANES, Lanes, NO_POINT, SolverCache, Status, lane_mask, run_lockstep,
 };
@@ -127,20 +127,23 @@ impl Sets<'_> {
 
     /// Model and start of runs side by side, at most as many as a number has; the first stands in for those
     /// that it has more. The names must be parameters.
-    pub fn placed<T: Number>(&self, runs: &[usize]) -> (DualClutch<T>, DualClutchStart<T>) {
+    pub fn place_runs<T: Number>(&self, runs: &[usize]) -> (DualClutch<T>, DualClutchStart<T>) {
         let of = |place: usize| runs.get(place).map_or(runs[0], |&run| run);
         let mut model = self.model.promote();
-        let mut start = DualClutchStart::gathered(|place| self.start(of(place)));
+        let mut start = DualClutchStart::from_lanes(|place| self.start(of(place)));
         let width = self.parameters.len();
         for (i, name) in self.parameters.iter().enumerate() {
-            let value = T::gathered(|place| self.sets[of(place) * width + i]);
+            let value = T::from_lanes(|place| self.sets[of(place) * width + i]);
             *place(&mut model, &mut start, name).expect("names that were checked") = value;
         }
         (model, start)
     }
 
-    fn prepared<T: Number>(&self, runs: &[usize]) -> Result<(Network<T>, State<T>), SimulateError> {
-        let (model, start) = self.placed(runs);
+    fn compile_runs<T: Number>(
+        &self,
+        runs: &[usize],
+    ) -> Result<(Network<T>, State<T>), SimulateError> {
+        let (model, start) = self.place_runs(runs);
         let network = Network::compile(&model.driveline())?;
         let state = start.state(&network)?;
         Ok((network, state))
@@ -187,7 +190,7 @@ impl Work<'_> {
             Job { run, values, outcome: None, events: Vec::new() }
         };
         let mut jobs: Vec<Job<'_>> = (0..count).map(job).collect();
-        self.do_all(&mut jobs);
+        self.run_all(&mut jobs);
         let mut result = Batch::default();
         for job in jobs {
             result.outcomes.push(job.outcome.expect("every job is done in the end"));
@@ -199,18 +202,18 @@ impl Work<'_> {
 
     /// Do all jobs: side by side as far as they go together. The results depend neither on that nor on the
     /// number of threads.
-    fn do_all(&self, jobs: &mut [Job<'_>]) {
+    fn run_all(&self, jobs: &mut [Job<'_>]) {
         let mut open: Vec<&mut Job<'_>> = jobs.iter_mut().collect();
         for _ in 0..ATTEMPTS {
-            share_out(self.threads, open.chunks_mut(LANES), |group| self.do_together(group));
+            share_out(self.threads, open.chunks_mut(LANES), |group| self.run_group(group));
             open.retain(|job| job.outcome.is_none());
         }
-        share_out(self.threads, open.iter_mut(), |job| self.do_alone(job));
+        share_out(self.threads, open.iter_mut(), |job| self.run_single(job));
     }
 
-    fn do_alone(&self, job: &mut Job<'_>) {
+    fn run_single(&self, job: &mut Job<'_>) {
         let plan = self.plan(job.run);
-        let prepared = self.sets.prepared(&[job.run]);
+        let prepared = self.sets.compile_runs(&[job.run]);
         let (network, state) = match prepared.and_then(|p| plan.check(&p.0).map(|()| p)) {
             Ok(prepared) => prepared,
             Err(error) => {
@@ -229,7 +232,7 @@ impl Work<'_> {
     }
 
     /// Do those of a group that go together with its first.
-    fn do_together(&self, group: &mut [&mut Job<'_>]) {
+    fn run_group(&self, group: &mut [&mut Job<'_>]) {
         let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
         let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
         // Fewer are done as fast alone.
@@ -241,7 +244,7 @@ impl Work<'_> {
                 && self.sets.start(run).locked == *locked
         };
         let alike = lane_mask(runs.iter().map(alike));
-        let (prepared, parting) = together(alike, || self.sets.prepared::<Lanes>(&runs));
+        let (prepared, parting) = with_consensus(alike, || self.sets.compile_runs::<Lanes>(&runs));
         let Ok((network, State { x, locked })) = prepared else { return };
         if plan.check(&network).is_err() {
             return;
@@ -258,8 +261,8 @@ impl Work<'_> {
         } else {
             group.iter_mut().map(|job| &mut *job.values).collect()
         };
-        let shared = (all, (&*points, count));
-        let mut recorder = abreast::Recorder::new(&network, &plan.targets, shared, values);
+        let points = GridPoints { at_knots: &points, count };
+        let mut recorder = Recorder::new(&network, &plan.targets, all, points, values);
         let events = run_lockstep(cache, &inputs, plan.settings, mask, x, &locked, &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
             let Some(events) = events else { continue };

@@ -3,8 +3,10 @@
 
 use super::batch::{Batch, Keep, Outcome, Sets, check_names, last_lock};
 use super::dual_clutch::DualClutchStart;
-use super::run::{Plan, SimulateError};
-use super::sensitivity::{LANES, Sampled, SensitivityError, check_corners, delayed, variables};
+use super::run::{Plan, RunOptions, SimulateError};
+use super::sensitivity::{
+    LANES, Sampled, SensitivityError, apply_delays, check_corners, seed_variables,
+};
 use super::threads::share_out;
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::DualClutch;
@@ -17,6 +19,26 @@ type Derived = Dual<LANES>;
 
 /// Inputs and start of a run.
 pub type Stated<'a> = (Vec<Sampled<'a>>, DualClutchStart<f64>);
+
+/// Parameter sets of a batch.
+#[derive(Clone, Copy, Debug)]
+pub struct ParameterSets<'a> {
+    /// Names of the parameters.
+    pub names: &'a [&'a str],
+    /// Values, sets × parameters.
+    pub values: &'a [f64],
+}
+
+/// Outputs that are recorded of every run, and the numbers that are kept of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Recording<'a> {
+    /// Grid, s.
+    pub grid: &'a [f64],
+    /// Outputs.
+    pub outputs: &'a [Output],
+    /// Numbers that are kept.
+    pub keep: Keep<'a>,
+}
 
 /// Output of a batch with its derivatives; NaN for failed runs.
 #[derive(Clone, Debug)]
@@ -36,29 +58,31 @@ pub struct BatchDerivatives {
 pub fn dual_clutch_batch_sensitivities(
     model: &DualClutch<f64>,
     scenarios: &[Stated<'_>],
-    (parameters, sets): (&[&str], &[f64]),
-    (grid, outputs): (&[f64], &[Output]),
+    parameters: ParameterSets<'_>,
+    recording: Recording<'_>,
     by: &[&str],
-    (keep, threads): (Keep<'_>, usize),
+    threads: usize,
 ) -> Result<(Batch, BatchDerivatives), SensitivityError> {
+    let ParameterSets { names: parameters, values: sets } = parameters;
+    let Recording { grid, outputs, keep } = recording;
     if let Some((_, start)) = scenarios.first() {
         check_names(model, start, parameters, sets)?;
     }
     let groups: Vec<&[&str]> = by.chunks(LANES).collect();
     let mut plans = Vec::with_capacity(scenarios.len());
     for (signals, start) in scenarios {
-        let plan = |names: &&[&str]| plan(model, (signals, start), (grid, outputs), names);
+        let plan = |names: &&[&str]| plan(model, signals, start, grid, outputs, names);
         plans.push(groups.iter().map(plan).collect::<Result<Vec<_>, _>>()?);
     }
     let starts = scenarios.iter().map(|(_, start)| start).collect();
     let sets = Sets { model, starts, parameters, sets };
-    (0..sets.count()).try_for_each(|i| check_corners(by, &sets.placed(&[i]).0))?;
+    (0..sets.count()).try_for_each(|i| check_corners(by, &sets.place_runs(&[i]).0))?;
     let run = |i: usize| -> Result<Vec<Kept>, SimulateError> {
         let (signals, _) = &scenarios[i % scenarios.len()];
-        let (model, start) = sets.placed(&[i]);
+        let (model, start) = sets.place_runs(&[i]);
         let passes = groups.iter().zip(&plans[i % plans.len()]).map(|(names, plan)| {
             let (model, start, _) =
-                variables(&model, signals, &start, names).expect("names that were checked");
+                seed_variables(&model, signals, &start, names).expect("names that were checked");
             let network = Network::compile(&model.driveline())?;
             plan.check(&network)?;
             let state = start.state(&network)?;
@@ -70,20 +94,28 @@ pub fn dual_clutch_batch_sensitivities(
     passes.resize_with(sets.count(), || None);
     share_out(threads, passes.iter_mut().enumerate(), |(i, pass)| *pass = Some(run(i)));
     let passes = passes.into_iter().map(|pass| pass.expect("every run is done")).collect();
-    Ok(gathered(passes, keep.size(outputs.len(), grid.len()), by.len()))
+    Ok(collect_runs(passes, keep.size(outputs.len(), grid.len()), by.len()))
 }
 
 /// The scenario made ready for one group of variables.
 fn plan(
     model: &DualClutch<f64>,
-    (signals, start): (&[Sampled<'_>], &DualClutchStart<f64>),
-    (grid, outputs): (&[f64], &[Output]),
+    signals: &[Sampled<'_>],
+    start: &DualClutchStart<f64>,
+    grid: &[f64],
+    outputs: &[Output],
     names: &[&str],
 ) -> Result<Plan<Derived>, SensitivityError> {
-    let (model, _, delays) = variables(model, signals, start, names)?;
+    let (model, _, delays) = seed_variables(model, signals, start, names)?;
     let network = Network::compile(&model.driveline()).map_err(SimulateError::from)?;
-    let inputs = delayed(signals, &delays);
-    Ok(Plan::new(&network, &inputs, grid, outputs, (Settings::default(), false))?)
+    let inputs = apply_delays(signals, &delays);
+    Ok(Plan::new(
+        &network,
+        &inputs,
+        grid,
+        outputs,
+        RunOptions { settings: Settings::default(), audit: false },
+    )?)
 }
 
 /// Result of one pass of a run.
@@ -120,7 +152,7 @@ impl Kept {
 }
 
 /// All runs in their order; `size` numbers are kept of each, derived by so many parameters.
-fn gathered(
+fn collect_runs(
     runs: Vec<Result<Vec<Kept>, SimulateError>>,
     size: usize,
     parameters: usize,

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 //! A run of the dual-clutch driveline with its usual outputs.
 
-use super::run::{Plan, SimulateError};
+use super::run::{Plan, RunOptions, SimulateError};
 use super::start::{StartError, State, state_of};
 use super::trajectory::{Output, Trajectory};
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
 use crate::network::Network;
 use crate::number::{Number, Real};
-use crate::solver::{Settings, Signal};
+use crate::solver::Signal;
 
 /// Start of a dual-clutch run.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ pub fn simulate_dual_clutch<T: Real>(
     signals: &[(&str, Signal<'_, T>)],
     start: &DualClutchStart<T>,
     grid: &[f64],
-    options: (Settings, bool),
+    options: RunOptions,
 ) -> Result<DualClutchRun<T>, SimulateError> {
     let network = Network::compile(&model.driveline())?;
     let plan = Plan::new(&network, signals, grid, &dual_clutch_outputs(model), options)?;
@@ -47,7 +47,7 @@ pub fn run_dual_clutch(
     signals: &[(&str, Signal<'_, f64>)],
     start: &DualClutchStart<f64>,
     grid: &[f64],
-    options: (Settings, bool),
+    options: RunOptions,
 ) -> Result<DualClutchRun<f64>, SimulateError> {
     simulate_dual_clutch(model, signals, start, grid, options)
 }
@@ -80,16 +80,16 @@ impl<T: Number> DualClutchStart<T> {
 impl DualClutchStart<f64> {
     /// Convert the start to another number type.
     pub fn promote<T: Number>(&self) -> DualClutchStart<T> {
-        Self::gathered(|_| self)
+        Self::from_lanes(|_| self)
     }
 
     /// The starts of runs by their numbers; elements without slip are those of run 0.
-    pub(super) fn gathered<'s, T: Number>(of: impl Fn(usize) -> &'s Self) -> DualClutchStart<T> {
+    pub(super) fn from_lanes<'s, T: Number>(of: impl Fn(usize) -> &'s Self) -> DualClutchStart<T> {
         DualClutchStart {
-            engine_speed: T::gathered(|run| of(run).engine_speed),
-            output_speed: T::gathered(|run| of(run).output_speed),
-            wheel_speed: T::gathered(|run| of(run).wheel_speed),
-            twist: T::gathered(|run| of(run).twist),
+            engine_speed: T::from_lanes(|run| of(run).engine_speed),
+            output_speed: T::from_lanes(|run| of(run).output_speed),
+            wheel_speed: T::from_lanes(|run| of(run).wheel_speed),
+            twist: T::from_lanes(|run| of(run).twist),
             locked: of(0).locked.clone(),
         }
     }

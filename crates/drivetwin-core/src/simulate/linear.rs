@@ -7,8 +7,8 @@ use super::trajectory::Output;
 use crate::model::Name;
 use crate::model::mechanism::Normal;
 use crate::network::linalg::Matrix;
-use crate::network::smooth::Law;
-use crate::network::{Cell, ModeKey, Network, Row};
+use crate::network::smooth_law::SmoothLaw;
+use crate::network::{Branch, ModeKey, Network, RowId};
 
 /// An element that slips at the operating point.
 #[derive(Clone, Debug)]
@@ -78,7 +78,7 @@ pub fn linearise(
         linear.b.row_mut(i).copy_from_slice(&row[n..]);
     }
     for (i, output) in outputs.iter().enumerate() {
-        let torque = |j: usize| match mode.stuck.iter().position(|&s| s == Row::Friction(j)) {
+        let torque = |j: usize| match mode.stuck.iter().position(|&s| s == RowId::Friction(j)) {
             Some(position) => mode.stuck_torque.row(position).to_vec(),
             None => {
                 let mut row = vec![0.0; network.basis()];
@@ -113,10 +113,11 @@ fn channel_slopes(
             }
             Normal::Constant(normal) => (normal, None),
         };
-        let cell = Cell::Moving { sign, piece: piece_of(network, j, point.slip.abs()) };
-        let law = Law::of(&network.channels[j], cell).expect("friction is smooth in a cell");
+        let branch = Branch::Moving { sign, piece: piece_of(network, j, point.slip.abs()) };
+        let law = SmoothLaw::from_channel(&network.channels[j], branch)
+            .expect("friction is smooth in a branch");
         let m = point.slip.abs() * law.unit;
-        let torque = law.about::<false>(m, law.stiction::<false>(m)).here(normal);
+        let torque = law.expand_at::<false>(m, law.stiction::<false>(m)).value_at_center(normal);
         for (entry, &c) in channels.row_mut(j).iter_mut().zip(&row.slip) {
             *entry += torque.by_argument * law.unit * c;
         }

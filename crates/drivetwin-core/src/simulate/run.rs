@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! One run of a network over a time grid.
 
-use super::audit::Auditor;
+use super::energy_balance::EnergyBalance;
 use super::start::{Start, StartError, State};
 use super::trajectory::{Output, Recorder, Target, Trajectory};
 use crate::network::{CompileError, Mode, ModeKey, Network};
@@ -37,6 +37,15 @@ pub enum SimulateError {
     },
 }
 
+/// How a run is computed and what is computed beside its outputs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RunOptions {
+    /// Accuracy.
+    pub settings: Settings,
+    /// True if the energy balance is computed.
+    pub audit: bool,
+}
+
 /// A scenario made ready for a network and all others of its structure: inputs on common knots,
 /// outputs found by name.
 #[derive(Clone, Debug)]
@@ -59,8 +68,9 @@ impl<T: Real> Plan<T> {
         signals: &[(&str, Signal<'_, T>)],
         grid: &[f64],
         outputs: &[Output],
-        (settings, audit): (Settings, bool),
+        options: RunOptions,
     ) -> Result<Self, SimulateError> {
+        let RunOptions { settings, audit } = options;
         check_grid(grid)?;
         let find = |output: &Output| output.find(network);
         let targets = outputs.iter().map(find).collect::<Result<Vec<_>, _>>()?;
@@ -70,7 +80,7 @@ impl<T: Real> Plan<T> {
         let sampled = |(_, signal): &(_, _)| matches!(signal, Signal::Samples { .. });
         let fine = sprint && supports_fixed_step(network) && signals.iter().all(sampled);
         let span = (grid[0], grid[grid.len() - 1]);
-        let inputs = join(network, signals, (span, if fine { grid } else { &[] }))?;
+        let inputs = join(network, signals, span, if fine { grid } else { &[] })?;
         let inputs = if fine { divided(network, inputs) } else { inputs };
         let points = inputs.points(grid);
         let settings = Settings { exponential_steps: sprint && points.is_some(), ..settings };
@@ -89,7 +99,7 @@ impl<T: Real> Plan<T> {
         known: SolverCache<'r, T>,
         start: &State<T>,
     ) -> Result<Integrator<'r, T>, Status> {
-        Integrator::start(known, &self.inputs, self.settings, (start.x.clone(), &start.locked))
+        Integrator::start(known, &self.inputs, self.settings, start.x.clone(), &start.locked)
     }
 
     /// One run. If it fails on the way it ends with its status, and with NaN from there on.
@@ -111,7 +121,7 @@ impl<T: Real> Plan<T> {
             let mut run =
                 self.integrator(std::mem::replace(known, SolverCache::new(network)), start)?;
             let outcome = if self.audit {
-                let mut auditor = Auditor::new(network, &run.state.x);
+                let mut auditor = EnergyBalance::new(network, &run.state.x);
                 let outcome =
                     recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
                 balance = Some(auditor.close(network, &run.state.x));
@@ -141,7 +151,7 @@ pub fn run<T: Real>(
     start: &Start<T>,
     grid: &[f64],
     outputs: &[Output],
-    options: (Settings, bool),
+    options: RunOptions,
 ) -> Result<Trajectory<T>, SimulateError> {
     let plan = Plan::new(network, signals, grid, outputs, options)?;
     Ok(plan.run(network, &start.state(network)?))
@@ -154,7 +164,7 @@ pub fn run_network(
     start: &Start<f64>,
     grid: &[f64],
     outputs: &[Output],
-    options: (Settings, bool),
+    options: RunOptions,
 ) -> Result<Trajectory<f64>, SimulateError> {
     run(network, signals, start, grid, outputs, options)
 }
@@ -168,7 +178,8 @@ const MAX_PARTS: usize = 100;
 /// fastest: every lock only lowers the highest frequency.
 fn divided<T: Real>(network: &Network<T>, inputs: Inputs<T>) -> Inputs<T> {
     let capacity = vec![T::zero_(); network.frictions.len()];
-    let Some(Mode { radius, .. }) = network.mode(ModeKey::default(), &capacity) else {
+    let Some(Mode { spectral_radius: radius, .. }) = network.mode(ModeKey::default(), &capacity)
+    else {
         return inputs;
     };
     let radius = radius.re();
@@ -183,7 +194,8 @@ fn divided<T: Real>(network: &Network<T>, inputs: Inputs<T>) -> Inputs<T> {
 fn join<T: Real>(
     network: &Network<T>,
     signals: &[(&str, Signal<'_, T>)],
-    (span, grid): ((f64, f64), &[f64]),
+    span: (f64, f64),
+    grid: &[f64],
 ) -> Result<Inputs<T>, InputError> {
     let ordered = network
         .mechanism
@@ -195,7 +207,8 @@ fn join<T: Real>(
         })
         .collect::<Result<Vec<_>, _>>()?;
     for prescribed in &network.mechanism.prescribed {
-        refuse_jump(ordered[prescribed.input])?;
+        let (name, signal) = ordered[prescribed.input];
+        refuse_jump(name, signal)?;
     }
     Inputs::join(&ordered, span, grid)
 }
@@ -210,7 +223,7 @@ fn check_grid(grid: &[f64]) -> Result<(), SimulateError> {
 }
 
 /// A prescribed speed that jumps would take an infinite torque.
-fn refuse_jump<T: Real>((name, signal): (&str, Signal<'_, T>)) -> Result<(), InputError> {
+fn refuse_jump<T: Real>(name: &str, signal: Signal<'_, T>) -> Result<(), InputError> {
     let Signal::Samples { times, .. } = signal else { return Ok(()) };
     match times.windows(2).position(|w| w[0] == w[1]) {
         Some(i) => Err(InputError::Jump { name: name.to_owned(), time: times[i] }),

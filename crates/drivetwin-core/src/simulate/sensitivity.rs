@@ -2,7 +2,7 @@
 //! Exact forward derivatives of a dual-clutch run, through lock and break-away events.
 
 use super::dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
-use super::run::SimulateError;
+use super::run::{RunOptions, SimulateError};
 use super::trajectory::Trajectory;
 use crate::model::dual_clutch::DualClutch;
 use crate::number::{Dual, Number};
@@ -41,8 +41,18 @@ pub enum SensitivityError {
     Simulate(#[from] SimulateError),
 }
 
-/// Sampled input: name, times [s], values, delay [s].
-pub type Sampled<'a> = (&'a str, &'a [f64], &'a [f64], f64);
+/// Sampled input.
+#[derive(Clone, Copy, Debug)]
+pub struct Sampled<'a> {
+    /// Name.
+    pub name: &'a str,
+    /// Times, s.
+    pub times: &'a [f64],
+    /// Values, SI.
+    pub values: &'a [f64],
+    /// Delay, s.
+    pub delay: f64,
+}
 
 /// A run with the derivatives of its columns and event times.
 #[derive(Clone, Debug)]
@@ -72,12 +82,15 @@ pub fn dual_clutch_sensitivities(
     // Without parameters one pass for the values.
     for k in 0..parameters.len().div_ceil(LANES).max(1) {
         let group = &parameters[k * LANES..parameters.len().min((k + 1) * LANES)];
-        let scenario = (signals, start, grid, settings);
-        if group.len() <= FEW {
-            pass::<FEW>(model, scenario, group, &mut found)?;
+        let Pass { run, columns, events } = if group.len() <= FEW {
+            pass::<FEW>(model, signals, start, grid, settings, group)?
         } else {
-            pass::<LANES>(model, scenario, group, &mut found)?;
-        }
+            pass::<LANES>(model, signals, start, grid, settings, group)?
+        };
+        let all =
+            found.get_or_insert_with(|| Sensitivities { run, columns: vec![], events: vec![] });
+        all.columns.push(columns);
+        all.events.extend(events);
     }
     Ok(found.expect("at least one pass"))
 }
@@ -94,31 +107,36 @@ pub(super) fn check_corners(
     }
 }
 
-/// One pass for up to `P` parameters, added to what others have found.
+/// A run with its derivatives by the parameters of one pass, as in [`Sensitivities`].
+struct Pass {
+    run: DualClutchRun<f64>,
+    columns: Vec<Vec<f64>>,
+    events: Vec<Vec<f64>>,
+}
+
+/// One pass for up to `P` parameters.
 fn pass<const P: usize>(
     model: &DualClutch<f64>,
-    (signals, start, grid, settings): (&[Sampled<'_>], &DualClutchStart<f64>, &[f64], Settings),
+    signals: &[Sampled<'_>],
+    start: &DualClutchStart<f64>,
+    grid: &[f64],
+    settings: Settings,
     parameters: &[&str],
-    found: &mut Option<Sensitivities>,
-) -> Result<(), SensitivityError> {
-    let (model, start, delays) = variables::<P>(model, signals, start, parameters)?;
-    let inputs = delayed(signals, &delays);
-    let dual = simulate_dual_clutch(&model, &inputs, &start, grid, (settings, false))?;
+) -> Result<Pass, SensitivityError> {
+    let (model, start, delays) = seed_variables::<P>(model, signals, start, parameters)?;
+    let inputs = apply_delays(signals, &delays);
+    let dual =
+        simulate_dual_clutch(&model, &inputs, &start, grid, RunOptions { settings, audit: false })?;
     let of_lane = |lane| dual.events.iter().map(|e| e.time.eps[lane]).collect();
     let events: Vec<Vec<f64>> = (0..parameters.len()).map(of_lane).collect();
-    let (run, columns) = parted(dual);
-    match found {
-        None => *found = Some(Sensitivities { run, columns: vec![columns], events }),
-        Some(found) => {
-            found.columns.push(columns);
-            found.events.extend(events);
-        }
-    }
-    Ok(())
+    let (run, columns) = split_derivatives(dual);
+    Ok(Pass { run, columns, events })
 }
 
 /// The run without derivatives, and those of its columns: time × parameters.
-fn parted<const P: usize>(run: DualClutchRun<Dual<P>>) -> (DualClutchRun<f64>, Vec<Vec<f64>>) {
+fn split_derivatives<const P: usize>(
+    run: DualClutchRun<Dual<P>>,
+) -> (DualClutchRun<f64>, Vec<Vec<f64>>) {
     let event = |e: &Event<Dual<P>>| Event { time: e.time.re, element: e.element, kind: e.kind };
     let values = Trajectory {
         time: run.time,
@@ -138,7 +156,7 @@ pub(super) type Variables<const P: usize> =
     (DualClutch<Dual<P>>, DualClutchStart<Dual<P>>, Vec<Dual<P>>);
 
 /// Model, start and delays with the named parameters as variables, at most `P`.
-pub(super) fn variables<const P: usize>(
+pub(super) fn seed_variables<const P: usize>(
     model: &DualClutch<f64>,
     signals: &[Sampled<'_>],
     start: &DualClutchStart<f64>,
@@ -146,12 +164,12 @@ pub(super) fn variables<const P: usize>(
 ) -> Result<Variables<P>, SensitivityError> {
     let mut model = model.promote::<Dual<P>>();
     let mut start = start.promote::<Dual<P>>();
-    let mut delays: Vec<Dual<P>> = signals.iter().map(|s| Dual::of(s.3)).collect();
+    let mut delays: Vec<Dual<P>> = signals.iter().map(|s| Dual::of(s.delay)).collect();
     for (lane, &name) in parameters.iter().enumerate() {
         let place = match name.split_once('.') {
             Some(("start", field)) => start.field_mut(field),
             Some(("delay", input)) => {
-                signals.iter().position(|s| s.0 == input).map(|i| &mut delays[i])
+                signals.iter().position(|s| s.name == input).map(|i| &mut delays[i])
             }
             _ => model.parameter_mut(name),
         };
@@ -162,11 +180,11 @@ pub(super) fn variables<const P: usize>(
 }
 
 /// The inputs with delays as variables.
-pub(super) fn delayed<'a, const P: usize>(
+pub(super) fn apply_delays<'a, const P: usize>(
     signals: &[Sampled<'a>],
     delays: &[Dual<P>],
 ) -> Vec<(&'a str, Signal<'a, Dual<P>>)> {
-    let signal = |(&(name, times, values, _), &delay): (&Sampled<'a>, &Dual<P>)| {
+    let signal = |(&Sampled { name, times, values, .. }, &delay): (&Sampled<'a>, &Dual<P>)| {
         (name, Signal::Samples { times, values, delay })
     };
     signals.iter().zip(delays).map(signal).collect()

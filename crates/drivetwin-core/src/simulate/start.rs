@@ -3,8 +3,8 @@
 
 use crate::model::Name;
 use crate::network::Network;
-use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows, solve};
+use crate::network::nonlinear_torque::form;
 use crate::number::{Number, Values};
 use thiserror::Error;
 

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 //! Chosen outputs on a time grid.
 
-use super::audit::EnergyAudit;
-use super::recorded::{Block, Picked, Recorded};
+use super::energy_balance::EnergyAudit;
+use super::output_buffer::{OutputBlock, OutputBuffer, OutputMask};
 use super::start::{StartError, find};
 use crate::model::mechanism::SpringLaw;
-use crate::network::channel::form;
 use crate::network::linalg::is_zero;
-use crate::network::{Network, Row};
+use crate::network::nonlinear_torque::form;
+use crate::network::{Network, RowId};
 use crate::number::{Number, Real};
 use crate::solver::{
-    Event, FrictionState, HybridState, Integrator, Kernel, SampleSink, Samples, Status, Step,
-    dispatch_simd,
+    Event, FrictionState, HybridState, Integrator, Kernel, SampleRange, SampleSink, Samples,
+    Status, Step, dispatch_simd,
 };
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -125,19 +125,19 @@ pub(super) struct Recorder<'g, T: Real> {
     grid: &'g [f64],
     next: usize,
     columns: Vec<Column<T>>,
-    recorded: Recorded<T>,
+    buffer: OutputBuffer<T>,
     /// Working space: the basis, at an instant and over a block of samples.
     basis: Vec<T>,
-    block: Block<T>,
+    block: OutputBlock<T>,
 }
 
 impl<'g, T: Real> Recorder<'g, T> {
     /// Columns of a network.
     pub fn new(network: &Network<T>, targets: &[Target], grid: &'g [f64]) -> Self {
         let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
-        let recorded = Recorded::new(targets.len(), grid.len());
-        let (basis, block) = (Vec::new(), Block::new());
-        Self { grid, next: 0, columns, recorded, basis, block }
+        let buffer = OutputBuffer::new(targets.len(), grid.len());
+        let (basis, block) = (Vec::new(), OutputBlock::new());
+        Self { grid, next: 0, columns, buffer, basis, block }
     }
 
     /// Record the grid points before the end of the step; `last` includes the end.
@@ -155,7 +155,7 @@ impl<'g, T: Real> Recorder<'g, T> {
                     Column::Angle(row, angle) => *angle + integral(state, row, h),
                     other => value(other, state, &self.basis),
                 };
-                self.recorded.push(output, value);
+                self.buffer.push(output, value);
             }
             self.next += 1;
         }
@@ -186,7 +186,7 @@ impl<'g, T: Real> Recorder<'g, T> {
 
     /// Columns at full length and their derivatives, as in [`Trajectory`].
     pub fn finish(self) -> (Vec<Vec<f64>>, Vec<Vec<T::Slopes>>) {
-        self.recorded.finish()
+        self.buffer.finish()
     }
 }
 
@@ -196,70 +196,73 @@ impl<T: Real> SampleSink<T> for Recorder<'_, T> {
         run: &Integrator<'_, T>,
         active: &[usize],
         samples: Samples<'_, T>,
-        (first, count): (usize, usize),
+        range: SampleRange,
     ) {
+        let SampleRange { first, count } = range;
         let knots = &run.knots()[first..first + count];
-        let picked = if self.grid.len() == run.knots().len() && self.next == first {
+        let mask = if self.grid.len() == run.knots().len() && self.next == first {
             // The knots contain the grid: as many are the same.
-            Picked::all(count)
+            OutputMask::all(count)
         } else {
-            Picked::of(&self.grid[self.next..], knots)
+            OutputMask::of(&self.grid[self.next..], knots)
         };
-        self.next += picked.count();
-        let (columns, recorded, block) = (&self.columns[..], &mut self.recorded, &mut self.block);
-        dispatch_simd(Passed { columns, recorded, block, run, active, samples, picked, first });
+        self.next += mask.count();
+        let (columns, buffer, block) = (&self.columns[..], &mut self.buffer, &mut self.block);
+        dispatch_simd(BlockWriter { columns, buffer, block, run, active, samples, mask, first });
     }
 }
 
 /// Samples to be added to the columns, with the widest instructions.
-struct Passed<'p, 'a, T: Real> {
+struct BlockWriter<'p, 'a, T: Real> {
     columns: &'p [Column<T>],
-    recorded: &'p mut Recorded<T>,
-    block: &'p mut Block<T>,
+    buffer: &'p mut OutputBuffer<T>,
+    block: &'p mut OutputBlock<T>,
     run: &'p Integrator<'a, T>,
     active: &'p [usize],
     samples: Samples<'p, T>,
-    picked: Picked,
+    mask: OutputMask,
     first: usize,
 }
 
-impl<T: Real> Kernel for Passed<'_, '_, T> {
+impl<T: Real> Kernel for BlockWriter<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
     fn run<const F: bool>(mut self) {
-        let count = self.picked.count();
+        let count = self.mask.count();
         for (output, column) in self.columns.iter().enumerate() {
-            let from = self.recorded.length(output);
-            for &(position, factor) in &*passing_terms(column, &self.run.state) {
+            let from = self.buffer.length(output);
+            for &(position, factor) in &*output_terms(column, &self.run.state) {
                 self.add::<F>(output, position, factor);
             }
-            self.recorded.take(output, self.block);
-            self.recorded.fill(output, from + count);
+            self.buffer.move_slopes(output, self.block);
+            self.buffer.pad_output(output, from + count);
         }
     }
 }
 
-impl<T: Real> Passed<'_, '_, T> {
+impl<T: Real> BlockWriter<'_, '_, T> {
     /// Add a multiple of an entry of the basis to an output.
     #[inline(always)]
     fn add<const F: bool>(&mut self, output: usize, position: usize, factor: T) {
-        let (recorded, picked) = (&mut *self.recorded, self.picked);
-        let to = (output, &mut *self.block);
+        let (buffer, mask) = (&mut *self.buffer, self.mask);
+        let block = &mut *self.block;
         match Entry::at(position, self.run.state.network, self.active) {
             Entry::State(i) => {
-                recorded.add::<F>(to, (self.samples.states[i].iter(), picked), factor);
+                buffer.add::<F>(output, block, self.samples.states[i].iter(), mask, factor);
             }
             Entry::Input(i) => {
                 let input = |k| self.run.input_at(self.first + k, i);
-                recorded.add::<F>(to, ((0..picked.span()).map(input), picked), factor);
+                buffer.add::<F>(output, block, (0..mask.span()).map(input), mask, factor);
             }
-            Entry::One => recorded.add::<F>(to, (std::iter::repeat(T::of(1.0)), picked), factor),
+            Entry::One => {
+                buffer.add::<F>(output, block, std::iter::repeat(T::of(1.0)), mask, factor)
+            }
             Entry::Torque(slot) => {
-                recorded.add::<F>(to, (self.samples.torques[slot].iter(), picked), factor);
+                buffer.add::<F>(output, block, self.samples.torques[slot].iter(), mask, factor);
             }
             Entry::Nothing => {
-                recorded.add::<F>(to, (std::iter::repeat(T::zero_()), picked), factor);
+                buffer.add::<F>(output, block, std::iter::repeat(T::zero_()), mask, factor);
             }
         }
     }
@@ -296,7 +299,7 @@ impl Entry {
 }
 
 /// Terms of a column while the mode lasts: positions in the basis and coefficients.
-pub(super) fn passing_terms<'c, T: Number>(
+pub(super) fn output_terms<'c, T: Number>(
     column: &'c Column<T>,
     state: &HybridState<'_, T>,
 ) -> Cow<'c, [(usize, T)]> {
@@ -345,7 +348,7 @@ fn shaft_torque<T: Number>(network: &Network<T>, i: usize) -> Column<T> {
             let springs = &network.mechanism.springs[..i];
             let backlashes =
                 springs.iter().filter(|s| matches!(s.law, SpringLaw::Regions { .. })).count();
-            Column::Linear(vec![(network.drives[backlashes].basis, T::of(1.0))])
+            Column::Linear(vec![(network.applied_torques[backlashes].basis, T::of(1.0))])
         }
     }
 }
@@ -369,7 +372,7 @@ pub(super) fn value<T: Number>(column: &Column<T>, state: &HybridState<'_, T>, b
 
 /// Torque of a stuck element over the basis.
 fn holding_row<'r, T: Number>(state: &'r HybridState<'_, T>, j: usize) -> &'r [T] {
-    let position = state.mode.stuck.iter().position(|&s| s == Row::Friction(j));
+    let position = state.mode.stuck.iter().position(|&s| s == RowId::Friction(j));
     state.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"))
 }
 

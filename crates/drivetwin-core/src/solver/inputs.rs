@@ -55,6 +55,15 @@ pub struct Inputs<T> {
     extremes: Vec<[f64; 2]>,
 }
 
+/// Consecutive samples: the segments of the inputs that they cover.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleRange {
+    /// Segment of the first.
+    pub first: usize,
+    /// Number of samples.
+    pub count: usize,
+}
+
 /// Fewest segments of equal length that make operators worth while.
 const WORTH_WHILE: usize = 8;
 
@@ -72,9 +81,10 @@ impl<T: Real> Inputs<T> {
     /// `(start, end)` [s]; the increasing points of a grid within it become knots too.
     pub fn join(
         signals: &[(&str, Signal<'_, T>)],
-        (start, end): (f64, f64),
+        span: (f64, f64),
         grid: &[f64],
     ) -> Result<Self, InputError> {
+        let (start, end) = span;
         let (mut jumps, mut sines, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
         let mut checked: Option<(&[f64], f64)> = None;
         for &(name, signal) in signals {
@@ -110,7 +120,7 @@ impl<T: Real> Inputs<T> {
         for (input, (_, signal)) in signals.iter().enumerate() {
             let Signal::Samples { times, values, delay } = *signal else { continue };
             let to = lines[input..].iter_mut().step_by(width);
-            fill(to, (&knots, jumps.is_empty()), (times, values, delay.re()));
+            fill(to, &knots, jumps.is_empty(), times, values, delay.re());
         }
         Ok(Self::of_lines(knots, lines, shifts, sines))
     }
@@ -236,9 +246,10 @@ impl<T: Real> Inputs<T> {
         self.shifts.iter().any(|shift| !shift.is_constant())
     }
 
-    /// Bounds of an input over `count` segments from `first` on, without derivatives; zero where there
+    /// Bounds of an input over a range of samples, without derivatives; zero where there
     /// are no inputs.
-    pub fn bounds(&self, input: usize, (first, count): (usize, usize)) -> [f64; 2] {
+    pub fn bounds(&self, input: usize, samples: SampleRange) -> [f64; 2] {
+        let SampleRange { first, count } = samples;
         let stretches = first / STRETCH..=(first + count.max(1) - 1) / STRETCH;
         stretches.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], stretch| {
             let [least, largest] = self.extremes[stretch * self.width() + input];
@@ -444,8 +455,11 @@ fn merge_knots(sorted: &[(f64, bool)], jumps: &[f64], start: f64, end: f64) -> V
 /// Lines of one signal over all segments; `smooth` where no knot stands twice.
 fn fill<'l>(
     lines: impl Iterator<Item = &'l mut [f64; 2]>,
-    (knots, smooth): (&[f64], bool),
-    (times, values, delay): (&[f64], &[f64], f64),
+    knots: &[f64],
+    smooth: bool,
+    times: &[f64],
+    values: &[f64],
+    delay: f64,
 ) {
     let first = times.partition_point(|&t| t < knots[0]);
     // Where the knots are samples there is nothing to search.
@@ -469,9 +483,10 @@ fn line(
     times: &[f64],
     values: &[f64],
     delay: f64,
-    (from, to): (f64, f64),
+    span: (f64, f64),
     cursor: &mut usize,
 ) -> [f64; 2] {
+    let (from, to) = span;
     let middle = 0.5 * (from + to) - delay;
     while *cursor < times.len() && times[*cursor] <= middle {
         *cursor += 1;

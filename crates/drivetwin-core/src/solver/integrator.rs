@@ -42,7 +42,8 @@ impl<'a, T: Real> Integrator<'a, T> {
         cache: SolverCache<'a, T>,
         inputs: &'a Inputs<T>,
         settings: Settings,
-        (x, locked): (Vec<T>, &[usize]),
+        x: Vec<T>,
+        locked: &[usize],
     ) -> Result<Self, Status> {
         let SolverCache { network, modes, propagators } = cache;
         let (from, to) = inputs.span(0);
@@ -99,7 +100,7 @@ impl<'a, T: Real> Integrator<'a, T> {
         let state = &mut self.state;
         let remaining = (-state.t + end).re();
         let wish = remaining.min(self.settings.max_step);
-        let h = state.expand(1, (wish, self.settings.accuracy(self.uses_fixed_step)));
+        let h = state.expand(1, wish, self.settings.accuracy(self.uses_fixed_step));
         if underflows(h, end) && h < remaining {
             return Err(Status::StepTooSmall { time: state.time() });
         }

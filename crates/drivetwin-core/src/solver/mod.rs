@@ -29,7 +29,7 @@ pub use hybrid::event::{Event, EventKind, FrictionState};
 pub use hybrid::state::HybridState;
 pub use hybrid::taylor::TaylorExpansion;
 pub use input_error::InputError;
-pub use inputs::{Inputs, NO_POINT, Signal};
+pub use inputs::{Inputs, NO_POINT, SampleRange, Signal};
 pub use integrator::Integrator;
 pub use lane_mask::lane_mask;
 pub use lockstep::batch::run_lockstep;

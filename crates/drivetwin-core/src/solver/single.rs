@@ -4,24 +4,26 @@
 //! A sample in which a guard could fall is left to the Taylor expansion, which locates the event.
 
 use crate::number::Real;
-use crate::solver::exponential::fixed_step::step_samples;
+use crate::solver::exponential::fixed_step::{FixedSteps, step_samples};
+use crate::solver::exponential::guards::StepState;
 use crate::solver::exponential::plan::StepPlan;
 use crate::solver::exponential::propagator::{Propagator, SizedPropagator};
 use crate::solver::exponential::samples::{
     BLOCK, ChannelState, DelayedInputs, InputSource, SampleBuffer, Samples, SharedInputs, room,
 };
+use crate::solver::inputs::SampleRange;
 use crate::solver::integrator::Integrator;
 use crate::solver::simd::{Kernel, dispatch_simd};
 
 /// Consumer of the samples that fixed steps pass in one mode.
 pub trait SampleSink<T: Real> {
-    /// Samples `(first, count)` with the channels `active`; see [`Samples`].
+    /// Samples of a range with the channels `active`; see [`Samples`].
     fn write_block(
         &mut self,
         run: &Integrator<'_, T>,
         active: &[usize],
         samples: Samples<'_, T>,
-        range: (usize, usize),
+        range: SampleRange,
     );
 }
 
@@ -43,12 +45,11 @@ impl<T: Real> Integrator<'_, T> {
         }
     }
 
-    /// Pass samples of equal length, `steps` [s] and their number; false where a guard could fall before
-    /// their end.
+    /// Pass samples of equal length; false where a guard could fall before their end.
     fn run_block(
         &mut self,
         plan: &StepPlan<T>,
-        steps: (f64, usize),
+        steps: FixedSteps,
         sink: &mut impl SampleSink<T>,
     ) -> bool {
         let active = &plan.active[..];
@@ -65,15 +66,17 @@ impl<T: Real> Integrator<'_, T> {
         }
     }
 
-    /// Plan fixed steps from the present sample on. Return the plan with the length [s] and number
-    /// of its samples, None if fixed steps are not possible.
-    fn plan_fixed_steps(&mut self) -> Option<(StepPlan<T>, (f64, usize))> {
+    /// Plan fixed steps from the present sample on. Return the plan with its samples, None if fixed
+    /// steps are not possible.
+    fn plan_fixed_steps(&mut self) -> Option<(StepPlan<T>, FixedSteps)> {
         let (from, _) = self.inputs.span(self.segment);
         let h = self.inputs.usual_length(self.segment, self.settings.max_step)?;
         let plan = (self.state.t.re() == from)
             .then(|| self.state.plan_steps(&mut self.propagators, h))
             .flatten()?;
-        Some((plan, (h, self.inputs.equal_from(self.segment))))
+        let range =
+            SampleRange { first: self.segment, count: self.inputs.equal_from(self.segment) };
+        Some((plan, FixedSteps { range, h }))
     }
 
     /// Pass samples with operators of known size.
@@ -81,7 +84,7 @@ impl<T: Real> Integrator<'_, T> {
         &mut self,
         operators: &Propagator<T, N>,
         active: &[usize],
-        steps: (f64, usize),
+        steps: FixedSteps,
         sink: &mut impl SampleSink<T>,
     ) -> bool {
         let run = self;
@@ -99,8 +102,8 @@ struct FixedStepRun<'r, 'a, T: Real, S, const N: usize, const A: usize> {
     run: &'r mut Integrator<'a, T>,
     operators: &'r Propagator<T, N>,
     active: &'r [usize],
-    /// Step length [s] and number of samples.
-    steps: (f64, usize),
+    /// Samples to be passed.
+    steps: FixedSteps,
     sink: &'r mut S,
 }
 
@@ -123,46 +126,52 @@ impl<T: Real, S: SampleSink<T>, const N: usize, const A: usize> Kernel
 impl<T: Real, S: SampleSink<T>, const N: usize, const A: usize> FixedStepRun<'_, '_, T, S, N, A> {
     #[inline(always)]
     fn pass<const F: bool, U: InputSource<T>>(self, source: &U) -> bool {
-        let Self { run, operators, active, steps: (h, mut count), sink } = self;
+        let Self { run, operators, active, steps, sink } = self;
+        let (h, mut count) = (steps.h, steps.range.count);
         let mut room = room();
         let first = source.read(run.segment, &mut room);
         let n = run.state.x.len();
         let mut x = [T::zero_(); N];
         x[..n].copy_from_slice(&run.state.x);
-        let mut carry: [ChannelState<T>; A] =
-            ChannelState::start::<F, N, A, _>(operators, first, &x);
-        let mut guards = operators.guards::<_, F, A>(first, (&x, &carry));
+        let carry: [ChannelState<T>; A] = ChannelState::start::<F, N, A, _>(operators, first, &x);
+        let guards = operators.guards::<_, F, A>(first, &x, &carry);
+        let mut state = StepState { x, carry, guards };
         let mut trail = SampleBuffer::in_columns(std::mem::take(&mut run.trail), A);
         let mut whole = true;
         while count > 0 && whole {
-            let samples = (run.segment, count.min(BLOCK));
-            let at = (&mut x, &mut carry, &mut guards);
-            // Samples with derivatives are dear.
-            let to = (&mut trail, 0, 1);
+            let range = SampleRange { first: run.segment, count: count.min(BLOCK) };
+            let (steps, to) = (FixedSteps { range, h }, &mut trail);
+            // Samples with derivatives are expensive, so guards are evaluated after each.
             let (passed, fallen) = if T::DERIVATIVES {
-                step_samples::<U, T, F, N, A, 1>(operators, (source, h), samples, at, to)
+                step_samples::<U, T, F, N, A, 1>(operators, source, steps, &mut state, to, 0, 1)
             } else {
                 step_samples::<U, T, F, N, A, SAMPLES_PER_CHECK>(
-                    operators,
-                    (source, h),
-                    samples,
-                    at,
-                    to,
+                    operators, source, steps, &mut state, to, 0, 1,
                 )
             };
-            sink.write_block(run, active, trail.samples(), (run.segment, passed));
+            sink.write_block(
+                run,
+                active,
+                trail.samples(),
+                SampleRange { first: run.segment, count: passed },
+            );
             run.segment += passed;
             count -= passed;
             if fallen != 0 {
-                x = std::array::from_fn(|i| trail.states(i)[passed]);
+                state.x = std::array::from_fn(|i| trail.states(i)[passed]);
                 whole = false;
             }
         }
-        run.state.x.copy_from_slice(&x[..n]);
+        run.state.x.copy_from_slice(&state.x[..n]);
         run.state.t = T::of(run.inputs.knot(run.segment));
         if run.segment == run.inputs.segments() {
-            trail.store(operators, 0, &x, &carry);
-            sink.write_block(run, active, trail.samples(), (run.segment, 1));
+            trail.store(operators, 0, &state.x, &state.carry);
+            sink.write_block(
+                run,
+                active,
+                trail.samples(),
+                SampleRange { first: run.segment, count: 1 },
+            );
             run.segment -= 1;
         }
         run.trail = trail.into_columns();

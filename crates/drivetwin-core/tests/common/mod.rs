@@ -11,7 +11,7 @@ use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::{Driveline, FrictionLaw, Stribeck};
 use drivetwin_core::network::Network;
 use drivetwin_core::number::Real;
-use drivetwin_core::simulate::{DualClutchStart, Output, Start, Trajectory, run};
+use drivetwin_core::simulate::{DualClutchStart, Output, RunOptions, Start, Trajectory, run};
 use drivetwin_core::solver::{Settings, Signal as Input};
 use std::marker::PhantomData;
 
@@ -81,12 +81,19 @@ pub fn simulate(
     grid: &[f64],
     outputs: &[Output],
 ) -> Trajectory<f64> {
-    simulate_by((Settings::default(), true), network, signals, start, grid, outputs)
+    simulate_by(
+        RunOptions { settings: Settings::default(), audit: true },
+        network,
+        signals,
+        start,
+        grid,
+        outputs,
+    )
 }
 
 /// Simulate with given settings, audited or not. Operators pass samples only without the audit.
 pub fn simulate_by(
-    options: (Settings, bool),
+    options: RunOptions,
     network: &Network<f64>,
     signals: &[Signal],
     start: &Start<f64>,

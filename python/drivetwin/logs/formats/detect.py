@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
@@ -11,13 +11,12 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.can.open import is_bus_text, open_blf, open_bus_text
 from drivetwin.logs.formats.csv import read_csv
+from drivetwin.logs.formats.guarded import open_guarded
 from drivetwin.logs.formats.mat import open_mat
 from drivetwin.logs.formats.mat_integrity import is_version4
 from drivetwin.logs.formats.mdf import open_mdf
 from drivetwin.logs.formats.parquet import open_parquet
-from drivetwin.logs.raw import Recording
-
-Opener = Callable[[Path, ReadOptions], AbstractContextManager[Recording]]
+from drivetwin.logs.raw import Opener, Recording
 
 SUFFIXES = frozenset(
     (".csv", ".txt", ".tsv", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".asc", ".blf", ".log")
@@ -36,6 +35,9 @@ _BY_MAGIC: dict[bytes, Opener] = {
     b"LOGG": open_blf,
 }
 
+_GUARDED = frozenset((open_mdf, open_mat, open_parquet, open_blf))
+"""Readers of binary formats, whose libraries trust damaged bytes."""
+
 _REFUSED = {
     b"\x89HDF": "an HDF5 file without MATLAB header",
     b"PK\x03\x04": "a zip archive or Excel workbook",
@@ -50,8 +52,9 @@ def open_recording(
 ) -> AbstractContextManager[Recording]:
     """Open a log of any format for reading its columns one by one.
 
-    Raises FileFormatError where it cannot be read, MissingExtraError where the library for its
-    format is not installed, and the errors of its reader.
+    Libraries for binary formats run in a child process, see `open_guarded`. Raises FileFormatError
+    where the file cannot be read, MissingExtraError where the library for its format is not
+    installed, and the errors of its reader.
     """
     try:
         with path.open("rb") as file:
@@ -59,7 +62,9 @@ def open_recording(
     except OSError as fault:
         what = f"cannot read the file: {fault.strerror}"
         raise FileFormatError(what, "check the path", Where(file=str(path))) from None
-    return _select_opener(head, path)(path, options or ReadOptions())
+    opener = _select_opener(head, path)
+    options = options or ReadOptions()
+    return open_guarded(opener, path, options) if opener in _GUARDED else opener(path, options)
 
 
 def _select_opener(head: bytes, path: Path) -> Opener:

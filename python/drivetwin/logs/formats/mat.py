@@ -17,8 +17,9 @@ import numpy as np
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, MissingChannelError, Where
-from drivetwin.logs.formats.mat_integrity import check_blocks
+from drivetwin.logs.formats.mat_integrity import check_blocks, refuse_expansion
 from drivetwin.logs.formats.mat_signals import Signals, find_signals
+from drivetwin.logs.formats.parser_limits import compute_parser_limits
 from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.raw import RawLog, Recording
 
@@ -63,6 +64,7 @@ def _make_no_signal_error(
 def _read_tree(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
+    refuse_expansion(path, compute_parser_limits(path).memory)
     check_blocks(path)
     content = loadmat(path, struct_as_record=False, squeeze_me=True, appendmat=False)
     return {name: _to_plain(v) for name, v in content.items() if not name.startswith("__")}

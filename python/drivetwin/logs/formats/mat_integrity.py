@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from drivetwin.errors import FileFormatError, Where
+from drivetwin.errors import FileFormatError, ReaderFailureError, Where
 
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -60,6 +60,39 @@ def check_blocks(path: Path) -> None:
                     f"variable {number} has parts of no known type or length", path
                 )
             file.seek(start + length)
+
+
+def refuse_expansion(path: Path, limit: int) -> None:
+    """Raise ReaderFailureError if a file of version 5 declares variables above `limit` [bytes].
+
+    Otherwise the reader would expand a file of a few megabytes for half a minute before it fails.
+    """
+    total = 0
+    with path.open("rb") as file:
+        head = file.read(_HEADER)
+        if not head.startswith(b"MATLAB 5.0"):
+            return
+        for kind, size in _iterate_elements(file, "<" if head.endswith(b"IM") else ">"):
+            start = file.tell()
+            total += _read_declared_size(file.read(256), head) if kind == _COMPRESSED else size
+            file.seek(start + size)
+    if total > limit:
+        raise ReaderFailureError(
+            f"the file says that it expands to {total / 1e9:.1f} GB, at most {limit / 1e9:.1f} GB "
+            "are read",
+            "hand in a shorter log, or only the channels that are needed",
+            Where(file=str(path)),
+        )
+
+
+def _read_declared_size(packed: bytes, head: bytes) -> int:
+    """Read the declared size [bytes] of a compressed variable; 0 if its header cannot be read."""
+    try:
+        tag = zlib.decompressobj().decompress(packed, 8)
+    except zlib.error:
+        return 0
+    order = "<" if head.endswith(b"IM") else ">"
+    return int(struct.unpack(f"{order}II", tag)[1]) if len(tag) == 8 else 0
 
 
 def is_version4(head: bytes) -> bool:

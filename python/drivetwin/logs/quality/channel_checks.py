@@ -30,9 +30,7 @@ from drivetwin.logs.quality.outliers import (
     find_stuck,
 )
 from drivetwin.logs.quality.update_raster import find_raster
-
-MIN_SAMPLES = 10
-"""Fewer samples cannot show a shift."""
+from drivetwin.logs.raw import MIN_SAMPLES
 
 MIN_SOUND = 0.5
 """Share of the samples that must hold a sound number."""

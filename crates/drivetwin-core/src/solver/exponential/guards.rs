@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 //! Guards of fixed steps: torques within their limits, speeds above zero, normal loads above zero.
 
-use crate::network::smooth::{Line, Sample};
-use crate::number::{Factor, Lane, Values};
+use crate::network::smooth_law::{AffineForm, Sample};
+use crate::number::{Coefficient, KernelFloat, Values};
 use crate::solver::exponential::propagator::{Bound, MAX_GUARDS, Propagator, SampleGuard};
 use crate::solver::exponential::samples::{ChannelState, InputSource, SampleBuffer, SampleColumn};
+use crate::solver::inputs::SampleRange;
 
 /// Of the watched forms at the start of a sample, what torques are off their limits by or what speeds are,
 /// and what the forms are.
@@ -12,16 +13,34 @@ pub type Guards<V> = [[V; 2]; MAX_GUARDS];
 
 /// Guards that never cross.
 pub fn inactive_guards<V: Values>() -> Guards<V> {
-    [[V::all(1.0), V::all(0.0)]; MAX_GUARDS]
+    [[V::splat(1.0), V::splat(0.0)]; MAX_GUARDS]
 }
 
-impl<L: Lane, const N: usize> Propagator<L, N> {
+/// State, carried channels and guards at the start of a sample.
+pub struct StepState<L: KernelFloat, const N: usize, const A: usize> {
+    /// State.
+    pub x: [L; N],
+    /// Carried channels.
+    pub carry: [ChannelState<L>; A],
+    /// Guards.
+    pub guards: Guards<L::Values>,
+}
+
+impl<L: KernelFloat, const N: usize, const A: usize> StepState<L, N, A> {
+    /// State zero without torques, whose guards never cross.
+    #[inline(always)]
+    pub fn idle() -> Self {
+        Self { x: [L::splat(0.0); N], carry: [ChannelState::idle(); A], guards: inactive_guards() }
+    }
+}
+
+impl<L: KernelFloat, const N: usize> Propagator<L, N> {
     /// Return true if every normal load stays above zero over samples, in all lanes.
     #[inline(always)]
     pub fn stays_loaded<S: InputSource<L>, const F: bool>(
         &self,
         source: &S,
-        samples: (usize, usize),
+        samples: SampleRange,
     ) -> bool {
         // A loop: the body of `all` would be compiled apart, for the least of all processors.
         let mut loaded = true;
@@ -36,17 +55,18 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     ///
     /// Apart from what falls in the step: sums over a loop that start from nothing stay in vectors.
     #[inline(always)]
-    pub fn crossed<V: Factor<L::Values>, const F: bool, const A: usize>(
+    pub fn crossed<V: Coefficient<L::Values>, const F: bool, const A: usize>(
         &self,
         guards: &mut Guards<L::Values>,
         input: impl Fn(usize) -> V,
         loads: bool,
-        at: (&[L; N], &[ChannelState<L>; A]),
+        x: &[L; N],
+        carry: &[ChannelState<L>; A],
     ) -> L::Values {
-        let mut left = [L::Values::all(0.0)];
+        let mut left = [L::Values::splat(0.0)];
         for (place, before) in guards.iter_mut().enumerate().take(self.guards.len()) {
-            let after = self.guard::<V, F, A>(place, &input, at.0, at.1);
-            self.may_cross::<F, _>(place, (before, &after.map(|value| [value])), &mut left);
+            let after = self.guard::<V, F, A>(place, &input, x, carry);
+            self.may_cross::<F, _>(place, before, &after.map(|value| [value]), &mut left);
             *before = after;
         }
         if loads {
@@ -60,7 +80,12 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     /// Evaluate [`Self::crossed`] for `some` samples together, from the trail and the inputs at the sample
     /// ends.
     #[inline(always)]
-    pub fn crossed_in_block<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
+    pub fn crossed_in_block<
+        V: Coefficient<L::Values>,
+        const F: bool,
+        const A: usize,
+        const W: usize,
+    >(
         &self,
         guards: &mut Guards<L::Values>,
         ends: impl Fn(usize) -> [V; W],
@@ -69,10 +94,10 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
         from: usize,
         some: usize,
     ) -> [L::Values; W] {
-        let mut left = [L::Values::all(0.0); W];
+        let mut left = [L::Values::splat(0.0); W];
         for (place, before) in guards.iter_mut().enumerate().take(self.guards.len()) {
             let after = self.guards_after::<_, F, A, W>(place, &ends, trail, from);
-            self.may_cross::<F, _>(place, (before, &after), &mut left);
+            self.may_cross::<F, _>(place, before, &after, &mut left);
             *before = after.map(|values| values[some - 1]);
         }
         if loads {
@@ -85,21 +110,26 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
 
     /// All guards at the start of a segment.
     #[inline(always)]
-    pub fn guards<U: Factor<L, Values: Factor<L::Values>>, const F: bool, const A: usize>(
+    pub fn guards<
+        U: Coefficient<L, Values: Coefficient<L::Values>>,
+        const F: bool,
+        const A: usize,
+    >(
         &self,
         sample: &Sample<U>,
-        at: (&[L; N], &[ChannelState<L>; A]),
+        x: &[L; N],
+        carry: &[ChannelState<L>; A],
     ) -> Guards<L::Values> {
         let mut guards = inactive_guards();
         for (place, guard) in guards.iter_mut().enumerate().take(self.guards.len()) {
-            *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), at.0, at.1);
+            *guard = self.guard::<_, F, A>(place, |input| sample[input][0].values(), x, carry);
         }
         guards
     }
 
     /// Margin or speed, and value, of a watched form at one instant, by the values of inputs there.
     #[inline(always)]
-    fn guard<V: Factor<L::Values>, const F: bool, const A: usize>(
+    fn guard<V: Coefficient<L::Values>, const F: bool, const A: usize>(
         &self,
         place: usize,
         input: impl Fn(usize) -> V,
@@ -108,8 +138,8 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     ) -> [L::Values; 2] {
         let SampleGuard { form, bound } = &self.guards[place];
         let mut value = form.constant.values();
-        for drive in &self.drives {
-            value = input(drive.input).onto::<F>(drive.guards[place].values(), value);
+        for drive in &self.inputs {
+            value = input(drive.input).multiply_add::<F>(drive.guards[place].values(), value);
         }
         for i in 0..self.columns() {
             value = form.state[i].values().fma::<F>(x[i].values(), value);
@@ -120,12 +150,12 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
         }
         match bound {
             Bound::Within { limit, side } => {
-                let Line { input: of, gain, offset } = limit;
-                let limit = input(*of).onto::<F>(gain.values(), offset.values());
+                let AffineForm { input: of, gain, offset } = limit;
+                let limit = input(*of).multiply_add::<F>(gain.values(), offset.values());
                 [margin::<L, F>(*side, limit, value), value]
             }
             Bound::Above(row) => {
-                let mut speed = L::Values::all(0.0);
+                let mut speed = L::Values::splat(0.0);
                 for i in 0..self.columns() {
                     speed = row[i].values().fma::<F>(x[i].values(), speed);
                 }
@@ -136,7 +166,7 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
 
     /// Margins or speeds, and values, of a guard at the ends of `W` samples from `from` on.
     #[inline(always)]
-    fn guards_after<V: Factor<L::Values>, const F: bool, const A: usize, const W: usize>(
+    fn guards_after<V: Coefficient<L::Values>, const F: bool, const A: usize, const W: usize>(
         &self,
         place: usize,
         ends: &impl Fn(usize) -> [V; W],
@@ -145,7 +175,7 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     ) -> [[L::Values; W]; 2] {
         let SampleGuard { form, bound } = &self.guards[place];
         let mut values = [form.constant.values(); W];
-        for drive in &self.drives {
+        for drive in &self.inputs {
             add::<L, V, F, W>(&mut values, drive.guards[place], &ends(drive.input));
         }
         self.add_states::<F, W>(&mut values, &form.state, trail, from);
@@ -165,7 +195,7 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
                 [margins, values]
             }
             Bound::Above(row) => {
-                let mut speeds = [L::Values::all(0.0); W];
+                let mut speeds = [L::Values::splat(0.0); W];
                 self.add_states::<F, W>(&mut speeds, row, trail, from);
                 [speeds, values]
             }
@@ -201,7 +231,8 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
     fn may_cross<const F: bool, const W: usize>(
         &self,
         place: usize,
-        (before, after): (&[L::Values; 2], &[[L::Values; W]; 2]),
+        before: &[L::Values; 2],
+        after: &[[L::Values; W]; 2],
         fallen: &mut [L::Values; W],
     ) {
         let [mut margin, mut value] = *before;
@@ -218,7 +249,7 @@ impl<L: Lane, const N: usize> Propagator<L, N> {
                 let corners = (margin + value).smaller(margin_after - value_after);
                 corners.smaller(margin).smaller(margin_after)
             };
-            fallen[k] = fallen[k].negative_with(left);
+            fallen[k] = fallen[k].either_negative(left);
             (margin, value) = (margin_after, value_after);
         }
     }
@@ -232,42 +263,46 @@ fn after<L, const W: usize>(column: &SampleColumn<L>, from: usize) -> &[L; W] {
 
 /// Add multiples of inputs.
 #[inline(always)]
-fn add<L: Lane, V: Factor<L::Values>, const F: bool, const W: usize>(
+fn add<L: KernelFloat, V: Coefficient<L::Values>, const F: bool, const W: usize>(
     sums: &mut [L::Values; W],
     factor: L,
     inputs: &[V; W],
 ) {
     for k in 0..W {
-        sums[k] = inputs[k].onto::<F>(factor.values(), sums[k]);
+        sums[k] = inputs[k].multiply_add::<F>(factor.values(), sums[k]);
     }
 }
 
 /// Distance of a torque to its limit, see [`Bound::Within`].
 #[inline(always)]
-fn margin<L: Lane, const F: bool>(side: L, limit: L::Values, torque: L::Values) -> L::Values {
+fn margin<L: KernelFloat, const F: bool>(
+    side: L,
+    limit: L::Values,
+    torque: L::Values,
+) -> L::Values {
     (limit + torque).smaller(side.values().fma::<F>(-torque, limit))
 }
 
-impl<L: Lane> Line<L> {
+impl<L: KernelFloat> AffineForm<L> {
     /// Return true if the line stays above zero in all lanes while its input stays within bounds.
     #[inline(always)]
     fn stays_positive<const F: bool>(&self, [low, high]: [L::Values; 2]) -> bool {
         let (gain, offset) = (self.gain.values(), self.offset.values());
         // Above zero where its negative is below.
-        let below = |u| (-gain.fma::<F>(u, offset)).negative();
-        below(low) & below(high) == L::Values::all(-1.0).negative()
+        let below = |u| (-gain.fma::<F>(u, offset)).negative_mask();
+        below(low) & below(high) == L::Values::splat(-1.0).negative_mask()
     }
 
     /// Make negative where the line falls below zero at the end of a sample.
     #[inline(always)]
-    fn may_cross<V: Factor<L::Values>, const F: bool, const W: usize>(
+    fn may_cross<V: Coefficient<L::Values>, const F: bool, const W: usize>(
         &self,
         ends: &[V; W],
         fallen: &mut [L::Values; W],
     ) {
         for k in 0..W {
-            let load = ends[k].onto::<F>(self.gain.values(), self.offset.values());
-            fallen[k] = fallen[k].negative_with(load);
+            let load = ends[k].multiply_add::<F>(self.gain.values(), self.offset.values());
+            fallen[k] = fallen[k].either_negative(load);
         }
     }
 }

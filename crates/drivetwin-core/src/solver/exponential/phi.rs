@@ -5,7 +5,7 @@
 //! Plain loops throughout: the body of a closure would be compiled apart, for the least of all processors.
 //! Matrices are written in place: of several runs side by side they are large, and copied where returned.
 
-use crate::number::{Lane, Number, Values};
+use crate::number::{KernelFloat, Number, Values};
 use crate::solver::tolerances::SERIES_RTOL;
 
 /// A square matrix by rows.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! Plan of fixed steps in the present mode: the propagator and its guards.
 
-use crate::network::channel;
-use crate::network::smooth::{Law, Line, MAX_INPUTS, line_of};
-use crate::network::{Cell, Channel, GearState, Network, Row};
-use crate::number::{Lane, Number};
+use crate::network::nonlinear_torque::TorqueLaw;
+use crate::network::smooth_law::{AffineForm, MAX_INPUTS, SmoothLaw, normal_load};
+use crate::network::{Branch, GearState, Network, NonlinearTorque, RowId};
+use crate::number::{KernelFloat, Number};
 use crate::solver::exponential::propagator::{
     MAX_ACTIVE, MAX_GUARDS, MAX_STATES, Propagator, SizedPropagator,
 };
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// Most states of a network over `T` that is marched. With derivatives the gain with more does not pay for the
 /// code, and several runs side by side are drivelines of two clutches.
-const fn max_states<T: Lane>() -> usize {
+const fn max_states<T: KernelFloat>() -> usize {
     if T::RUNS > 1 {
         4
     } else if T::DERIVATIVES {
@@ -29,8 +29,8 @@ const fn max_states<T: Lane>() -> usize {
 
 /// Return true if propagators can pass the samples of a network.
 pub fn supports_fixed_step<T: Number>(network: &Network<T>) -> bool {
-    let smooth = |channel: &Channel<T>| {
-        matches!(channel.law, channel::Law::Friction { .. } | channel::Law::Quadratic(_))
+    let smooth = |channel: &NonlinearTorque<T>| {
+        matches!(channel.law, TorqueLaw::Friction { .. } | TorqueLaw::Quadratic(_))
     };
     network.states() <= max_states::<T>()
         && network.prescribed.is_empty()
@@ -56,8 +56,8 @@ impl<T: Number> HybridState<'_, T> {
         if !self.is_simple() {
             return None;
         }
-        let on = |j: &usize| self.cells[*j] != Cell::Off;
-        let active: Vec<usize> = (0..self.cells.len()).filter(on).collect();
+        let on = |j: &usize| self.branches[*j] != Branch::Off;
+        let active: Vec<usize> = (0..self.branches.len()).filter(on).collect();
         let operators = self.operators(propagators, &active, h)?;
         Some(StepPlan { operators, active })
     }
@@ -76,7 +76,9 @@ impl<T: Number> HybridState<'_, T> {
         if let Some(known) = propagators.entries.get(&key) {
             return known.clone();
         }
-        let laws = active.iter().map(|&j| Law::of(&self.network.channels[j], self.cells[j]));
+        let laws = active
+            .iter()
+            .map(|&j| SmoothLaw::from_channel(&self.network.channels[j], self.branches[j]));
         let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| match self.network.states() {
             0..=4 => self.build::<4>(active, &laws, h).map(|o| SizedPropagator::Four(Arc::new(o))),
             5..=8 if T::RUNS == 1 => {
@@ -99,7 +101,7 @@ impl<T: Number> HybridState<'_, T> {
         let mut pieces = [0; MAX_ACTIVE];
         for (slot, &j) in active.iter().enumerate() {
             branches[0] |= 1 << j;
-            if let Cell::Moving { sign, piece } = self.cells[j] {
+            if let Branch::Moving { sign, piece } = self.branches[j] {
                 branches[1] |= u64::from(sign < 0.0) << j;
                 pieces[slot] = piece as u8;
             }
@@ -126,10 +128,10 @@ impl<T: Number> HybridState<'_, T> {
     fn build<const N: usize>(
         &self,
         active: &[usize],
-        laws: &[Law<T>],
+        laws: &[SmoothLaw<T>],
         h: f64,
     ) -> Option<Propagator<T, N>> {
-        let mut operators = Propagator::build(self.network, &self.mode, (active, laws), h)?;
+        let mut operators = Propagator::build(self.network, &self.mode, active, laws, h)?;
         self.guard_frictions(active, h, &mut operators);
         self.guard_gears(active, h, &mut operators);
         (operators.guards.len() <= MAX_GUARDS).then_some(operators)
@@ -143,11 +145,11 @@ impl<T: Number> HybridState<'_, T> {
     ) {
         for (j, row) in self.network.frictions.iter().enumerate() {
             let side = if self.pressed[j] { 1.0 } else { -1.0 };
-            let load = line_of(&row.normal);
+            let load = normal_load(&row.normal);
             // At the end of a sample the load is a sum, with round-off of its own.
             let nothing =
                 row.normal.load_tolerance() + if self.pressed[j] { TORQUE_ATOL } else { 0.0 };
-            let above = Line { offset: load.offset - nothing, ..load };
+            let above = AffineForm { offset: load.offset - nothing, ..load };
             operators.loads.push(above.map(|v| v * side));
             match self.rows[j] {
                 FrictionState::Sticking => {
@@ -156,7 +158,7 @@ impl<T: Number> HybridState<'_, T> {
                     } else {
                         T::zero_()
                     };
-                    let position = self.mode.stuck.iter().position(|&s| s == Row::Friction(j));
+                    let position = self.mode.stuck.iter().position(|&s| s == RowId::Friction(j));
                     let position = position.expect("a stuck element belongs to the mode");
                     let torque = self.mode.stuck_torque.row(position);
                     let mut limit = load.map(|v| v * mu);
@@ -194,6 +196,6 @@ impl<T: Number> HybridState<'_, T> {
     }
 }
 
-fn constant<T: Number>(value: T) -> Line<T> {
-    Line { input: 0, gain: T::zero_(), offset: value }
+fn constant<T: Number>(value: T) -> AffineForm<T> {
+    AffineForm { input: 0, gain: T::zero_(), offset: value }
 }

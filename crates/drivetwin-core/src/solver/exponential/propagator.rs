@@ -6,9 +6,9 @@
 //! every channel there and its rate are linear in x, u, u', a. Channels count in their direction of
 //! motion: `τ = sign · φ` over `m = sign · unit · s`.
 
-use crate::network::smooth::{Law, Line};
+use crate::network::smooth_law::{AffineForm, SmoothLaw};
 use crate::network::{Mode, Network};
-use crate::number::{Lane, Number, Values};
+use crate::number::{KernelFloat, Number, Values};
 use crate::solver::exponential::phi::{
     FORCING_DEGREE, N_BASIS, apply, dot, forcing_response, phi_functions, unrolled,
 };
@@ -40,19 +40,19 @@ pub struct Propagator<L, const N: usize> {
     /// State at the end without initial state and inputs.
     pub constant: [L; N],
     /// Inputs that act on the state.
-    pub drives: Vec<Drive<L, N>>,
+    pub inputs: Vec<InputMap<L, N>>,
     /// Carried channels.
     pub channels: Vec<ChannelCoefficients<L, N>>,
     /// Forms that must stay within their limits.
     pub guards: Vec<SampleGuard<L, N>>,
     /// Normal loads that must stay above zero.
-    pub loads: Vec<Line<L>>,
+    pub loads: Vec<AffineForm<L>>,
 }
 
 /// Effect of one input; pairs are those of its value at the start and of its rate, per second. On rates and turns
 /// of the arguments as in [`ChannelCoefficients`].
 #[derive(Clone, Copy, Debug)]
-pub struct Drive<L, const N: usize> {
+pub struct InputMap<L, const N: usize> {
     /// Its index.
     pub input: usize,
     /// On the state at the end.
@@ -106,7 +106,7 @@ pub struct ChannelCoefficients<L, const N: usize> {
     /// Half the second derivative of the argument at the start, over a sample.
     pub half_second_derivative: StepForm<L, N>,
     /// Its law.
-    pub law: Law<L>,
+    pub law: SmoothLaw<L>,
     /// Rise of the normal load in a sample, over the rate of its input.
     pub load_slope: L,
 }
@@ -127,7 +127,7 @@ pub enum Bound<L, const N: usize> {
     /// `side` is 1, else `limit(u) + form` and it is -1.
     Within {
         /// The limit.
-        limit: Line<L>,
+        limit: AffineForm<L>,
         /// 1 if both signs are bounded, -1 if only the negative one is.
         side: L,
     },
@@ -141,26 +141,32 @@ impl<T: Number, const N: usize> Propagator<T, N> {
     pub fn build(
         network: &Network<T>,
         mode: &Mode<T>,
-        (active, laws): (&[usize], &[Law<T>]),
+        active: &[usize],
+        laws: &[SmoothLaw<T>],
         h: f64,
     ) -> Option<Self> {
         dispatch_simd(BuildKernel { network, mode, active, laws, h })
     }
 
-    /// Add a channel; `argument` is its argument over the states.
+    /// Add the active channel number `slot`.
     #[inline(always)]
     fn carry<const F: bool>(
         &mut self,
         slot: usize,
-        (network, mode): (&Network<T>, &Mode<T>),
-        (active, forcing_response): (&[usize], &[[[T; N]; N_BASIS]]),
-        (argument, law, h): ([T; N], Law<T>, f64),
+        kernel: &BuildKernel<'_, T, N>,
+        forcing_response: &[[[T; N]; N_BASIS]],
     ) {
+        let BuildKernel { network, mode, active, laws, h } = *kernel;
+        let law = laws[slot];
+        let mut argument = [T::zero_(); N];
+        for (to, &c) in argument.iter_mut().zip(&network.channels[active[slot]].arguments[0]) {
+            *to = c * law.sign * law.unit;
+        }
         let now = over_basis::<T, F, N>(network, mode, &argument, h);
         let mut rate = [T::zero_(); N];
         rate[..network.states()].copy_from_slice(&now[..network.states()]);
         let second = over_basis::<T, F, N>(network, mode, &rate, 0.5 * h);
-        for drive in &mut self.drives {
+        for drive in &mut self.inputs {
             let ([held, load_slope], input) = (&drive.step, network.first_input() + drive.input);
             drive.argument[slot] =
                 [dot::<T, F, N>(&argument, held), dot::<T, F, N>(&argument, load_slope)];
@@ -169,9 +175,8 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         }
         let argument_end = self.at_end::<F>(&argument, forcing_response);
         let rate_end = over_moments::<T, F, N>(&rate, forcing_response);
-        let rate = Form::over(network, (active, &self.signs), &now);
-        let Form { state, constant, channels } =
-            Form::over(network, (active, &self.signs), &second);
+        let rate = Form::over(network, active, &self.signs, &now);
+        let Form { state, constant, channels } = Form::over(network, active, &self.signs, &second);
         let mut half_second_derivative = StepForm { state, constant, ..StepForm::idle() };
         for other in 0..MAX_ACTIVE {
             half_second_derivative.cubics[other][0] = channels[other];
@@ -211,7 +216,7 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         network: &Network<T>,
         active: &[usize],
         row: &[T],
-        limit: Line<T>,
+        limit: AffineForm<T>,
         both: bool,
     ) {
         let side = T::of(if both { 1.0 } else { -1.0 });
@@ -237,11 +242,11 @@ impl<T: Number, const N: usize> Propagator<T, N> {
 
     fn watch(&mut self, network: &Network<T>, active: &[usize], row: &[T], bound: Bound<T, N>) {
         let place = self.guards.len();
-        for drive in &mut self.drives {
+        for drive in &mut self.inputs {
             drive.guards[place] =
                 row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
         }
-        let form = Form::over(network, (active, &[T::of(1.0); MAX_ACTIVE]), row);
+        let form = Form::over(network, active, &[T::of(1.0); MAX_ACTIVE], row);
         self.guards.push(SampleGuard { form, bound });
     }
 }
@@ -251,7 +256,7 @@ struct BuildKernel<'b, T, const N: usize> {
     network: &'b Network<T>,
     mode: &'b Mode<T>,
     active: &'b [usize],
-    laws: &'b [Law<T>],
+    laws: &'b [SmoothLaw<T>],
     h: f64,
 }
 
@@ -261,7 +266,7 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
     #[inline(always)]
     fn run<const F: bool>(self) -> Option<Propagator<T, N>> {
         let Self { network, mode, active, laws, h } = self;
-        let reach = mode.radius * h;
+        let reach = mode.spectral_radius * h;
         let longest =
             if active.is_empty() { MAX_SPECTRAL_STEP_LINEAR } else { MAX_SPECTRAL_STEP_SLIPPING };
         if reach.re().decide(|reach| reach > longest) {
@@ -276,7 +281,7 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
         let mut s = [[[T::zero_(); N]; N]; FORCING_DEGREE + 1];
         phi_functions::<T, F, N>(&a, h, reach, &mut s);
         let mut operators = Propagator::empty(n, reach);
-        operators.drives.reserve_exact(network.mechanism.inputs.len());
+        operators.inputs.reserve_exact(network.mechanism.inputs.len());
         operators.channels.reserve_exact(active.len());
         for i in 0..N {
             for j in 0..unrolled::<T, N>() {
@@ -288,7 +293,7 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
             if network.is_driven_by(input) {
                 let force = forcing(mode, network.first_input() + input);
                 let step = [apply::<T, F, N>(&s[1], &force), apply::<T, F, N>(&s[2], &force)];
-                operators.drives.push(Drive::new(input, step));
+                operators.inputs.push(InputMap::new(input, step));
             }
         }
         let mut responses: SmallVec<[[[T; N]; N_BASIS]; 2]> = SmallVec::new();
@@ -300,13 +305,8 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
             }
             responses.push(forcing_response::<T, F, N>(&s, &force, h));
         }
-        for (slot, &j) in active.iter().enumerate() {
-            let mut argument = [T::zero_(); N];
-            for (to, &c) in argument.iter_mut().zip(&network.channels[j].arguments[0]) {
-                *to = c * laws[slot].sign * laws[slot].unit;
-            }
-            let carried = (argument, laws[slot], h);
-            operators.carry::<F>(slot, (network, mode), (active, &responses), carried);
+        for slot in 0..active.len() {
+            operators.carry::<F>(slot, &self, &responses);
         }
         // Inner loops exist for 0, 1, 2 and 4 channels.
         if operators.channels.len() == 3 {
@@ -357,7 +357,7 @@ impl<T: Number, const N: usize> Propagator<T, N> {
             signs: [none; MAX_ACTIVE],
             transition: [[none; N]; N],
             constant: [none; N],
-            drives: Vec::new(),
+            inputs: Vec::new(),
             channels: Vec::new(),
             guards: Vec::new(),
             loads: Vec::new(),
@@ -365,14 +365,14 @@ impl<T: Number, const N: usize> Propagator<T, N> {
     }
 }
 
-impl<L: Lane, const N: usize> Drive<L, N> {
+impl<L: KernelFloat, const N: usize> InputMap<L, N> {
     fn new(input: usize, step: [[L; N]; 2]) -> Self {
         Self { input, step, ..Self::idle() }
     }
 
     /// Create an input without effect.
     pub fn idle() -> Self {
-        let none = L::all(0.0);
+        let none = L::splat(0.0);
         Self {
             input: 0,
             step: [[none; N]; 2],
@@ -384,10 +384,10 @@ impl<L: Lane, const N: usize> Drive<L, N> {
     }
 }
 
-impl<L: Lane, const N: usize> ChannelCoefficients<L, N> {
+impl<L: KernelFloat, const N: usize> ChannelCoefficients<L, N> {
     /// Create a channel without torque.
     pub fn idle() -> Self {
-        let none = L::all(0.0);
+        let none = L::splat(0.0);
         Self {
             forcing_response: [[none; N]; N_BASIS],
             argument: [none; N],
@@ -395,35 +395,31 @@ impl<L: Lane, const N: usize> ChannelCoefficients<L, N> {
             rate_end: [[none; N_BASIS]; MAX_ACTIVE],
             rate: Form::idle(),
             half_second_derivative: StepForm::idle(),
-            law: Law::idle(),
+            law: SmoothLaw::idle(),
             load_slope: none,
         }
     }
 }
 
-impl<L: Lane, const N: usize> StepForm<L, N> {
+impl<L: KernelFloat, const N: usize> StepForm<L, N> {
     /// Always zero.
     fn idle() -> Self {
-        let none = L::all(0.0);
+        let none = L::splat(0.0);
         Self { state: [none; N], constant: none, cubics: [[none; N_BASIS]; MAX_ACTIVE] }
     }
 }
 
-impl<L: Lane, const N: usize> Form<L, N> {
+impl<L: KernelFloat, const N: usize> Form<L, N> {
     /// Always zero.
     fn idle() -> Self {
-        let none = L::all(0.0);
+        let none = L::splat(0.0);
         Self { state: [none; N], constant: none, channels: [none; MAX_ACTIVE] }
     }
 }
 
 impl<T: Number, const N: usize> Form<T, N> {
     /// Of a row over the basis or over the states alone.
-    fn over(
-        network: &Network<T>,
-        (active, signs): (&[usize], &[T; MAX_ACTIVE]),
-        row: &[T],
-    ) -> Self {
+    fn over(network: &Network<T>, active: &[usize], signs: &[T; MAX_ACTIVE], row: &[T]) -> Self {
         let at = |position: usize| row.get(position).map_or(T::zero_(), |&c| c);
         let state = |i: usize| if i < network.states() { at(i) } else { T::zero_() };
         let mut channels = [T::zero_(); MAX_ACTIVE];

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
 //! Inputs, channel states and output buffers of fixed-step runs.
 
-use crate::network::smooth::{MAX_INPUTS, Sample, Value};
-use crate::number::{FOUR, Factor, Lane, Real};
+use crate::network::smooth_law::{LawValue, MAX_INPUTS, Sample};
+use crate::number::{Coefficient, FOUR, KernelFloat, Real};
 use crate::solver::exponential::propagator::{ChannelCoefficients, Form, Propagator};
-use crate::solver::inputs::Inputs;
+use crate::solver::inputs::{Inputs, SampleRange};
 
 /// Samples that are passed before they are handed on.
 pub const BLOCK: usize = 64;
 
 /// Inputs of one run or several.
-pub trait InputSource<L: Lane> {
+pub trait InputSource<L: KernelFloat> {
     /// Plain numbers, or where runs have inputs of their own or a delay is a parameter, numbers like the
     /// state. With derivatives these jump between segments.
-    type Input: Factor<L, Values: Factor<L::Values>>;
+    type Input: Coefficient<L, Values: Coefficient<L::Values>>;
 
     /// The inputs of a segment, in `room` where they stand nowhere.
     fn read<'s>(
@@ -22,9 +22,8 @@ pub trait InputSource<L: Lane> {
         room: &'s mut InputScratch<Self::Input>,
     ) -> &'s Sample<Self::Input>;
 
-    /// The least and the largest value of an input over `count` segments from `first` on, or bounds of
-    /// these.
-    fn bounds(&self, input: usize, samples: (usize, usize)) -> [L::Values; 2];
+    /// The least and the largest value of an input over a range of samples, or bounds of these.
+    fn bounds(&self, input: usize, samples: SampleRange) -> [L::Values; 2];
 }
 
 /// Room for the inputs of a segment.
@@ -32,13 +31,13 @@ pub type InputScratch<U> = [[U; 2]; MAX_INPUTS];
 
 /// [`InputScratch`] without inputs.
 #[inline(always)]
-pub fn room<U: Lane>() -> InputScratch<U> {
-    [[U::all(0.0); 2]; MAX_INPUTS]
+pub fn room<U: KernelFloat>() -> InputScratch<U> {
+    [[U::splat(0.0); 2]; MAX_INPUTS]
 }
 
 /// Evaluate a line (value, rate) after `h` [s], without derivatives.
 #[inline(always)]
-pub(crate) fn line_end<U: Lane>([start, rate]: [U; 2], h: f64) -> U::Values {
+pub(crate) fn line_end<U: KernelFloat>([start, rate]: [U; 2], h: f64) -> U::Values {
     rate.values().times(h) + start.values()
 }
 
@@ -54,7 +53,7 @@ impl<T: Real> InputSource<T> for SharedInputs<'_, T> {
     }
 
     #[inline(always)]
-    fn bounds(&self, input: usize, samples: (usize, usize)) -> [f64; 2] {
+    fn bounds(&self, input: usize, samples: SampleRange) -> [f64; 2] {
         self.0.bounds(input, samples)
     }
 }
@@ -74,7 +73,7 @@ impl<T: Real> InputSource<T> for DelayedInputs<'_, T> {
     }
 
     #[inline(always)]
-    fn bounds(&self, input: usize, samples: (usize, usize)) -> [f64; 2] {
+    fn bounds(&self, input: usize, samples: SampleRange) -> [f64; 2] {
         self.0.bounds(input, samples)
     }
 }
@@ -87,21 +86,21 @@ pub struct ChannelState<L> {
     /// Its rate over a sample.
     pub rate: L,
     /// Torque with its slopes.
-    pub value: Value<L>,
+    pub value: LawValue<L>,
     /// Argument expected at the end of the sample.
     pub predicted_argument: L,
     /// Stiction there.
     pub stiction: L,
 }
 
-impl<L: Lane> ChannelState<L> {
+impl<L: KernelFloat> ChannelState<L> {
     /// State of an inactive channel.
     pub fn idle() -> Self {
-        let none = L::all(0.0);
+        let none = L::splat(0.0);
         Self {
             argument: none,
             rate: none,
-            value: Value::zero(),
+            value: LawValue::zero(),
             predicted_argument: none,
             stiction: none,
         }
@@ -114,10 +113,12 @@ impl<L: Lane> ChannelState<L> {
         Self {
             argument: self.argument.replace_where(runs, other.argument),
             rate: self.rate.replace_where(runs, other.rate),
-            value: Value {
+            value: LawValue {
                 value: own.value.replace_where(runs, value.value),
                 by_argument: own.by_argument.replace_where(runs, value.by_argument),
-                bend: own.bend.replace_where(runs, value.bend),
+                half_second_derivative: own
+                    .half_second_derivative
+                    .replace_where(runs, value.half_second_derivative),
                 by_normal: own.by_normal.replace_where(runs, value.by_normal),
                 mixed: own.mixed.replace_where(runs, value.mixed),
             },
@@ -130,7 +131,7 @@ impl<L: Lane> ChannelState<L> {
 
     /// All channels at the start of a segment.
     #[inline(always)]
-    pub fn start<const F: bool, const N: usize, const A: usize, U: Factor<L>>(
+    pub fn start<const F: bool, const N: usize, const A: usize, U: Coefficient<L>>(
         op: &Propagator<L, N>,
         sample: &Sample<U>,
         x: &[L; N],
@@ -144,7 +145,7 @@ impl<L: Lane> ChannelState<L> {
             }
             let m = out[a].argument;
             let normal = law.normal.start::<F, U>(sample);
-            out[a].value = law.about::<F>(m, law.stiction::<F>(m)).here(normal);
+            out[a].value = law.expand_at::<F>(m, law.stiction::<F>(m)).value_at_center(normal);
         }
         for a in 0..A {
             let form = &channels[a].rate;
@@ -152,8 +153,8 @@ impl<L: Lane> ChannelState<L> {
             for i in 0..op.columns() {
                 rate = form.state[i].fma::<F>(x[i], rate);
             }
-            for drive in &op.drives {
-                rate = sample[drive.input][0].onto::<F>(drive.now[a], rate);
+            for drive in &op.inputs {
+                rate = sample[drive.input][0].multiply_add::<F>(drive.now[a], rate);
             }
             out[a].rate = rate;
             out[a].predicted_argument = rate + out[a].argument;
@@ -163,7 +164,7 @@ impl<L: Lane> ChannelState<L> {
     }
 }
 
-impl<L: Lane, const N: usize> ChannelCoefficients<L, N> {
+impl<L: KernelFloat, const N: usize> ChannelCoefficients<L, N> {
     /// Its torque φ.
     #[inline(always)]
     pub fn torque(&self, carry: &ChannelState<L>) -> L {
@@ -173,7 +174,7 @@ impl<L: Lane, const N: usize> ChannelCoefficients<L, N> {
 
 /// Add the contributions of the carried channels to `sum`.
 #[inline(always)]
-pub fn add_channels<L: Lane, const F: bool, const N: usize, const A: usize>(
+pub fn add_channels<L: KernelFloat, const F: bool, const N: usize, const A: usize>(
     form: &Form<L, N>,
     carry: &[ChannelState<L>; A],
     sum: L,
@@ -192,11 +193,11 @@ pub type SampleColumn<L> = [L; BLOCK + FOUR];
 /// each as a column over the samples: first the states.
 pub struct SampleBuffer<L, const N: usize>(Vec<SampleColumn<L>>);
 
-impl<L: Lane, const N: usize> SampleBuffer<L, N> {
+impl<L: KernelFloat, const N: usize> SampleBuffer<L, N> {
     /// Create a buffer for a number of channels from columns of an earlier one.
     pub fn in_columns(mut columns: Vec<SampleColumn<L>>, channels: usize) -> Self {
         if columns.len() < N + channels {
-            columns.resize(N + channels, [L::all(0.0); BLOCK + FOUR]);
+            columns.resize(N + channels, [L::splat(0.0); BLOCK + FOUR]);
         }
         Self(columns)
     }

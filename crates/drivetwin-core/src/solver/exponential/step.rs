@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! One sample: the torques of slipping elements as cubics, predicted and corrected.
 
-use crate::network::smooth::Sample;
-use crate::number::{Factor, Lane, SMALL, Values};
+use crate::network::smooth_law::Sample;
+use crate::number::{Coefficient, KernelFloat, SMALL, Values};
 use crate::solver::exponential::phi::N_BASIS;
 use crate::solver::exponential::propagator::{ChannelCoefficients, MAX_ACTIVE, Propagator};
 use crate::solver::exponential::samples::{ChannelState, add_channels};
@@ -15,7 +15,7 @@ const N_START: usize = 3;
 const N_END: usize = N_BASIS - N_START;
 
 /// Intermediate results of one step.
-struct StepWork<L: Lane, const N: usize, const A: usize> {
+struct StepWork<L: KernelFloat, const N: usize, const A: usize> {
     /// State at the end.
     end: [L; N],
     /// Arguments at the end, and the part of their rates there that comes from the state.
@@ -39,13 +39,15 @@ struct StepWork<L: Lane, const N: usize, const A: usize> {
 
 /// Pass one sample; returns something negative where a guard of the carried channels has fallen.
 #[inline(always)]
-pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize>(
+pub fn step<L: KernelFloat, U: Coefficient<L>, const F: bool, const N: usize, const A: usize>(
     op: &Propagator<L, N>,
-    (sample, h): (&Sample<U>, f64),
-    (x, carry): (&mut [L; N], &mut [ChannelState<L>; A]),
+    sample: &Sample<U>,
+    h: f64,
+    x: &mut [L; N],
+    carry: &mut [ChannelState<L>; A],
 ) -> L::Values {
     let channels: &[_; A] = op.channels.first_chunk().expect("as many as are carried");
-    let none = L::all(0.0);
+    let none = L::splat(0.0);
     let mut sampling = StepWork {
         end: op.constant,
         argument: [none; A],
@@ -59,17 +61,17 @@ pub fn step<L: Lane, U: Factor<L>, const F: bool, const N: usize, const A: usize
         guard: none.values(),
     };
     sampling.apply_linear::<F, U>(op, channels, sample, h, x);
-    let about = sampling.extrapolate::<F>(channels, carry);
-    sampling.predict::<F>(op, channels, carry, &about);
+    let expansion_points = sampling.extrapolate::<F>(channels, carry);
+    sampling.predict::<F>(op, channels, carry, &expansion_points);
     sampling.correct::<F>(channels, carry);
     *x = sampling.end;
     sampling.guard
 }
 
-impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
+impl<L: KernelFloat, const N: usize, const A: usize> StepWork<L, N, A> {
     /// Apply the linear part of the propagator: state and inputs without channels.
     #[inline(always)]
-    fn apply_linear<const F: bool, U: Factor<L>>(
+    fn apply_linear<const F: bool, U: Coefficient<L>>(
         &mut self,
         op: &Propagator<L, N>,
         channels: &[ChannelCoefficients<L, N>; A],
@@ -83,23 +85,27 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
             s.argument[a] = c.argument_end.constant;
             s.direct[a] = c.rate.constant;
             s.half_second_derivative[a] = c.half_second_derivative.constant;
-            let rise = sample[c.law.normal.input][1].product(c.load_slope);
+            let rise = sample[c.law.normal.input][1].multiply(c.load_slope);
             s.normal[a] = [c.law.normal.start::<F, U>(sample), rise];
         }
-        for drive in &op.drives {
+        for drive in &op.inputs {
             let [u, du] = sample[drive.input];
             let u_end = du.times(h) + u;
             for i in 0..N {
-                s.end[i] = u.onto::<F>(drive.step[0][i], du.onto::<F>(drive.step[1][i], s.end[i]));
+                s.end[i] = u.multiply_add::<F>(
+                    drive.step[0][i],
+                    du.multiply_add::<F>(drive.step[1][i], s.end[i]),
+                );
             }
             for a in 0..A {
                 if !L::DERIVATIVES {
-                    s.argument[a] = pair::<L, U, F>(&drive.argument[a], (u, du), s.argument[a]);
+                    s.argument[a] = pair::<L, U, F>(&drive.argument[a], u, du, s.argument[a]);
                 }
-                s.direct[a] = u_end.onto::<F>(drive.now[a], s.direct[a]);
+                s.direct[a] = u_end.multiply_add::<F>(drive.now[a], s.direct[a]);
                 s.half_second_derivative[a] = pair::<L, U, F>(
                     &drive.half_second_derivative[a],
-                    (u, du),
+                    u,
+                    du,
                     s.half_second_derivative[a],
                 );
             }
@@ -129,8 +135,8 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
         channels: &[ChannelCoefficients<L, N>; A],
         carry: &mut [ChannelState<L>; A],
     ) -> [[L; 2]; A] {
-        let mut about = [[L::all(0.0); 2]; A];
-        let mut faded = [L::all(0.0); A];
+        let mut expansion_points = [[L::splat(0.0); 2]; A];
+        let mut faded = [L::splat(0.0); A];
         for a in 0..A {
             let v = &carry[a].value;
             self.size = self.size.larger(v.value.values().magnitude());
@@ -138,7 +144,7 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
             self.cubics[a][0] = v.value;
             self.cubics[a][1] = v.by_argument.fma::<F>(carry[a].rate, drift);
         }
-        let mut farthest = L::Values::all(0.0);
+        let mut farthest = L::Values::splat(0.0);
         for a in 0..A {
             let half_second_derivative = over_cubics::<L, F, A, 0, 2>(
                 &channels[a].half_second_derivative.cubics,
@@ -148,22 +154,22 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
             let half_second_derivative =
                 half_second_derivative + self.state_half_second_derivative[a];
             let (v, rate) = (&carry[a].value, carry[a].rate);
-            let bent = v.bend.fma::<F>(rate, v.mixed * self.normal[a][1]) * rate;
+            let bent = v.half_second_derivative.fma::<F>(rate, v.mixed * self.normal[a][1]) * rate;
             self.cubics[a][2] = v.by_argument.fma::<F>(half_second_derivative, bent);
             if L::DERIVATIVES {
                 continue;
             }
-            about[a] = [carry[a].predicted_argument, carry[a].stiction];
+            expansion_points[a] = [carry[a].predicted_argument, carry[a].stiction];
             carry[a].predicted_argument =
                 half_second_derivative.fma_times::<F>(4.0, rate + rate + carry[a].argument);
-            let decay = about[a][0] - carry[a].predicted_argument;
+            let decay = expansion_points[a][0] - carry[a].predicted_argument;
             farthest = farthest.larger(decay.values().magnitude());
-            faded[a] = carry[a].stiction.grown::<F>(decay);
+            faded[a] = carry[a].stiction.times_small_exp::<F>(decay);
         }
         if L::DERIVATIVES {
-            return about;
+            return expansion_points;
         }
-        let far = (L::Values::all(SMALL) - farthest).negative();
+        let far = (L::Values::splat(SMALL) - farthest).negative_mask();
         if far != 0 {
             faded = evaluate_stiction(
                 channels,
@@ -175,7 +181,7 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
         for a in 0..A {
             carry[a].stiction = faded[a];
         }
-        about
+        expansion_points
     }
 
     /// The end that the cubics lead to, and the channels there.
@@ -185,12 +191,12 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
         op: &Propagator<L, N>,
         channels: &[ChannelCoefficients<L, N>; A],
         carry: &mut [ChannelState<L>; A],
-        about: &[[L; 2]; A],
+        expansion_points: &[[L; 2]; A],
     ) {
         add_moments::<L, F, N, A, 0, N_START>(channels, &self.cubics, &mut self.end);
         for a in 0..A {
             let ChannelCoefficients { argument, argument_end, rate, law, .. } = &channels[a];
-            let [predicted_argument, stiction] = about[a];
+            let [predicted_argument, stiction] = expansion_points[a];
             let normal = self.normal[a][1] + self.normal[a][0];
             self.rate[a] = over_state::<L, F, N>(op, &rate.state, &self.end);
             if L::DERIVATIVES {
@@ -198,17 +204,18 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
                 // than their order.
                 self.argument[a] = over_state::<L, F, N>(op, argument, &self.end);
                 let stiction = law.stiction::<F>(self.argument[a]);
-                carry[a].value = law.about::<F>(self.argument[a], stiction).here(normal);
+                carry[a].value =
+                    law.expand_at::<F>(self.argument[a], stiction).value_at_center(normal);
                 continue;
             }
             let (cubics, from_near) = (&self.cubics, self.argument[a] - predicted_argument);
             let distance =
                 over_cubics::<L, F, A, 0, N_START>(&argument_end.cubics, cubics, from_near);
             self.argument[a] = predicted_argument + distance;
-            let friction = law.about::<F>(predicted_argument, stiction);
-            carry[a].value = friction.at::<F>(distance, normal);
-            let guard = L::Values::all(MAX_LINEARIZED_DISTANCE) - distance.values().magnitude();
-            self.guard = self.guard.negative_with(guard);
+            let friction = law.expand_at::<F>(predicted_argument, stiction);
+            carry[a].value = friction.value_at::<F>(distance, normal);
+            let guard = L::Values::splat(MAX_LINEARIZED_DISTANCE) - distance.values().magnitude();
+            self.guard = self.guard.either_negative(guard);
         }
     }
 
@@ -220,8 +227,8 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
         channels: &[ChannelCoefficients<L, N>; A],
         carry: &mut [ChannelState<L>; A],
     ) {
-        let mut missing = [[L::all(0.0); N_END]; A];
-        let mut raised = [L::all(0.0); A];
+        let mut missing = [[L::splat(0.0); N_END]; A];
+        let mut raised = [L::splat(0.0); A];
         for a in 0..A {
             let (v, [a0, a1, a2]) = (&carry[a].value, self.cubics[a]);
             let known = self.rate[a] + self.direct[a];
@@ -231,30 +238,30 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
             missing[a] =
                 [v.value - raised[a], v.by_argument.fma::<F>(rate, drift - (a1 + a2 + a2))];
         }
-        let size = self.size + L::Values::all(1.0);
+        let size = self.size + L::Values::splat(1.0);
         let mut reached = self.argument;
         for a in 0..A {
-            let (form, none) = (&channels[a].argument_end.cubics, L::all(0.0));
+            let (form, none) = (&channels[a].argument_end.cubics, L::splat(0.0));
             let ds = over_cubics::<L, F, A, N_START, N_END>(form, &missing, none);
             reached[a] = reached[a] + ds;
-            let corrected = carry[a].value.moved::<F>(ds);
+            let corrected = carry[a].value.shifted::<F>(ds);
             let correction = (corrected.value - carry[a].value.value).values().magnitude();
             let close = size.times(CORRECTION_RTOL) - correction;
-            self.guard = self.guard.negative_with(close);
+            self.guard = self.guard.either_negative(close);
             carry[a].value = corrected;
         }
         for a in 0..A {
             missing[a][0] = carry[a].value.value - raised[a];
         }
         add_moments::<L, F, N, A, N_START, N_END>(channels, &missing, &mut self.end);
-        let mut early = [L::Values::all(0.0); A];
+        let mut early = [L::Values::splat(0.0); A];
         for a in 0..A {
             let ChannelCoefficients { argument_end, rate_end, .. } = &channels[a];
             let (argument, rate) = (self.argument[a], self.rate[a]);
             self.rate[a] = over_cubics::<L, F, A, N_START, N_END>(rate_end, &missing, rate);
             let [value, slope] = missing[a];
             let cubic = (slope - (value + value)).values().magnitude();
-            self.guard = self.guard.negative_with(size.times(CUBIC_RTOL) - cubic);
+            self.guard = self.guard.either_negative(size.times(CUBIC_RTOL) - cubic);
             early[a] = carry[a].rate.values().times(1.0 / 3.0) + carry[a].argument.values();
             carry[a].argument =
                 over_cubics::<L, F, A, N_START, N_END>(&argument_end.cubics, &missing, argument);
@@ -270,7 +277,7 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
             let late = end - carry[a].rate.values().times(1.0 / 3.0);
             let above = early.smaller(late).smaller(end) - law.from.values();
             let below = law.to.values() - early.larger(late).larger(end);
-            self.guard = self.guard.negative_with(above).negative_with(below);
+            self.guard = self.guard.either_negative(above).either_negative(below);
         }
     }
 }
@@ -279,7 +286,7 @@ impl<L: Lane, const N: usize, const A: usize> StepWork<L, N, A> {
 /// instructions, which the compiler keeps in vectors.
 #[cold]
 #[inline(never)]
-fn evaluate_stiction<L: Lane, const N: usize, const A: usize>(
+fn evaluate_stiction<L: KernelFloat, const N: usize, const A: usize>(
     channels: &[ChannelCoefficients<L, N>; A],
     predicted_argument: [L; A],
     faded: [L; A],
@@ -296,7 +303,7 @@ struct StictionKernel<'c, L, const N: usize, const A: usize> {
     far: u32,
 }
 
-impl<L: Lane, const N: usize, const A: usize> Kernel for StictionKernel<'_, L, N, A> {
+impl<L: KernelFloat, const N: usize, const A: usize> Kernel for StictionKernel<'_, L, N, A> {
     type Output = [L; A];
 
     #[inline(always)]
@@ -310,13 +317,18 @@ impl<L: Lane, const N: usize, const A: usize> Kernel for StictionKernel<'_, L, N
 }
 
 #[inline(always)]
-fn pair<L: Lane, U: Factor<L>, const F: bool>(coefficients: &[L; 2], (u, du): (U, U), sum: L) -> L {
-    u.onto::<F>(coefficients[0], du.onto::<F>(coefficients[1], sum))
+fn pair<L: KernelFloat, U: Coefficient<L>, const F: bool>(
+    coefficients: &[L; 2],
+    u: U,
+    du: U,
+    sum: L,
+) -> L {
+    u.multiply_add::<F>(coefficients[0], du.multiply_add::<F>(coefficients[1], sum))
 }
 
 #[inline(always)]
 fn add_moments<
-    L: Lane,
+    L: KernelFloat,
     const F: bool,
     const N: usize,
     const A: usize,
@@ -338,7 +350,7 @@ fn add_moments<
 
 /// Value of a form over the state.
 #[inline(always)]
-fn over_state<L: Lane, const F: bool, const N: usize>(
+fn over_state<L: KernelFloat, const F: bool, const N: usize>(
     op: &Propagator<L, N>,
     form: &[L; N],
     x: &[L; N],
@@ -352,7 +364,13 @@ fn over_state<L: Lane, const F: bool, const N: usize>(
 }
 
 #[inline(always)]
-fn over_cubics<L: Lane, const F: bool, const A: usize, const FROM: usize, const COUNT: usize>(
+fn over_cubics<
+    L: KernelFloat,
+    const F: bool,
+    const A: usize,
+    const FROM: usize,
+    const COUNT: usize,
+>(
     form: &[[L; N_BASIS]; MAX_ACTIVE],
     cubics: &[[L; COUNT]; A],
     sum: L,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Active set of the friction programme: the trial state of every friction element and gear.
 
-use crate::network::{GearState, Row};
+use crate::network::{GearState, RowId};
 use crate::solver::hybrid::event::FrictionState;
 
 /// A trial: the state of every friction element and of every lossy gear.
@@ -15,25 +15,26 @@ pub(crate) struct ActiveSet {
 
 impl ActiveSet {
     /// Set a row to sticking.
-    pub fn rest(&mut self, row: Row) {
+    pub fn rest(&mut self, row: RowId) {
         match row {
-            Row::Friction(j) => self.rows[j] = FrictionState::Sticking,
-            Row::Gear(i) => self.gears[i] = GearState::Locked,
+            RowId::Friction(j) => self.rows[j] = FrictionState::Sticking,
+            RowId::Gear(i) => self.gears[i] = GearState::Locked,
         }
     }
 
     /// Set a row to slipping in a direction.
-    pub fn move_off(&mut self, row: Row, sign: f64) {
+    pub fn move_off(&mut self, row: RowId, sign: f64) {
         match row {
-            Row::Friction(j) => self.rows[j] = FrictionState::Slipping { sign },
-            Row::Gear(i) => self.gears[i] = GearState::Meshing { sign, power_reversed: false },
+            RowId::Friction(j) => self.rows[j] = FrictionState::Slipping { sign },
+            RowId::Gear(i) => self.gears[i] = GearState::Meshing { sign, power_reversed: false },
         }
     }
 
     /// Count the friction elements that slip, and those that do not stick.
-    pub fn moving_off(&self, candidates: &[Row]) -> (usize, usize) {
-        let friction =
-            |row: &Row| if let Row::Friction(j) = *row { Some(self.rows[j]) } else { None };
+    pub fn moving_off(&self, candidates: &[RowId]) -> (usize, usize) {
+        let friction = |row: &RowId| {
+            if let RowId::Friction(j) = *row { Some(self.rows[j]) } else { None }
+        };
         let rows = || candidates.iter().filter_map(friction);
         let moving = rows().filter(|row| matches!(row, FrictionState::Slipping { .. })).count();
         (moving, moving + rows().filter(FrictionState::is_saturated).count())
@@ -47,13 +48,13 @@ impl ActiveSet {
     }
 
     /// Direction in which a row moves, none at rest or without capacity.
-    pub fn direction(&self, row: Row) -> Option<f64> {
+    pub fn direction(&self, row: RowId) -> Option<f64> {
         match row {
-            Row::Friction(j) => match self.rows[j] {
+            RowId::Friction(j) => match self.rows[j] {
                 FrictionState::Slipping { sign } => Some(sign),
                 _ => None,
             },
-            Row::Gear(i) => match self.gears[i] {
+            RowId::Gear(i) => match self.gears[i] {
                 GearState::Meshing { sign, .. } => Some(sign),
                 GearState::Locked => None,
             },

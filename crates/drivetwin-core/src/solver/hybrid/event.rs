@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT
 //! Events of the hybrid system: causes, kinds and friction states.
 
-use crate::network::{Cell, Row};
-use crate::number::{Pack, Values};
+use crate::network::{Branch, RowId};
+use crate::number::{SimdVector, Values};
 
 /// Cause of an event: the guard that crossed zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventCause {
     /// The slip of a friction element, or the speed of a lossy gear, reaches zero.
-    SlipZero(Row),
+    SlipZero(RowId),
     /// The normal load of an element sets in or is gone.
     LoadOnset(usize),
     /// The torque of a row at rest leaves its bounds; its sign.
-    TorqueLimit(Row, f64),
+    TorqueLimit(RowId, f64),
     /// Torque limit reached within round-off of a knot of the inputs, where the inputs may end.
-    TorqueLimitAtKnot(Row),
+    TorqueLimitAtKnot(RowId),
     /// Power through a rolling gear changes its direction.
     PowerReversal(usize),
-    /// A channel enters another cell.
-    BranchBoundary(usize, Cell),
+    /// A channel enters another branch.
+    BranchBoundary(usize, Branch),
     /// Events at one instant did not come to an end; everything is decided anew a moment later.
     Stalled,
 }
@@ -85,7 +85,7 @@ pub struct Event<T> {
     pub kind: EventKind,
 }
 
-impl<const K: usize> Event<Pack<K>> {
+impl<const K: usize> Event<SimdVector<K>> {
     /// Return the event of one lane.
     pub(crate) fn extract_run(&self, run: usize) -> Event<f64> {
         Event { time: self.time.0[run], element: self.element, kind: self.kind }

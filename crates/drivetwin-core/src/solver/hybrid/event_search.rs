@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! Guards: polynomials that must stay positive while a mode holds, and the earliest that falls.
 
-use crate::network::{GearState, Row};
-use crate::number::{Lane, Number, Pack, Real, Series, TERMS, Values, evaluate, slope};
+use crate::network::{GearState, RowId};
+use crate::number::{
+    KernelFloat, Number, Real, Series, SimdVector, TERMS, Values, evaluate, slope,
+};
 use crate::solver::hybrid::event::{EventCause, FrictionState};
 use crate::solver::hybrid::state::HybridState;
 use crate::solver::hybrid::zero_crossing::first_zero_crossing;
@@ -32,14 +34,15 @@ pub fn earliest<T: Real>(state: &HybridState<'_, T>, h: f64) -> Option<(T, Event
 
 /// The earliest falls of several runs, `runs` as bits, each within its own `h` [s].
 pub fn earliest_per_lane<const K: usize>(
-    state: &HybridState<'_, Pack<K>>,
+    state: &HybridState<'_, SimdVector<K>>,
     runs: u32,
-    h: Pack<K>,
+    h: SimdVector<K>,
 ) -> [Option<(f64, EventCause)>; K] {
     let (mut causes, mut fallen, mut earliest) = ([None; K], 0, h);
-    all_guards(state, &mut |series: Series<Pack<K>>, cause: EventCause| {
-        let guard = (&series, state.expansion.order);
-        let (falls, t) = dispatch_simd(ZeroCrossingKernel { guard, span: (runs, earliest) });
+    all_guards(state, &mut |series: Series<SimdVector<K>>, cause: EventCause| {
+        let order = state.expansion.order;
+        let kernel = ZeroCrossingKernel { series: &series, order, runs, horizon: earliest };
+        let (falls, t) = dispatch_simd(kernel);
         let earlier = falls & (!fallen | (earliest - t).mask_where(|left| left > 0.0));
         lanes_in(earlier).for_each(|run| causes[run] = Some(cause));
         earliest = earliest.replace_where(earlier, t);
@@ -50,16 +53,18 @@ pub fn earliest_per_lane<const K: usize>(
 
 /// [`first_zero_crossing`], to be dispatched.
 struct ZeroCrossingKernel<'s, const K: usize> {
-    guard: (&'s Series<Pack<K>>, usize),
-    span: (u32, Pack<K>),
+    series: &'s Series<SimdVector<K>>,
+    order: usize,
+    runs: u32,
+    horizon: SimdVector<K>,
 }
 
 impl<const K: usize> Kernel for ZeroCrossingKernel<'_, K> {
-    type Output = (u32, Pack<K>);
+    type Output = (u32, SimdVector<K>);
 
     #[inline(always)]
     fn run<const F: bool>(self) -> Self::Output {
-        first_zero_crossing(self.guard.0, self.guard.1, self.span.0, self.span.1)
+        first_zero_crossing(self.series, self.order, self.runs, self.horizon)
     }
 }
 
@@ -76,7 +81,8 @@ fn all_guards<T: Number>(
     }
     for (i, channel) in state.network.channels.iter().enumerate() {
         let series = &state.expansion.channels[i];
-        for (border, next) in channel.borders(state.cells[i], &state.expansion.inputs, series) {
+        for (border, next) in channel.boundaries(state.branches[i], &state.expansion.inputs, series)
+        {
             consider(border, EventCause::BranchBoundary(i, next));
         }
     }
@@ -99,19 +105,22 @@ fn friction_guards<T: Number>(
         FrictionState::Open | FrictionState::Saturated { .. } => {}
         FrictionState::Slipping { sign } => {
             let slip = &state.expansion.channels[j].arguments[0];
-            let cause = EventCause::SlipZero(Row::Friction(j));
+            let cause = EventCause::SlipZero(RowId::Friction(j));
             consider(departing(slip, sign, state.released[j]), cause);
         }
         FrictionState::Sticking => {
-            let torque = holding_torque(state, Row::Friction(j));
+            let torque = holding_torque(state, RowId::Friction(j));
             let capacity = row.law.at(T::zero_()) * row.peak;
             let mut cap = scaled(&normal, if pressed { capacity } else { T::zero_() });
             cap[0] += balanced(state) * BOUND_RTOL + if row.one_way { TORQUE_ATOL } else { 0.0 };
-            consider(combined(&cap, &torque, 1.0), EventCause::TorqueLimit(Row::Friction(j), -1.0));
+            consider(
+                combined(&cap, &torque, 1.0),
+                EventCause::TorqueLimit(RowId::Friction(j), -1.0),
+            );
             if !row.one_way {
                 consider(
                     combined(&cap, &torque, -1.0),
-                    EventCause::TorqueLimit(Row::Friction(j), 1.0),
+                    EventCause::TorqueLimit(RowId::Friction(j), 1.0),
                 );
             }
         }
@@ -140,10 +149,10 @@ fn gear_guards<T: Number>(
             }
             let released = state.released[state.rows.len() + i];
             let speed = state.expansion.speed_form(&gear.speed);
-            consider(departing(&speed, sign, released), EventCause::SlipZero(Row::Gear(i)));
+            consider(departing(&speed, sign, released), EventCause::SlipZero(RowId::Gear(i)));
         }
         GearState::Locked => {
-            let loss = holding_torque(state, Row::Gear(i));
+            let loss = holding_torque(state, RowId::Gear(i));
             let bounds = gear.loss.bounds();
             let line = |(slope, drag): (T, T)| {
                 let mut line = scaled(&torque, slope);
@@ -154,8 +163,8 @@ fn gear_guards<T: Number>(
             let mut lower = scaled(&larger(bounds.lower.map(line).map(negative)), T::of(-1.0));
             upper[0] += TORQUE_ATOL;
             lower[0] -= TORQUE_ATOL;
-            consider(combined(&upper, &loss, -1.0), EventCause::TorqueLimit(Row::Gear(i), 1.0));
-            consider(combined(&loss, &lower, -1.0), EventCause::TorqueLimit(Row::Gear(i), -1.0));
+            consider(combined(&upper, &loss, -1.0), EventCause::TorqueLimit(RowId::Gear(i), 1.0));
+            consider(combined(&loss, &lower, -1.0), EventCause::TorqueLimit(RowId::Gear(i), -1.0));
         }
     }
 }
@@ -168,7 +177,7 @@ fn larger<T: Number>([a, b]: [Series<T>; 2]) -> Series<T> {
     if ahead { a } else { b }
 }
 
-fn holding_torque<T: Number>(state: &HybridState<'_, T>, row: Row) -> Series<T> {
+fn holding_torque<T: Number>(state: &HybridState<'_, T>, row: RowId) -> Series<T> {
     let position = state.mode.stuck.iter().position(|&s| s == row);
     let position = position.expect("what is at rest belongs to the mode");
     state.expansion.form(state.network, state.mode.stuck_torque.row(position))

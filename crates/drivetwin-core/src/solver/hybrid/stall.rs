@@ -17,10 +17,25 @@ const STEP_WINDOW: usize = 10_000;
 pub(crate) struct StallDetector {
     /// Events in a row without progress.
     stalled: usize,
-    /// Events since, and time of, the last look at these.
-    events: (usize, f64),
-    /// Steps since, and time of, the last look at these.
-    steps: (usize, f64),
+    /// Present window of events.
+    events: Window,
+    /// Present window of steps.
+    steps: Window,
+}
+
+/// Events or steps over which the advance of a run is measured.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    /// Number so far.
+    count: usize,
+    /// Time at which the window began, s.
+    start: f64,
+}
+
+impl Window {
+    fn from(start: f64) -> Self {
+        Self { count: 0, start }
+    }
 }
 
 /// Kind of a stall.
@@ -40,7 +55,7 @@ pub(crate) fn underflows(h: f64, end: f64) -> bool {
 impl StallDetector {
     /// Create the detector of a run that starts at `time` [s].
     pub fn from(time: f64) -> Self {
-        Self { stalled: 0, events: (0, time), steps: (0, time) }
+        Self { stalled: 0, events: Window::from(time), steps: Window::from(time) }
     }
 
     /// Return true if events at one instant do not end.
@@ -50,21 +65,21 @@ impl StallDetector {
 
     /// Record a step: the time it led to, its length [s], and whether an event ended it.
     pub fn note(&mut self, time: f64, length: f64, event: bool) -> Result<(), Stall> {
-        self.steps.0 += 1;
-        if self.steps.0 == STEP_WINDOW {
-            if time - self.steps.1 < MIN_ADVANCE_OF_STEPS {
+        self.steps.count += 1;
+        if self.steps.count == STEP_WINDOW {
+            if time - self.steps.start < MIN_ADVANCE_OF_STEPS {
                 return Err(Stall::TooSmall);
             }
-            self.steps = (0, time);
+            self.steps = Window::from(time);
         }
         let advances = length > ADVANCE_RTOL * (1.0 + time.abs());
         self.stalled = if advances || !event { 0 } else { self.stalled + 1 };
-        self.events.0 += usize::from(event);
-        if event && self.events.0 == PROGRESS_WINDOW {
-            if time - self.events.1 < MIN_ADVANCE_OF_EVENTS {
+        self.events.count += usize::from(event);
+        if event && self.events.count == PROGRESS_WINDOW {
+            if time - self.events.start < MIN_ADVANCE_OF_EVENTS {
                 return Err(Stall::Zeno);
             }
-            self.events = (0, time);
+            self.events = Window::from(time);
         }
         Ok(())
     }

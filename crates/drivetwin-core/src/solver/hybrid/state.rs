@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! Hybrid state: continuous state, friction states and the compiled mode.
 
-use crate::network::channel::ChannelSeries;
-use crate::network::{Cell, GearState, Mode, ModeKey, Network, Row};
+use crate::network::nonlinear_torque::ChannelSeries;
+use crate::network::{Branch, GearState, Mode, ModeKey, Network, RowId};
 use crate::number::{Number, Series, TERMS, Values, evaluate};
 use crate::solver::hybrid::event::{Event, EventCause, FrictionState};
 use crate::solver::hybrid::mode_cache::ModeCache;
@@ -33,7 +33,7 @@ pub struct HybridState<'a, T> {
     pub(crate) t: T,
     /// Time to the end of the segment, s, without derivatives.
     pub(crate) remaining: T,
-    pub(crate) cells: Vec<Cell>,
+    pub(crate) branches: Vec<Branch>,
     /// Elements and gears that leave exact zero speed at the start of the step.
     pub(crate) released: Vec<bool>,
     /// Elements with a normal load.
@@ -66,7 +66,7 @@ impl<'a, T: Number> HybridState<'a, T> {
             events: Vec::new(),
             t,
             remaining: T::zero_(),
-            cells: vec![Cell::Off; network.channels.len()],
+            branches: vec![Branch::Off; network.channels.len()],
             released: vec![false; frictions + network.losses.len()],
             pressed: vec![false; frictions],
             blocked: vec![false; network.losses.len()],
@@ -85,8 +85,8 @@ impl<'a, T: Number> HybridState<'a, T> {
     }
 
     /// Expand the motion of the runs `runs`, as bits, from here on: [`TaylorExpansion::expand`].
-    pub(crate) fn expand(&mut self, runs: u32, step: (T::Values, Accuracy)) -> T::Values {
-        dispatch_simd(ExpandKernel { state: self, runs, step })
+    pub(crate) fn expand(&mut self, runs: u32, h: T::Values, accuracy: Accuracy) -> T::Values {
+        dispatch_simd(ExpandKernel { state: self, runs, h, accuracy })
     }
 
     /// State of the runs `runs`, as bits, `h` [s] after the start of the expansion.
@@ -117,10 +117,10 @@ impl<'a, T: Number> HybridState<'a, T> {
             EventCause::SlipZero(row)
             | EventCause::TorqueLimit(row, _)
             | EventCause::TorqueLimitAtKnot(row) => row,
-            EventCause::LoadOnset(j) => Row::Friction(j),
-            EventCause::PowerReversal(i) => Row::Gear(i),
+            EventCause::LoadOnset(j) => RowId::Friction(j),
+            EventCause::PowerReversal(i) => RowId::Gear(i),
             EventCause::BranchBoundary(channel, _) if channel < self.rows.len() => {
-                Row::Friction(channel)
+                RowId::Friction(channel)
             }
             EventCause::BranchBoundary(channel, _) => return format!("torque law {channel}"),
             EventCause::Stalled => return "several elements at once".to_owned(),
@@ -129,10 +129,10 @@ impl<'a, T: Number> HybridState<'a, T> {
     }
 
     /// Position of a row in lists that hold friction elements first, then lossy gears.
-    pub(crate) fn index_of(&self, row: Row) -> usize {
+    pub(crate) fn index_of(&self, row: RowId) -> usize {
         match row {
-            Row::Friction(j) => j,
-            Row::Gear(i) => self.rows.len() + i,
+            RowId::Friction(j) => j,
+            RowId::Gear(i) => self.rows.len() + i,
         }
     }
 }
@@ -141,7 +141,8 @@ impl<'a, T: Number> HybridState<'a, T> {
 struct ExpandKernel<'r, 'a, T: Number> {
     state: &'r mut HybridState<'a, T>,
     runs: u32,
-    step: (T::Values, Accuracy),
+    h: T::Values,
+    accuracy: Accuracy,
 }
 
 impl<T: Number> Kernel for ExpandKernel<'_, '_, T> {
@@ -149,8 +150,10 @@ impl<T: Number> Kernel for ExpandKernel<'_, '_, T> {
 
     #[inline(always)]
     fn run<const F: bool>(self) -> T::Values {
-        let HybridState { expansion, network, mode, cells, x, .. } = self.state;
-        expansion.expand(network, mode, cells, (self.runs, x), self.step)
+        let Self { state, runs, h, accuracy } = self;
+        let HybridState { expansion, network, mode, branches, x, .. } = state;
+        expansion.set_start(x);
+        expansion.expand(network, mode, branches, runs, h, accuracy)
     }
 }
 

@@ -2,9 +2,9 @@
 //! Stick-slip decision (THEORY section 1): the box-constrained programme over all friction
 //! elements at zero slip, together with the states of lossy gears.
 
-use crate::network::channel::form;
 use crate::network::linalg::{Matrix, independent_rows};
-use crate::network::{Cell, GearState, Mode, ModeKey, Row};
+use crate::network::nonlinear_torque::form;
+use crate::network::{Branch, GearState, Mode, ModeKey, RowId};
 use crate::number::{Number, Values, evaluate};
 use crate::solver::hybrid::active_set::ActiveSet;
 use crate::solver::hybrid::event::{FrictionState, signum_nonneg};
@@ -24,9 +24,9 @@ const MAX_EXHAUSTIVE: usize = 8;
 /// Violated condition of an active set.
 enum Violation {
     /// A row at rest carries more than its bounds allow; the torque's sign.
-    TorqueBound(Row, f64),
+    TorqueBound(RowId, f64),
     /// A row that moves off from zero speed accelerates back.
-    SlipDirection(Row),
+    SlipDirection(RowId),
     /// Power through a rolling gear flows the other way.
     PowerDirection(usize),
 }
@@ -34,7 +34,7 @@ enum Violation {
 impl<T: Number> HybridState<'_, T> {
     /// Decide anew the state of everything at zero speed. `overloaded` names what has just reached
     /// its bound, with the torque's sign.
-    pub(crate) fn decide(&mut self, overloaded: Option<(Row, f64)>) -> Result<(), Status> {
+    pub(crate) fn decide(&mut self, overloaded: Option<(RowId, f64)>) -> Result<(), Status> {
         self.evaluate_at_t_plus();
         let candidates = self.at_zero_speed();
         let mut trial = self.assignment();
@@ -89,7 +89,7 @@ impl<T: Number> HybridState<'_, T> {
     /// Torques that have been taken to their bounds one by one need not be those with which everything
     /// holds: with `moving`, only lasting assignments count in which fewer than so many friction elements
     /// move off, and in which all that move off have overcome their static capacities.
-    fn enumerate_active_sets(&mut self, candidates: &[Row], moving: Option<usize>) -> bool {
+    fn enumerate_active_sets(&mut self, candidates: &[RowId], moving: Option<usize>) -> bool {
         let gears = self.gears.len();
         let choices = 3usize.pow(candidates.len().min(MAX_EXHAUSTIVE) as u32) << gears.min(4);
         let feasible = candidates.len() <= MAX_EXHAUSTIVE && gears <= 4;
@@ -124,13 +124,13 @@ impl<T: Number> HybridState<'_, T> {
         mut trial: ActiveSet,
         mut mode: Arc<Mode<T>>,
         basis: Vec<T>,
-        candidates: &[Row],
+        candidates: &[RowId],
         overloaded: bool,
     ) -> (ActiveSet, Arc<Mode<T>>) {
         let before = self.assignment();
         let moves = |assignment: &ActiveSet, row| assignment.direction(row).is_some();
-        let frictions = candidates.iter().copied().filter(|row| matches!(row, Row::Friction(_)));
-        let moving: Vec<Row> = frictions
+        let frictions = candidates.iter().copied().filter(|row| matches!(row, RowId::Friction(_)));
+        let moving: Vec<RowId> = frictions
             .filter(|&row| moves(&trial, row) && !(overloaded && moves(&before, row)))
             .collect();
         if overloaded && moving.len() < 2 {
@@ -140,7 +140,7 @@ impl<T: Number> HybridState<'_, T> {
             let mut held = trial.clone();
             held.rest(row);
             self.classify_saturated(&mut held, candidates);
-            let same = |&row: &Row| held.direction(row) == before.direction(row);
+            let same = |&row: &RowId| held.direction(row) == before.direction(row);
             if overloaded && candidates.iter().all(same) || !self.stays(row, &mode, &basis) {
                 continue;
             }
@@ -157,12 +157,12 @@ impl<T: Number> HybridState<'_, T> {
     fn violates_static_limit(
         &mut self,
         trial: &ActiveSet,
-        candidates: &[Row],
+        candidates: &[RowId],
         mode: &Mode<T>,
     ) -> bool {
         let mut at_capacity = trial.clone();
         for &row in candidates {
-            if let (Row::Friction(j), Some(sign)) = (row, trial.direction(row)) {
+            if let (RowId::Friction(j), Some(sign)) = (row, trial.direction(row)) {
                 at_capacity.rows[j] = FrictionState::Saturated { sign };
             }
         }
@@ -175,7 +175,7 @@ impl<T: Number> HybridState<'_, T> {
         let capacities = self.capacities();
         mode.stuck.iter().enumerate().all(|(i, &row)| {
             let torque = form(mode.stuck_torque.row(i), basis).re();
-            let (low, high) = self.bounds(row, &capacities, (mode, basis));
+            let (low, high) = self.bounds(row, &capacities, mode, basis);
             let room = (torque - low).smaller(high - torque);
             room.decide_with(torque, |room, torque| room > STRICT_MARGIN_RTOL * torque.abs())
         })
@@ -183,7 +183,7 @@ impl<T: Number> HybridState<'_, T> {
 
     /// An assignment by its number: whether power flows back through every lossy gear, and whether every
     /// candidate rests, moves off forwards or backwards. Nothing where one cannot.
-    fn choice(&self, number: usize, candidates: &[Row]) -> Option<ActiveSet> {
+    fn choice(&self, number: usize, candidates: &[RowId]) -> Option<ActiveSet> {
         let (mut trial, gears) = (self.assignment(), self.gears.len());
         let mut digits = number >> gears;
         for &row in candidates {
@@ -218,16 +218,16 @@ impl<T: Number> HybridState<'_, T> {
         }
     }
 
-    fn blocks_forward(&self, row: Row) -> bool {
-        matches!(row, Row::Friction(j) if self.network.frictions[j].one_way)
+    fn blocks_forward(&self, row: RowId) -> bool {
+        matches!(row, RowId::Friction(j) if self.network.frictions[j].one_way)
     }
 
     fn assignment(&self) -> ActiveSet {
         ActiveSet { rows: self.rows.clone(), gears: self.gears.clone() }
     }
 
-    fn at_zero_speed(&self) -> Vec<Row> {
-        let near = |row: Row| {
+    fn at_zero_speed(&self) -> Vec<RowId> {
+        let near = |row: RowId| {
             let slip = self.network.slip_of(row);
             let terms = slip.iter().zip(&self.x);
             let terms = terms.map(|(c, v)| (c.re() * v.re()).magnitude());
@@ -238,8 +238,8 @@ impl<T: Number> HybridState<'_, T> {
         };
         let pressed = |j: &usize| self.rows[*j] != FrictionState::Open;
         let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
-        let frictions = (0..self.rows.len()).filter(pressed).map(Row::Friction);
-        let gears = (0..self.gears.len()).filter(directional).map(Row::Gear);
+        let frictions = (0..self.rows.len()).filter(pressed).map(RowId::Friction);
+        let gears = (0..self.gears.len()).filter(directional).map(RowId::Gear);
         frictions.chain(gears).filter(|&row| near(row)).collect()
     }
 
@@ -249,10 +249,10 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// The basis at this instant under a trial.
-    fn basis_now(&mut self, trial: &ActiveSet, candidates: &[Row]) -> Vec<T> {
+    fn basis_now(&mut self, trial: &ActiveSet, candidates: &[RowId]) -> Vec<T> {
         let mut basis = self.basis_without_channels();
         for (j, row) in self.network.frictions.iter().enumerate() {
-            let at_rest = candidates.contains(&Row::Friction(j));
+            let at_rest = candidates.contains(&RowId::Friction(j));
             let slip = if at_rest { T::zero_() } else { form(&row.slip, &self.x_plus) };
             let normal = self.normal(j);
             basis.push(match trial.rows[j] {
@@ -280,7 +280,7 @@ impl<T: Number> HybridState<'_, T> {
 
     /// Static capacities of the friction elements.
     pub(crate) fn capacities(&self) -> Vec<T> {
-        let capacity = |(j, row): (usize, &crate::network::FrictionRow<T>)| {
+        let capacity = |(j, row): (usize, &crate::network::FrictionElement<T>)| {
             row.law.at(T::zero_()) * row.peak * self.normal(j)
         };
         self.network.frictions.iter().enumerate().map(capacity).collect()
@@ -289,7 +289,7 @@ impl<T: Number> HybridState<'_, T> {
     fn fault(
         &self,
         trial: &ActiveSet,
-        candidates: &[Row],
+        candidates: &[RowId],
         mode: &Mode<T>,
         basis: &[T],
     ) -> Option<Violation> {
@@ -307,11 +307,11 @@ impl<T: Number> HybridState<'_, T> {
     fn returning(
         &self,
         trial: &ActiveSet,
-        candidates: &[Row],
+        candidates: &[RowId],
         mode: &Mode<T>,
         basis: &[T],
-    ) -> Option<Row> {
-        let returns = |&row: &Row| {
+    ) -> Option<RowId> {
+        let returns = |&row: &RowId| {
             trial.direction(row).is_some_and(|sign| {
                 let (a, scale) = self.acceleration(row, mode, basis);
                 (a * sign).decide_with(scale, |a, scale| a < -negligible(scale))
@@ -321,7 +321,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Return true if the acceleration of a row is round-off.
-    fn stays(&self, row: Row, mode: &Mode<T>, basis: &[T]) -> bool {
+    fn stays(&self, row: RowId, mode: &Mode<T>, basis: &[T]) -> bool {
         let (a, scale) = self.acceleration(row, mode, basis);
         a.decide_with(scale, |a, scale| a.abs() <= negligible(scale))
     }
@@ -335,7 +335,7 @@ impl<T: Number> HybridState<'_, T> {
         let mut worst: Option<(T::Values, Violation)> = None;
         for (&row, terms) in mode.stuck.iter().zip(rows()) {
             let torque = form(terms, basis).re();
-            let (low, high) = self.bounds(row, &capacities, (mode, basis));
+            let (low, high) = self.bounds(row, &capacities, mode, basis);
             let above = torque.decide_with(high, |torque, high| torque > high);
             let (excess, size, sign) = if above {
                 (torque - high, high.magnitude(), 1.0)
@@ -365,16 +365,17 @@ impl<T: Number> HybridState<'_, T> {
     /// Bounds of the torque of a row at rest.
     fn bounds(
         &self,
-        row: Row,
+        row: RowId,
         capacities: &[T],
-        (mode, basis): (&Mode<T>, &[T]),
+        mode: &Mode<T>,
+        basis: &[T],
     ) -> (T::Values, T::Values) {
         match row {
-            Row::Friction(j) if self.network.frictions[j].one_way => {
+            RowId::Friction(j) if self.network.frictions[j].one_way => {
                 (-capacities[j].re() - T::Values::of(TORQUE_ATOL), T::Values::of(f64::INFINITY))
             }
-            Row::Friction(j) => (-capacities[j].re(), capacities[j].re()),
-            Row::Gear(g) => {
+            RowId::Friction(j) => (-capacities[j].re(), capacities[j].re()),
+            RowId::Gear(g) => {
                 self.gear_bounds(g, form(mode.gear_torque(self.network).row(g), basis).re())
             }
         }
@@ -416,7 +417,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Acceleration [rad/s²] of a row's speed and the size of the terms it is the sum of.
-    fn acceleration(&self, row: Row, mode: &Mode<T>, basis: &[T]) -> (T::Values, T::Values) {
+    fn acceleration(&self, row: RowId, mode: &Mode<T>, basis: &[T]) -> (T::Values, T::Values) {
         let (mut sum, mut scale) = (T::Values::zero_(), T::Values::zero_());
         for (i, c) in self.network.slip_of(row).iter().enumerate() {
             let (part, size) = sum_and_scale(mode.derivative.row(i), basis);
@@ -427,17 +428,17 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// An overloaded row moves off, or stays at its capacity where others hold its speed.
-    fn release(&self, trial: &mut ActiveSet, row: Row, sign: f64, candidates: &[Row]) {
+    fn release(&self, trial: &mut ActiveSet, row: RowId, sign: f64, candidates: &[RowId]) {
         trial.move_off(row, sign);
         self.classify_saturated(trial, candidates);
     }
 
     /// Of the friction elements at zero speed that carry all they can, those slip that nothing at rest
     /// holds; the others stay at their capacity.
-    fn classify_saturated(&self, trial: &mut ActiveSet, candidates: &[Row]) {
+    fn classify_saturated(&self, trial: &mut ActiveSet, candidates: &[RowId]) {
         use FrictionState::{Saturated, Slipping};
         for &row in candidates {
-            if let Row::Friction(j) = row
+            if let RowId::Friction(j) = row
                 && let Slipping { sign } | Saturated { sign } = trial.rows[j]
             {
                 let held = self.is_held_by_others(trial, row);
@@ -447,7 +448,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Return true if the elements at rest hold the speed of a row that is not at rest.
-    fn is_held_by_others(&self, trial: &ActiveSet, row: Row) -> bool {
+    fn is_held_by_others(&self, trial: &ActiveSet, row: RowId) -> bool {
         let mut stuck = self.key_of(trial).rows();
         let alone = self.rank(&stuck);
         stuck.push(row);
@@ -455,7 +456,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Number of independent speeds of rows.
-    fn rank(&self, rows: &[Row]) -> usize {
+    fn rank(&self, rows: &[RowId]) -> usize {
         let mut speeds = Matrix::zeros(rows.len(), self.network.speeds());
         for (i, &row) in rows.iter().enumerate() {
             speeds.row_mut(i).copy_from_slice(self.network.slip_of(row));
@@ -464,7 +465,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Make a trial the state of the run.
-    fn adopt(&mut self, trial: ActiveSet, candidates: &[Row], mode: Arc<Mode<T>>) {
+    fn adopt(&mut self, trial: ActiveSet, candidates: &[RowId], mode: Arc<Mode<T>>) {
         self.released.iter_mut().for_each(|r| *r = false);
         for &row in candidates {
             let index = self.index_of(row);
@@ -473,20 +474,20 @@ impl<T: Number> HybridState<'_, T> {
         for i in 0..trial.gears.len() {
             let rolling = matches!(trial.gears[i], GearState::Meshing { .. });
             let watched = rolling && self.network.losses[i].loss.is_directional();
-            self.blocked[i] = watched && self.is_held_by_others(&trial, Row::Gear(i));
+            self.blocked[i] = watched && self.is_held_by_others(&trial, RowId::Gear(i));
         }
         self.record_changes(&trial);
         self.rows = trial.rows;
         self.gears = trial.gears;
         for (j, row) in self.network.frictions.iter().enumerate() {
-            self.cells[j] = match self.rows[j] {
-                FrictionState::Open | FrictionState::Sticking => Cell::Off,
-                _ if !self.pressed[j] => Cell::Off,
-                FrictionState::Saturated { sign } => Cell::Saturated { sign },
+            self.branches[j] = match self.rows[j] {
+                FrictionState::Open | FrictionState::Sticking => Branch::Off,
+                _ if !self.pressed[j] => Branch::Off,
+                FrictionState::Saturated { sign } => Branch::Saturated { sign },
                 FrictionState::Slipping { sign } => {
                     let (slip, none) = (form(&row.slip, &self.x).re(), T::Values::zero_());
                     let inputs = &self.expansion.inputs;
-                    self.network.channels[j].cell_at([slip, none], sign, inputs)
+                    self.network.channels[j].branch_at([slip, none], sign, inputs)
                 }
             };
         }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! Taylor expansion in time of the whole state in one mode.
 
-use crate::network::channel::{ChannelSeries, form};
 use crate::network::linalg::is_zero;
-use crate::network::{Cell, Channel, Mode, Network};
-use crate::number::{INVERSE, Lane, Number, Series, TERMS, Values, evaluate, slope};
+use crate::network::nonlinear_torque::{ChannelSeries, form};
+use crate::network::{Branch, Mode, Network, NonlinearTorque};
+use crate::number::{INVERSE, KernelFloat, Number, Series, TERMS, Values, evaluate, slope};
 use crate::solver::settings::Accuracy;
 use crate::solver::tolerances::{MAX_STICTION_EXPONENT_CHANGE, STICTION_RANGE};
 
@@ -51,26 +51,32 @@ impl<T: Number> TaylorExpansion<T> {
         basis.extend(self.channels.iter().map(|channel| value(&channel.torque)));
     }
 
-    /// Expand the runs `runs`, as bits, from state `x`; returns the step `<= h` [s] over which the truncation
+    /// Set the state at which the next expansion starts.
+    #[inline(always)]
+    pub fn set_start(&mut self, x: &[T]) {
+        for (series, &value) in self.states.iter_mut().zip(x) {
+            series[0] = value;
+        }
+    }
+
+    /// Expand the runs `runs`, as bits, from the state that was set; returns the step `<= h` [s] over which the truncation
     /// error stays within the tolerance. Inputs must have been set.
     #[inline(always)]
     pub fn expand(
         &mut self,
         network: &Network<T>,
         mode: &Mode<T>,
-        cells: &[Cell],
-        (runs, x): (u32, &[T]),
-        (h, accuracy): (T::Values, Accuracy),
+        branches: &[Branch],
+        runs: u32,
+        h: T::Values,
+        accuracy: Accuracy,
     ) -> T::Values {
-        for (series, &value) in self.states.iter_mut().zip(x) {
-            series[0] = value;
-        }
         self.set_scales(network);
         self.basis.clear();
         self.basis.resize(network.basis(), T::zero_());
         let curved = self.input_order() > 1;
         let last = accuracy.order.unwrap_or(TERMS - 1);
-        let products = network.channels.iter().any(Channel::is_product);
+        let products = network.channels.iter().any(NonlinearTorque::is_product);
         // Successive terms that must be small: every other one of an even or odd motion is zero, and
         // products of motions that start with high powers of time leave longer gaps.
         let window = if products { 4 } else { 2 };
@@ -80,7 +86,7 @@ impl<T: Number> TaylorExpansion<T> {
         // Runs whose series ends with each order, as bits.
         let mut ended = [0; TERMS];
         for k in 0..last {
-            self.channel_terms(network, cells, k);
+            self.channel_terms(network, branches, k);
             // Of lines only two coefficients are left to enter, and the zeros after them.
             if k <= 2 || curved {
                 self.input_terms(network, k);
@@ -94,28 +100,30 @@ impl<T: Number> TaylorExpansion<T> {
                 growing &= !ended[k + 1];
             }
             if growing == 0 {
-                self.finish(network, cells, (k + 1, &ended));
-                return self.within_decay(network, cells, h);
+                self.finish(network, branches, k + 1, &ended);
+                return self.within_decay(network, branches, h);
             }
         }
         ended[last] |= growing;
-        self.finish(network, cells, (last, &ended));
+        self.finish(network, branches, last, &ended);
         if accuracy.order.is_some() {
             return h;
         }
         let excess = largest(&sizes[TERMS - window..]) / accuracy.tolerance;
         let shorter = |run| (0.8 * excess.run_value(run).powf(-1.0 / last as f64)).min(1.0);
-        let h = h.replace_where(growing, h * T::Values::gathered(shorter));
-        self.within_decay(network, cells, h)
+        let h = h.replace_where(growing, h * T::Values::from_lanes(shorter));
+        self.within_decay(network, branches, h)
     }
 
     /// The part of a step `h` [s] over which no stiction grows or decays so far that terms which are small at
     /// the start could become large: those of `exp(-s / v_s)` do so first where `s >> v_s`.
     #[inline(always)]
-    fn within_decay(&self, network: &Network<T>, cells: &[Cell], h: T::Values) -> T::Values {
+    fn within_decay(&self, network: &Network<T>, branches: &[Branch], h: T::Values) -> T::Values {
         let mut within = h;
-        for ((channel, cell), series) in network.channels.iter().zip(cells).zip(&self.channels) {
-            let (Cell::Moving { .. }, Some((speed, stiction))) = (cell, channel.stiction()) else {
+        for ((channel, branch), series) in network.channels.iter().zip(branches).zip(&self.channels)
+        {
+            let (Branch::Moving { .. }, Some((speed, stiction))) = (branch, channel.stiction())
+            else {
                 continue;
             };
             let slip = &series.arguments[0];
@@ -174,10 +182,11 @@ impl<T: Number> TaylorExpansion<T> {
     fn finish(
         &mut self,
         network: &Network<T>,
-        cells: &[Cell],
-        (order, ended): (usize, &[u32; TERMS]),
+        branches: &[Branch],
+        order: usize,
+        ended: &[u32; TERMS],
     ) {
-        self.channel_terms(network, cells, order);
+        self.channel_terms(network, branches, order);
         self.order = order;
         let mut done = 0;
         for k in 1..order {
@@ -199,18 +208,18 @@ impl<T: Number> TaylorExpansion<T> {
 
     /// Coefficient `k` of the channels from that of the states, both into the basis.
     #[inline(always)]
-    fn channel_terms(&mut self, network: &Network<T>, cells: &[Cell], k: usize) {
+    fn channel_terms(&mut self, network: &Network<T>, branches: &[Branch], k: usize) {
         let (states, others) = self.basis.split_at_mut(self.states.len());
         for (to, state) in states.iter_mut().zip(&self.states) {
             *to = state[k];
         }
         let torques = &mut others[network.first_channel() - self.states.len()..];
-        let channels = network.channels.iter().zip(cells).zip(&mut self.channels);
-        for (((channel, &cell), series), torque) in channels.zip(torques) {
+        let channels = network.channels.iter().zip(branches).zip(&mut self.channels);
+        for (((channel, &branch), series), torque) in channels.zip(torques) {
             for (row, argument) in channel.arguments.iter().zip(&mut series.arguments) {
                 argument[k] = form(row, states);
             }
-            channel.term(cell, &self.inputs, series, k);
+            channel.term(branch, &self.inputs, series, k);
             *torque = series.torque[k];
         }
     }

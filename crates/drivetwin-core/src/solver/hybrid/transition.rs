@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! Changes of mode at events and at jumps of the inputs.
 
-use crate::network::channel::form;
 use crate::network::linalg::Matrix;
-use crate::network::{GearState, Hold, ModeKey, Row};
+use crate::network::nonlinear_torque::form;
+use crate::network::{ConstraintSolver, GearState, ModeKey, RowId};
 use crate::number::{Number, Values};
 use crate::solver::hybrid::active_set::ActiveSet;
 use crate::solver::hybrid::event::{Event, EventCause, EventKind, FrictionState, signum_nonneg};
@@ -23,8 +23,8 @@ impl<T: Number> HybridState<'_, T> {
                 self.press(j, !self.pressed[j]);
                 self.decide(None)
             }
-            EventCause::TorqueLimit(Row::Friction(j), _)
-            | EventCause::TorqueLimitAtKnot(Row::Friction(j))
+            EventCause::TorqueLimit(RowId::Friction(j), _)
+            | EventCause::TorqueLimitAtKnot(RowId::Friction(j))
                 if self.is_about_to_vent(j) =>
             {
                 self.press(j, false);
@@ -48,24 +48,24 @@ impl<T: Number> HybridState<'_, T> {
                 self.apply_locking_impulse(&self.nearly_at_rest());
                 self.decide(None)
             }
-            EventCause::BranchBoundary(channel, cell) => {
-                self.cells[channel] = cell;
+            EventCause::BranchBoundary(channel, branch) => {
+                self.branches[channel] = branch;
                 Ok(())
             }
         }
     }
 
     /// Speed that a row keeps at zero where it is at rest.
-    fn slip(&self, row: Row) -> T {
+    fn slip(&self, row: RowId) -> T {
         form(self.network.slip_of(row), &self.x)
     }
 
     /// Rows that can have moved only within the moment that a stalled run moved on.
-    fn nearly_at_rest(&self) -> Vec<Row> {
+    fn nearly_at_rest(&self) -> Vec<RowId> {
         let frictions = (0..self.rows.len()).filter(|&j| self.rows[j] != FrictionState::Open);
         let directional = |i: &usize| self.network.losses[*i].loss.is_directional();
         let gears = (0..self.gears.len()).filter(directional);
-        let rows = frictions.map(Row::Friction).chain(gears.map(Row::Gear));
+        let rows = frictions.map(RowId::Friction).chain(gears.map(RowId::Gear));
         rows.filter(|&row| self.slip(row).re().decide(|slip| slip.abs() < STALLED_SLIP)).collect()
     }
 
@@ -89,16 +89,16 @@ impl<T: Number> HybridState<'_, T> {
             .find(|&(_, runs)| runs != 0)
     }
 
-    /// Start of a run: prescribed speeds, elements at rest, directions of gears, cells.
+    /// Start of a run: prescribed speeds, elements at rest, directions of gears, branches.
     pub(crate) fn engage_initial(&mut self, locked: &[usize]) -> Result<(), Status> {
-        let locked: Vec<Row> = locked.iter().map(|&j| Row::Friction(j)).collect();
+        let locked: Vec<RowId> = locked.iter().map(|&j| RowId::Friction(j)).collect();
         if !self.network.losses.is_empty() {
             self.lock_through_gears(&locked)?;
         }
         self.apply_locking_impulse(&locked);
         self.turn_gears();
         for i in self.rows.len()..self.network.channels.len() {
-            self.cells[i] = self.cell_now(i);
+            self.branches[i] = self.cell_now(i);
         }
         self.refresh()?;
         self.events.clear();
@@ -117,7 +117,7 @@ impl<T: Number> HybridState<'_, T> {
         }
         for i in self.rows.len()..self.network.channels.len() {
             if self.network.channels[i].follows_inputs() {
-                self.cells[i] = self.cell_now(i);
+                self.branches[i] = self.cell_now(i);
             }
         }
         self.decide(None)
@@ -158,7 +158,7 @@ impl<T: Number> HybridState<'_, T> {
 
     /// Set prescribed speeds and bring rows to rest by impulses that pass the lossy gears as torques do, each in
     /// the direction of its own; where no directions agree with their impulses, nothing is done.
-    fn lock_through_gears(&mut self, rows: &[Row]) -> Result<(), Status> {
+    fn lock_through_gears(&mut self, rows: &[RowId]) -> Result<(), Status> {
         let network = self.network;
         let excess = self.excess(rows);
         let speed = |largest: T::Values, v: &T| v.re().magnitude().larger(largest);
@@ -194,7 +194,7 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Speeds of rows that are to rest, then what prescribed speeds are off theirs, rows × 1, rad/s.
-    fn excess(&self, rows: &[Row]) -> Matrix<T> {
+    fn excess(&self, rows: &[RowId]) -> Matrix<T> {
         let network = self.network;
         let mut excess = Matrix::zeros(rows.len() + network.prescribed.len(), 1);
         for (i, &row) in rows.iter().enumerate() {
@@ -208,15 +208,15 @@ impl<T: Number> HybridState<'_, T> {
 
     /// Set prescribed speeds and remove the round-off speed of everything at rest and of `more`,
     /// changing the momentum least.
-    pub(crate) fn apply_locking_impulse(&mut self, more: &[Row]) {
+    pub(crate) fn apply_locking_impulse(&mut self, more: &[RowId]) {
         let network = self.network;
         let resting = |j: usize| {
             matches!(self.rows[j], FrictionState::Sticking | FrictionState::Saturated { .. })
         };
-        let frictions = (0..self.rows.len()).filter(|&j| resting(j)).map(Row::Friction);
+        let frictions = (0..self.rows.len()).filter(|&j| resting(j)).map(RowId::Friction);
         let held = |i: &usize| self.gears[*i] == GearState::Locked;
-        let gears = (0..self.gears.len()).filter(held).map(Row::Gear);
-        let mut rows: Vec<Row> = frictions.chain(gears).collect();
+        let gears = (0..self.gears.len()).filter(held).map(RowId::Gear);
+        let mut rows: Vec<RowId> = frictions.chain(gears).collect();
         rows.extend(more.iter().filter(|row| !rows.contains(row)).copied().collect::<Vec<_>>());
         let count = rows.len() + network.prescribed.len();
         if count == 0 {
@@ -230,7 +230,8 @@ impl<T: Number> HybridState<'_, T> {
             g.row_mut(i).copy_from_slice(speed);
         }
         let excess = self.excess(&rows);
-        let hold = Hold { inertia: &network.mass, acting: None, rows: g, resting: rows.len() };
+        let hold =
+            ConstraintSolver { inertia: &network.mass, acting: None, rows: g, resting: rows.len() };
         let change = hold.stop(&excess).expect("the mass is regular");
         for i in 0..network.speeds() {
             self.x[i] += change[(i, 0)];
@@ -248,23 +249,23 @@ impl<T: Number> HybridState<'_, T> {
         basis
     }
 
-    /// Torque of a channel for a decision, in its present cell.
+    /// Torque of a channel for a decision, in its present branch.
     pub(crate) fn channel_plus(&mut self, i: usize) -> T {
         let (channel, series) = (&self.network.channels[i], &mut self.channel_plus);
         for (argument, row) in series.arguments.iter_mut().zip(&channel.arguments) {
             argument[0] = form(row, &self.x_plus);
         }
-        channel.term(self.cells[i], &self.inputs_plus, series, 0);
+        channel.term(self.branches[i], &self.inputs_plus, series, 0);
         series.torque[0]
     }
 
-    fn cell_now(&self, i: usize) -> crate::network::Cell {
+    fn cell_now(&self, i: usize) -> crate::network::Branch {
         let channel = &self.network.channels[i];
         let mut arguments = [T::Values::zero_(); 2];
         for (argument, row) in arguments.iter_mut().zip(&channel.arguments) {
             *argument = form(row, &self.x).re();
         }
-        channel.cell_at(arguments, signum_nonneg(arguments[0]), &self.expansion.inputs)
+        channel.branch_at(arguments, signum_nonneg(arguments[0]), &self.expansion.inputs)
     }
 
     /// Note every difference between the present modes and `after` as an event.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! The first instant at which a guard polynomial falls below zero.
 
-use crate::number::{Lane, Number, Series, Values, evaluate, slope};
+use crate::number::{KernelFloat, Number, Series, Values, evaluate, slope};
 use crate::solver::tolerances::GUARD_RTOL;
 
 /// Largest number of bisections of a step.
@@ -199,7 +199,7 @@ fn shifted<V: Values>(c: &Series<V>, order: usize, at: V) -> Series<V> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::number::{Pack, TERMS};
+    use crate::number::{SimdVector, TERMS};
     use proptest::prelude::*;
 
     fn fall(coefficients: &[f64], h: f64) -> Option<f64> {
@@ -255,8 +255,9 @@ mod tests {
             (5, [0.00243, -0.0405, 0.27, -0.9, 1.5, -1.0]),
         ] {
             let falls = u32::from(fold % 2 == 1);
-            let guard = std::array::from_fn(|k| Pack::<8>::of(c.get(k).copied().unwrap_or(0.0)));
-            let (fallen, time) = first_zero_crossing(&guard, 5, 255, Pack::of(1.0));
+            let guard =
+                std::array::from_fn(|k| SimdVector::<8>::of(c.get(k).copied().unwrap_or(0.0)));
+            let (fallen, time) = first_zero_crossing(&guard, 5, 255, SimdVector::of(1.0));
             assert_eq!(fallen, 255 * falls, "{fold}");
             let width = 2.0 * GUARD_RTOL.powf(1.0 / f64::from(fold));
             assert!(falls == 0 || (time.run_value(7) - 0.3).abs() < width, "{fold}: {time:?}");
@@ -265,11 +266,11 @@ mod tests {
 
     /// Guards of several runs, some of which start at zero: small whole coefficients, so that roots fall
     /// together and leading ones vanish.
-    fn guards() -> impl Strategy<Value = Series<Pack<8>>> {
+    fn guards() -> impl Strategy<Value = Series<SimdVector<8>>> {
         let coefficients = prop::collection::vec(-4_i8..=4, 8 * 6);
         coefficients.prop_map(|c| {
             std::array::from_fn(|k| {
-                Pack::gathered(|run| c.get(k * 8 + run).map_or(0.0, |&c| f64::from(c)))
+                SimdVector::from_lanes(|run| c.get(k * 8 + run).map_or(0.0, |&c| f64::from(c)))
             })
         })
     }
@@ -277,7 +278,7 @@ mod tests {
     proptest! {
         #[test]
         fn runs_side_by_side_fall_as_each_alone(guards in guards(), runs in 0_u32..256, h in 0.1..4.0) {
-            let (fallen, time) = first_zero_crossing(&guards, 5, runs, Pack::of(h));
+            let (fallen, time) = first_zero_crossing(&guards, 5, runs, SimdVector::of(h));
             prop_assert_eq!(fallen & !runs, 0);
             for run in (0..8).filter(|run| runs >> run & 1 == 1) {
                 let (falls, at) = first_zero_crossing(&guards.map(|c| c.run_value(run)), 5, 1, h);

@@ -6,7 +6,7 @@
 //! meets another event, or decides otherwise, parts: it has to be run again in other company or alone. No
 //! operation mixes runs: a result depends neither on the neighbours nor on their number.
 
-use crate::number::{Lane, Number, Series, TERMS, Values, together};
+use crate::number::{KernelFloat, Number, Series, TERMS, Values, with_consensus};
 use crate::solver::cache::SolverCache;
 use crate::solver::exponential::plan::supports_fixed_step;
 use crate::solver::exponential::propagator::{MAX_ACTIVE, SizedPropagator};
@@ -54,7 +54,7 @@ pub fn run_lockstep<'a>(
     let SolverCache { network, modes, propagators } = cache;
     let start = inputs[0].knot(0);
     let (state, diverged_mask) =
-        together(runs, || HybridState::start(network, modes, x, Lanes::of(start)));
+        with_consensus(runs, || HybridState::start(network, modes, x, Lanes::of(start)));
     let Ok(state) = state else { return events };
     let lane = |(run, &inputs): (usize, &&'a Inputs<f64>)| {
         let status =
@@ -144,7 +144,7 @@ impl LockstepBatch<'_> {
             return;
         }
         self.load_inputs(runs);
-        let (result, diverged_mask) = together(runs, || act(&mut self.state));
+        let (result, diverged_mask) = with_consensus(runs, || act(&mut self.state));
         // Splits of torque are decided anew at every sample, each run at its own.
         let all = result.is_err() || self.state.is_split();
         self.evict(if all { runs } else { diverged_mask });
@@ -195,7 +195,7 @@ impl LockstepBatch<'_> {
         };
         let h = self.lanes[0].inputs.usual_length(first, self.settings.max_step);
         let (plan, diverged_mask) =
-            together(self.open(), || self.state.plan_steps(&mut self.propagators, h?));
+            with_consensus(self.open(), || self.state.plan_steps(&mut self.propagators, h?));
         if diverged_mask != 0 {
             self.evict(diverged_mask);
             return true;
@@ -227,7 +227,7 @@ impl LockstepBatch<'_> {
             // Of the others nothing is gone, whatever the gain.
             _ => [f64::NAN; 2],
         };
-        let inputs = |input| [0, 1].map(|k| Lanes::gathered(|run| line(run, input)[k]));
+        let inputs = |input| [0, 1].map(|k| Lanes::from_lanes(|run| line(run, input)[k]));
         if let Some((j, runs)) = self.state.find_unloaded(inputs) {
             let status = LaneStatus::Event(EventCause::LoadOnset(j));
             lanes_in(runs).for_each(|run| self.lanes[run].status = status);
@@ -241,8 +241,8 @@ impl LockstepBatch<'_> {
         let remaining = none.replace_where(runs, self.state.remaining);
         let wish = remaining.smaller(Lanes::of(self.settings.max_step));
         let accuracy = self.settings.accuracy(true);
-        let ((h, events), diverged_mask) = together(runs, || {
-            let h = self.state.expand(runs, (wish, accuracy));
+        let ((h, events), diverged_mask) = with_consensus(runs, || {
+            let h = self.state.expand(runs, wish, accuracy);
             (h, earliest_per_lane(&self.state, runs, h))
         });
         let mut lengths = h;
@@ -257,36 +257,30 @@ impl LockstepBatch<'_> {
         for run in lanes_in(runs & !diverged_mask) {
             let whole = h.0[run] >= remaining.0[run];
             let event = events[run].map(|(_, cause)| cause);
-            self.step(run, (lengths.0[run], h.0[run]), whole, event);
+            self.step(run, lengths.0[run], h.0[run], whole, event);
             at |= u32::from(self.lanes[run].status == LaneStatus::Finished) << run;
         }
         if at != 0 {
-            record.write_sample(&self.state, (at, &[last; LANES]), lengths);
+            record.write_sample(&self.state, at, &[last; LANES], lengths);
         }
     }
 
     /// Record the samples at which runs start.
     fn record_start(&self, runs: u32, record: &mut impl LaneSink) {
-        let mut at = (0, [0; LANES]);
+        let (mut at, mut knots) = (0, [0; LANES]);
         for run in lanes_in(runs) {
             let LaneRun { inputs, segment, .. } = self.lanes[run];
-            at.0 |= u32::from(self.state.t.0[run] == inputs.knot(segment)) << run;
-            at.1[run] = segment;
+            at |= u32::from(self.state.t.0[run] == inputs.knot(segment)) << run;
+            knots[run] = segment;
         }
-        if at.0 != 0 {
-            record.write_sample(&self.state, (at.0, &at.1), Lanes::zero_());
+        if at != 0 {
+            record.write_sample(&self.state, at, &knots, Lanes::zero_());
         }
     }
 
     /// Let a run take the step that it has expanded: its length, the length it could have had [s], whether it
     /// leads to the end of the segment, and the event that ends it.
-    fn step(
-        &mut self,
-        run: usize,
-        (length, h): (f64, f64),
-        whole: bool,
-        event: Option<EventCause>,
-    ) {
+    fn step(&mut self, run: usize, length: f64, h: f64, whole: bool, event: Option<EventCause>) {
         let (lane, t) = (&mut self.lanes[run], &mut self.state.t.0[run]);
         let end = lane.inputs.span(lane.segment).1;
         *t = if whole && event.is_none() { end } else { *t + length };

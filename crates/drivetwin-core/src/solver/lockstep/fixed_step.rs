@@ -2,15 +2,16 @@
 //! Samples of several runs side by side: each joins at its own and leaves before the one in which a guard
 //! could fall.
 
-use crate::network::smooth::Sample;
-use crate::number::{Factor, Lane, Number};
-use crate::solver::exponential::fixed_step::step_samples;
-use crate::solver::exponential::guards::{Guards, inactive_guards};
+use crate::network::smooth_law::Sample;
+use crate::number::{Coefficient, KernelFloat};
+use crate::solver::exponential::fixed_step::{FixedSteps, step_samples};
+use crate::solver::exponential::guards::StepState;
 use crate::solver::exponential::propagator::Propagator;
 use crate::solver::exponential::samples::{
     BLOCK, ChannelState, InputSource, SampleBuffer, SampleColumn, SharedInputs, room,
 };
 use crate::solver::hybrid::state::HybridState;
+use crate::solver::inputs::SampleRange;
 use crate::solver::lane_mask::{lane_mask, lanes_in};
 use crate::solver::lockstep::inputs::PerLaneInputs;
 use crate::solver::lockstep::lane::{LANES, LaneRun, LaneSink, LaneStatus, Lanes, SampleBlock};
@@ -78,19 +79,17 @@ impl<R: LaneSink, const N: usize, const A: usize> PassKernel<'_, '_, '_, R, N, A
         let mut pending_mask = lanes_at_samples(lanes);
         let segments_of_lanes = segments_of_lanes(lanes);
         let mut segment = next_segment(&segments_of_lanes, pending_mask);
-        let (last, end) = {
-            let inputs = lanes[0].inputs;
-            (inputs.segments(), segment + inputs.equal_from(segment))
-        };
+        let inputs = lanes[0].inputs;
+        let (last, end) = (inputs.segments(), segment + inputs.equal_from(segment));
         let mut trail = SampleBuffer::in_columns(std::mem::take(columns), A);
         let mut stretch = SampleBlock::new(segment);
-        let mut front = LaneState::idle();
+        let mut front = StepState::<Lanes, N, A>::idle();
         let (mut active_mask, mut room) = (0, room());
         while segment < end {
             let joining_mask = pending_mask & lanes_at_segment(&segments_of_lanes, segment);
             if joining_mask != 0 {
                 let sample = source.read(segment, &mut room);
-                front.join::<F, _>(operators, (joining_mask, &state.x), sample);
+                front.join::<F, _>(operators, joining_mask, &state.x, sample);
                 active_mask |= joining_mask;
                 pending_mask &= !joining_mask;
                 stretch.begin(joining_mask);
@@ -102,11 +101,17 @@ impl<R: LaneSink, const N: usize, const A: usize> PassKernel<'_, '_, '_, R, N, A
                 stretch = SampleBlock::new(segment);
                 continue;
             }
-            let samples = (segment, (until - segment).min(BLOCK - stretch.count));
-            let at = (&mut front.x, &mut front.carry, &mut front.guards);
-            let to = (&mut trail, stretch.count, active_mask);
-            let (count, fallen) =
-                step_samples::<U, Lanes, F, N, A, 1>(operators, (source, h), samples, at, to);
+            let count = (until - segment).min(BLOCK - stretch.count);
+            let steps = FixedSteps { range: SampleRange { first: segment, count }, h };
+            let (count, fallen) = step_samples::<U, Lanes, F, N, A, 1>(
+                operators,
+                source,
+                steps,
+                &mut front,
+                &mut trail,
+                stretch.count,
+                active_mask,
+            );
             stretch.add(count, active_mask);
             segment += count;
             if fallen != 0 {
@@ -133,33 +138,21 @@ impl<R: LaneSink, const N: usize, const A: usize> PassKernel<'_, '_, '_, R, N, A
     }
 }
 
-/// States, channels and guards of the active lanes.
-struct LaneState<const N: usize, const A: usize> {
-    x: [Lanes; N],
-    carry: [ChannelState<Lanes>; A],
-    guards: Guards<Lanes>,
-}
-
-impl<const N: usize, const A: usize> LaneState<N, A> {
-    /// Create the state before any lane has joined.
-    #[inline(always)]
-    fn idle() -> Self {
-        Self { x: [Lanes::zero_(); N], carry: [ChannelState::idle(); A], guards: inactive_guards() }
-    }
-
+impl<const N: usize, const A: usize> StepState<Lanes, N, A> {
     /// Add lanes (mask) with their states.
     #[inline(always)]
-    fn join<const F: bool, U: Factor<Lanes, Values: Factor<Lanes>>>(
+    fn join<const F: bool, U: Coefficient<Lanes, Values: Coefficient<Lanes>>>(
         &mut self,
         operators: &Propagator<Lanes, N>,
-        (runs, x): (u32, &[Lanes]),
+        runs: u32,
+        x: &[Lanes],
         sample: &Sample<U>,
     ) {
         for (to, &from) in self.x.iter_mut().zip(x) {
             *to = to.replace_where(runs, from);
         }
         let fresh: [_; A] = ChannelState::start::<F, N, A, _>(operators, sample, &self.x);
-        let first = operators.guards::<_, F, A>(sample, (&self.x, &fresh));
+        let first = operators.guards::<_, F, A>(sample, &self.x, &fresh);
         for a in 0..A {
             self.carry[a] = self.carry[a].replace_where(runs, &fresh[a]);
         }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! Inputs of the lanes of a lockstep batch.
 
-use crate::network::smooth::Sample;
-use crate::number::{Lane, Number, Pack};
+use crate::network::smooth_law::Sample;
+use crate::number::{KernelFloat, Number, SimdVector};
 use crate::solver::exponential::samples::{InputScratch, InputSource, SharedInputs};
-use crate::solver::inputs::Inputs;
+use crate::solver::inputs::{Inputs, SampleRange};
 use crate::solver::lockstep::lane::{LANES, Lanes};
 
 /// The inputs of every run.
@@ -24,7 +24,7 @@ impl InputSource<Lanes> for PerLaneInputs<'_> {
     }
 
     #[inline(always)]
-    fn bounds(&self, input: usize, samples: (usize, usize)) -> [Lanes; 2] {
+    fn bounds(&self, input: usize, samples: SampleRange) -> [Lanes; 2] {
         let mut bounds = [Lanes::zero_(); 2];
         for (run, inputs) in self.iter().enumerate() {
             let [low, high] = inputs.bounds(input, samples);
@@ -44,7 +44,7 @@ impl InputSource<Lanes> for SharedInputs<'_, f64> {
     }
 
     #[inline(always)]
-    fn bounds(&self, input: usize, samples: (usize, usize)) -> [Lanes; 2] {
-        self.0.bounds(input, samples).map(Pack::all)
+    fn bounds(&self, input: usize, samples: SampleRange) -> [Lanes; 2] {
+        self.0.bounds(input, samples).map(SimdVector::splat)
     }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! State of one lane of a lockstep batch, and the sample blocks that lanes pass.
 
-use crate::number::Pack;
+use crate::number::SimdVector;
 use crate::solver::exponential::samples::Samples;
 use crate::solver::hybrid::event::EventCause;
 use crate::solver::hybrid::stall::StallDetector;
@@ -13,7 +13,7 @@ use crate::solver::lane_mask::lanes_in;
 pub const LANES: usize = 8;
 
 /// A number of every lane of a batch.
-pub type Lanes = Pack<LANES>;
+pub type Lanes = SimdVector<LANES>;
 
 /// Consumer of the samples of a lockstep batch.
 pub trait LaneSink {
@@ -26,11 +26,12 @@ pub trait LaneSink {
         stretch: &SampleBlock,
     );
 
-    /// The runs `runs`, as bits, are at samples of their own, `h` [s] after the start of the expansion.
+    /// The runs `runs`, as bits, are at the samples `knots`, `h` [s] after the start of the expansion.
     fn write_sample(
         &mut self,
         state: &HybridState<'_, Lanes>,
-        at: (u32, &[usize; LANES]),
+        runs: u32,
+        knots: &[usize; LANES],
         h: Lanes,
     );
 }

@@ -30,8 +30,7 @@ from drivetwin.logs.formats.j1939.identifier import (
     decode_sender,
 )
 from drivetwin.logs.formats.j1939.transport import REPEATED, Assembled, assemble_messages
-from drivetwin.logs.quality.channel_checks import MIN_SAMPLES
-from drivetwin.logs.raw import RawChannel, Window
+from drivetwin.logs.raw import MIN_SAMPLES, RawChannel, Window
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ use std::borrow::Borrow;
 
 /// Values of outputs on a grid with their derivatives, filled as a run comes along.
 #[derive(Clone, Debug)]
-pub(super) struct Recorded<T: Real> {
+pub(super) struct OutputBuffer<T: Real> {
     /// Points of the grid.
     points: usize,
     /// A column per output, as long as the run has come.
@@ -16,7 +16,7 @@ pub(super) struct Recorded<T: Real> {
     slopes: Vec<Vec<T::Slopes>>,
 }
 
-impl<T: Real> Recorded<T> {
+impl<T: Real> OutputBuffer<T> {
     /// Nothing yet.
     pub fn new(outputs: usize, points: usize) -> Self {
         let column = || Vec::with_capacity(points);
@@ -37,42 +37,44 @@ impl<T: Real> Recorded<T> {
         self.values[output].len()
     }
 
-    /// Add a multiple of the picked ones of samples to an output that ends with those of `block`.
+    /// Add a multiple of the masked samples to an output that ends with those of `block`.
     #[inline(always)]
     pub fn add<const F: bool>(
         &mut self,
-        (output, block): (usize, &mut Block<T>),
-        samples: (impl Iterator<Item: Borrow<T>>, Picked),
+        output: usize,
+        block: &mut OutputBlock<T>,
+        samples: impl Iterator<Item: Borrow<T>>,
+        mask: OutputMask,
         factor: T,
     ) {
         let values = &mut self.values[output];
-        let count = samples.1.count();
+        let count = mask.count();
         let first = block.count == 0;
         block.count = count;
-        if first && !T::DERIVATIVES && samples.1.are_all() {
+        if first && !T::DERIVATIVES && mask.are_all() {
             // Without clearing the column beforehand.
-            let terms = samples.0.take(count).map(|sample| sample.borrow().re() * factor.re());
+            let terms = samples.take(count).map(|sample| sample.borrow().re() * factor.re());
             values.extend(terms);
             return;
         }
         values.resize(values.len() + if first { count } else { 0 }, 0.0);
         let at = values.len() - count;
         if first {
-            block.sum::<F, true>(&mut values[at..], samples, factor);
+            block.sum::<F, true>(&mut values[at..], samples, mask, factor);
         } else {
-            block.sum::<F, false>(&mut values[at..], samples, factor);
+            block.sum::<F, false>(&mut values[at..], samples, mask, factor);
         }
     }
 
     /// The derivatives that a block has summed up, out of it.
     #[inline(always)]
-    pub fn take(&mut self, output: usize, block: &mut Block<T>) {
+    pub fn move_slopes(&mut self, output: usize, block: &mut OutputBlock<T>) {
         let count = std::mem::take(&mut block.count);
         self.slopes[output].extend_from_slice(&block.slopes[..count]);
     }
 
     /// Fill an output up to a length with zeros.
-    pub fn fill(&mut self, output: usize, length: usize) {
+    pub fn pad_output(&mut self, output: usize, length: usize) {
         self.values[output].resize(length, 0.0);
         self.slopes[output].resize(length, T::zero_().slopes());
     }
@@ -89,9 +91,9 @@ impl<T: Real> Recorded<T> {
 
 /// The samples of a block that stand on the grid, as bits of [`BLOCK`].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Picked(u64);
+pub(super) struct OutputMask(u64);
 
-impl Picked {
+impl OutputMask {
     /// The first `count`.
     pub fn all(count: usize) -> Self {
         Self(if count == BLOCK { u64::MAX } else { (1 << count) - 1 })
@@ -127,7 +129,7 @@ impl Picked {
         (u64::BITS - self.0.leading_zeros()) as usize
     }
 
-    /// True if no sample before the last picked one is left out.
+    /// True if no sample before the last masked one is left out.
     fn are_all(self) -> bool {
         self.count() == self.span()
     }
@@ -135,28 +137,29 @@ impl Picked {
 
 /// Derivatives of one output over the samples of a block, while its terms are summed up.
 #[derive(Clone, Debug)]
-pub(super) struct Block<T: Real> {
+pub(super) struct OutputBlock<T: Real> {
     /// Number of samples; none before the first term.
     count: usize,
     slopes: Vec<T::Slopes>,
 }
 
-impl<T: Real> Block<T> {
+impl<T: Real> OutputBlock<T> {
     /// Without terms.
     pub fn new() -> Self {
         Self { count: 0, slopes: vec![T::zero_().slopes(); BLOCK] }
     }
 
-    /// Add a multiple of the picked ones of samples to the derivatives and to `values`; `FIRST` where there is
+    /// Add a multiple of the masked samples to the derivatives and to `values`; `FIRST` where there is
     /// nothing yet.
     #[inline(always)]
     fn sum<const F: bool, const FIRST: bool>(
         &mut self,
         values: &mut [f64],
-        (mut samples, mut picked): (impl Iterator<Item: Borrow<T>>, Picked),
+        mut samples: impl Iterator<Item: Borrow<T>>,
+        mut mask: OutputMask,
         factor: T,
     ) {
-        if !FIRST && !T::DERIVATIVES && picked.are_all() {
+        if !FIRST && !T::DERIVATIVES && mask.are_all() {
             for (value, sample) in values.iter_mut().zip(samples) {
                 *value += sample.borrow().re() * factor.re();
             }
@@ -165,9 +168,9 @@ impl<T: Real> Block<T> {
         let mut at = 0;
         // The number of samples is not fixed beforehand, so the compiler does not combine several samples
         // by gathering data that are a vector already.
-        while let Some(sample) = picked.gap().and_then(|gap| samples.nth(gap)) {
+        while let Some(sample) = mask.gap().and_then(|gap| samples.nth(gap)) {
             let (sample, slopes) = (sample.borrow(), &mut self.slopes[at]);
-            let (value, sum) = (&mut values[at], T::sloped(*slopes));
+            let (value, sum) = (&mut values[at], T::from_slopes(*slopes));
             *value = sample.re() * factor.re() + if FIRST { 0.0 } else { *value };
             *slopes = sample.fma::<F>(factor, if FIRST { T::zero_() } else { sum }).slopes();
             at += 1;
@@ -183,15 +186,15 @@ mod tests {
     #[test]
     fn values_and_derivatives_stand_apart_and_what_was_not_reached_is_no_number() {
         let numbers = [Dual::new(5.0, [50.0, 0.0]), Dual::new(7.0, [70.0, 1.0])];
-        let (ones, picked) = ([Dual::of(1.0); 2], Picked::all(2));
-        let mut recorded = Recorded::new(2, 3);
-        recorded.push(0, numbers[0]);
-        recorded.push(0, numbers[1]);
-        let mut block = Block::new();
-        recorded.add::<false>((1, &mut block), (numbers.iter(), picked), Dual::of(-2.0));
-        recorded.add::<false>((1, &mut block), (ones.iter(), picked), Dual::new(0.0, [0.0, 10.0]));
-        recorded.take(1, &mut block);
-        let (values, slopes) = recorded.finish();
+        let (ones, mask) = ([Dual::of(1.0); 2], OutputMask::all(2));
+        let mut buffer = OutputBuffer::new(2, 3);
+        buffer.push(0, numbers[0]);
+        buffer.push(0, numbers[1]);
+        let mut block = OutputBlock::new();
+        buffer.add::<false>(1, &mut block, numbers.iter(), mask, Dual::of(-2.0));
+        buffer.add::<false>(1, &mut block, ones.iter(), mask, Dual::new(0.0, [0.0, 10.0]));
+        buffer.move_slopes(1, &mut block);
+        let (values, slopes) = buffer.finish();
         assert_eq!((&values[0][..2], &values[1][..2]), (&[5.0, 7.0][..], &[-10.0, -14.0][..]));
         assert!(values[0][2].is_nan() && slopes.iter().flat_map(|s| s[2]).all(f64::is_nan));
         assert_eq!(slopes[0][..2], [[50.0, 0.0], [70.0, 1.0]]);
@@ -201,10 +204,10 @@ mod tests {
     #[test]
     fn only_the_samples_on_the_grid_are_recorded() {
         let numbers = [1.0, 2.0, 3.0, 4.0].map(|re| Dual::new(re, [10.0 * re]));
-        let picked = Picked::of(&[0.1, 0.3, 0.9], &[0.0, 0.1, 0.2, 0.3]);
-        let (mut recorded, mut block) = (Recorded::new(1, 2), Block::new());
-        recorded.add::<false>((0, &mut block), (numbers.iter(), picked), Dual::of(1.0));
-        recorded.take(0, &mut block);
-        assert_eq!(recorded.finish(), (vec![vec![2.0, 4.0]], vec![vec![[20.0], [40.0]]]));
+        let mask = OutputMask::of(&[0.1, 0.3, 0.9], &[0.0, 0.1, 0.2, 0.3]);
+        let (mut buffer, mut block) = (OutputBuffer::new(1, 2), OutputBlock::new());
+        buffer.add::<false>(0, &mut block, numbers.iter(), mask, Dual::of(1.0));
+        buffer.move_slopes(0, &mut block);
+        assert_eq!(buffer.finish(), (vec![vec![2.0, 4.0]], vec![vec![[20.0], [40.0]]]));
     }
 }

@@ -48,7 +48,7 @@ pub enum EngagedError {
     },
     /// A member whose speed must be free is held, or follows from the others.
     #[error("the speed of {} is not free; engaged: {}", members.join(" and "), engaged.join(", "))]
-    Held {
+    NotFree {
         /// The members whose speeds were to be free.
         members: Vec<String>,
         /// Engaged friction elements.
@@ -67,7 +67,7 @@ pub struct RigidRow<T> {
 
 /// Speeds of a mechanism with engaged elements over those of its free members.
 #[derive(Clone, Debug)]
-pub struct Engaged<T> {
+pub struct EngagedMechanism<T> {
     /// Rigid rows that touch the moving part.
     pub rows: Vec<RigidRow<T>>,
     /// Nodes connected with a free member; the others idle and have no speed of their own.
@@ -92,7 +92,7 @@ pub fn member_index<T>(m: &Mechanism<T>, name: &str) -> Result<usize, EngagedErr
     })
 }
 
-impl<T: Real> Engaged<T> {
+impl<T: Real> EngagedMechanism<T> {
     /// Engage the named friction elements and express all speeds over those of the `free` members.
     pub fn new(m: &Mechanism<T>, engaged: &[String], free: &[usize]) -> Result<Self, EngagedError> {
         let mut rows: Vec<RigidRow<T>> = m
@@ -116,15 +116,15 @@ impl<T: Real> Engaged<T> {
             let (wanted, engaged) = (free.len(), engaged.to_vec());
             return Err(EngagedError::FreeSpeeds { found, wanted, engaged });
         }
-        let Some(speeds) = over_free(&matrix, &connected, free) else {
+        let Some(speeds) = in_free_coordinates(&matrix, &connected, free) else {
             let members = free.iter().map(|&i| m.nodes[i].to_string()).collect();
-            return Err(EngagedError::Held { members, engaged: engaged.to_vec() });
+            return Err(EngagedError::NotFree { members, engaged: engaged.to_vec() });
         };
         Ok(Self { rows, connected, speeds })
     }
 
     /// A linear form over nodes, expressed over the free speeds.
-    pub fn over_free(&self, row: &Row<T>) -> Vec<T> {
+    pub fn in_free_coordinates(&self, row: &Row<T>) -> Vec<T> {
         (0..self.speeds.cols)
             .map(|j| row.iter().fold(T::zero_(), |sum, &(i, c)| sum + c * self.speeds[(i, j)]))
             .collect()
@@ -163,7 +163,11 @@ fn row_matrix<T: Real>(rows: &[RigidRow<T>], nodes: usize) -> Matrix<T> {
 
 /// Solve the rows for the connected nodes that are not free; `None` where these do not determine
 /// them.
-fn over_free<T: Real>(c: &Matrix<T>, connected: &[usize], free: &[usize]) -> Option<Matrix<T>> {
+fn in_free_coordinates<T: Real>(
+    c: &Matrix<T>,
+    connected: &[usize],
+    free: &[usize],
+) -> Option<Matrix<T>> {
     let dependent: Vec<usize> =
         connected.iter().copied().filter(|node| !free.contains(node)).collect();
     let tied = solve(c.select_columns(&dependent), c.select_columns(free)).ok()?;

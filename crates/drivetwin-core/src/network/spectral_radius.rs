@@ -15,7 +15,7 @@ struct Chunked<V> {
 
 /// Estimate of the spectral radius of the square matrix A that `rows` begin with, one per state: from
 /// `A^16`, of which a bad scaling of the states counts only by its sixteenth root.
-pub fn radius<T: Number>(rows: &Matrix<T>) -> T::Values {
+pub fn spectral_radius_bound<T: Number>(rows: &Matrix<T>) -> T::Values {
     let mut power = Chunked::zeros(rows.rows);
     for i in 0..rows.rows {
         for (to, from) in power.row_mut(i).iter_mut().zip(&rows.row(i)[..rows.rows]) {
@@ -83,9 +83,9 @@ mod tests {
             let mut a = Matrix::zeros(size, size + 3);
             (a[(0, 1)], a[(1, 0)]) = (70.0 * scale, -70.0 / scale);
             (2..size).for_each(|i| a[(i, i)] = -1.0);
-            let found = radius(&a);
+            let found = spectral_radius_bound(&a);
             assert!((found / 70.0 - 1.0).abs() < 1e-12, "{found} rad/s for {scale}");
         }
-        assert_eq!(radius(&Matrix::<f64>::zeros(4, 7)), 0.0);
+        assert_eq!(spectral_radius_bound(&Matrix::<f64>::zeros(4, 7)), 0.0);
     }
 }

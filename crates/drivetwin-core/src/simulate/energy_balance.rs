@@ -2,7 +2,7 @@
 //! Energy balance of a run.
 
 use crate::model::mechanism::{Account, ForceLaw, SpringLaw, Stop};
-use crate::network::channel::form;
+use crate::network::nonlinear_torque::form;
 use crate::network::{GearState, Network};
 use crate::number::Real;
 use crate::solver::{Integrator, Step};
@@ -39,12 +39,12 @@ const GAUSS: [(f64, f64); 4] = [
 ];
 
 /// Accumulates the audit step by step.
-pub(super) struct Auditor {
+pub(super) struct EnergyBalance {
     audit: EnergyAudit,
     start: f64,
 }
 
-impl Auditor {
+impl EnergyBalance {
     /// Begin at state `x`.
     pub fn new<T: Real>(network: &Network<T>, x: &[T]) -> Self {
         Self { audit: EnergyAudit::default(), start: stored_energy(network, x) }
@@ -72,7 +72,7 @@ impl Auditor {
                 audit.load -= (torque * form(n.row(force.node), basis)).re() * width;
             }
         }
-        for drive in &network.drives {
+        for drive in &network.applied_torques {
             let speed = drive.nodes.iter().fold(T::zero_(), |sum, &(node, direction)| {
                 sum + direction * form(n.row(node), basis)
             });

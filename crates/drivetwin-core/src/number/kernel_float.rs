@@ -9,7 +9,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 ///
 /// Multiply-adds are fused by the caller's word (`F`), not by the compiler: a fused one is an
 /// instruction where the processor has it and a slow call where it has not.
-pub trait Lane:
+pub trait KernelFloat:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
     /// True if a value carries derivatives, so that inputs may jump in these alone.
@@ -22,7 +22,7 @@ pub trait Lane:
     type Values: Values;
 
     /// Set all lanes to one value.
-    fn all(value: f64) -> Self;
+    fn splat(value: f64) -> Self;
 
     /// `self · a + b`.
     fn fma<const F: bool>(self, a: Self, b: Self) -> Self;
@@ -40,7 +40,7 @@ pub trait Lane:
     fn exponential<const F: bool>(self) -> Self;
 
     /// `self · e^x` for |x| up to [`SMALL`].
-    fn grown<const F: bool>(self, x: Self) -> Self;
+    fn times_small_exp<const F: bool>(self, x: Self) -> Self;
 
     /// Replace the values of the runs given as bits by those of `other`.
     fn replace_where(self, runs: u32, other: Self) -> Self;
@@ -51,47 +51,47 @@ pub trait Lane:
 
 /// A factor of numbers of type `L`: one of them, or a plain number, which is the same in all runs and has no
 /// derivatives.
-pub trait Factor<L: Lane>: Lane {
+pub trait Coefficient<L: KernelFloat>: KernelFloat {
     /// `self · a`.
-    fn product(self, a: L) -> L;
+    fn multiply(self, a: L) -> L;
 
     /// `self · a + b`.
-    fn onto<const F: bool>(self, a: L, b: L) -> L;
+    fn multiply_add<const F: bool>(self, a: L, b: L) -> L;
 }
 
-impl<L: Lane> Factor<L> for f64 {
+impl<L: KernelFloat> Coefficient<L> for f64 {
     #[inline(always)]
-    fn product(self, a: L) -> L {
+    fn multiply(self, a: L) -> L {
         a.times(self)
     }
     #[inline(always)]
-    fn onto<const F: bool>(self, a: L, b: L) -> L {
+    fn multiply_add<const F: bool>(self, a: L, b: L) -> L {
         a.fma_times::<F>(self, b)
     }
 }
 
-impl<const P: usize> Factor<Self> for Dual<P> {
+impl<const P: usize> Coefficient<Self> for Dual<P> {
     #[inline(always)]
-    fn product(self, a: Self) -> Self {
+    fn multiply(self, a: Self) -> Self {
         self * a
     }
     #[inline(always)]
-    fn onto<const F: bool>(self, a: Self, b: Self) -> Self {
+    fn multiply_add<const F: bool>(self, a: Self, b: Self) -> Self {
         self.fma::<F>(a, b)
     }
 }
 
 /// Values of one or several runs, as used in guards: a guard falls where its sign bit is set.
-pub trait Values: Number + Lane<Values = Self> {
-    /// Value of `say` for the run that decides. Of several runs the first decides for all. Runs with
-    /// another value of `say` part with it, see [`together`](super::together).
-    fn decide<R: PartialEq>(self, say: impl Fn(f64) -> R) -> R;
+pub trait Values: Number + KernelFloat<Values = Self> {
+    /// Value of `predicate` for the run that decides. Of several runs the first decides for all. Runs with
+    /// another value of `predicate` part with it, see [`with_consensus`](super::with_consensus).
+    fn decide<R: PartialEq>(self, predicate: impl Fn(f64) -> R) -> R;
 
-    /// Value of `say` over two values, see [`Self::decide`].
-    fn decide_with<R: PartialEq>(self, other: Self, say: impl Fn(f64, f64) -> R) -> R;
+    /// Value of `predicate` over two values, see [`Self::decide`].
+    fn decide_with<R: PartialEq>(self, other: Self, predicate: impl Fn(f64, f64) -> R) -> R;
 
-    /// Runs for whose value `say` holds, as bits.
-    fn mask_where(self, say: impl Fn(f64) -> bool) -> u32;
+    /// Runs for whose value `predicate` holds, as bits.
+    fn mask_where(self, predicate: impl Fn(f64) -> bool) -> u32;
 
     /// The value of the run that decides, for messages.
     fn leading(self) -> f64;
@@ -109,16 +109,16 @@ pub trait Values: Number + Lane<Values = Self> {
     fn smaller(self, other: Self) -> Self;
 
     /// Number that is negative where either operand is; its magnitude has no meaning.
-    fn negative_with(self, other: Self) -> Self;
+    fn either_negative(self, other: Self) -> Self;
 
     /// Runs whose value is negative, as bits.
-    fn negative(self) -> u32;
+    fn negative_mask(self) -> u32;
 
     /// True if the value of any run is negative.
     fn any_negative(self) -> bool;
 
     /// Runs whose value is infinite or no number, as bits.
-    fn unbounded(self) -> u32 {
+    fn nonfinite_mask(self) -> u32 {
         self.mask_where(|value| !value.is_finite())
     }
 }
@@ -169,12 +169,12 @@ pub(super) fn exponential<const F: bool>(x: f64) -> f64 {
     fused::<F>(odd, r, even) * power
 }
 
-/// Largest |x| for which [`Lane::grown`] is exact to 3e-14.
+/// Largest |x| for which [`KernelFloat::times_small_exp`] is exact to 3e-14.
 pub const SMALL: f64 = 0.125;
 
 /// `e^x` for |x| up to [`SMALL`], by its series; powers of x² apart, for a short chain of products.
 #[inline(always)]
-pub(super) fn growth<const F: bool>(x: f64) -> f64 {
+pub(super) fn small_exp<const F: bool>(x: f64) -> f64 {
     let (c, square) = (&EXPONENTIAL, x * x);
     let pair = |k: usize| fused::<F>(c[12 - k], x, c[13 - k]);
     let (low, high) = (fused::<F>(pair(2), square, pair(0)), fused::<F>(pair(6), square, pair(4)));
@@ -182,7 +182,7 @@ pub(super) fn growth<const F: bool>(x: f64) -> f64 {
     fused::<F>(high, square * square, low)
 }
 
-impl Lane for f64 {
+impl KernelFloat for f64 {
     const DERIVATIVES: bool = false;
 
     const RUNS: u32 = 1;
@@ -190,7 +190,7 @@ impl Lane for f64 {
     type Values = Self;
 
     #[inline(always)]
-    fn all(value: f64) -> Self {
+    fn splat(value: f64) -> Self {
         value
     }
     #[inline(always)]
@@ -214,8 +214,8 @@ impl Lane for f64 {
         exponential::<F>(self)
     }
     #[inline(always)]
-    fn grown<const F: bool>(self, x: Self) -> Self {
-        self * growth::<F>(x)
+    fn times_small_exp<const F: bool>(self, x: Self) -> Self {
+        self * small_exp::<F>(x)
     }
     #[inline(always)]
     fn replace_where(self, runs: u32, other: Self) -> Self {
@@ -241,11 +241,11 @@ impl Values for f64 {
         if self < other { self } else { other }
     }
     #[inline(always)]
-    fn negative_with(self, other: Self) -> Self {
+    fn either_negative(self, other: Self) -> Self {
         f64::from_bits(self.to_bits() | other.to_bits())
     }
     #[inline(always)]
-    fn negative(self) -> u32 {
+    fn negative_mask(self) -> u32 {
         (self.to_bits() >> 63) as u32
     }
     #[inline(always)]
@@ -253,16 +253,16 @@ impl Values for f64 {
         self.is_sign_negative()
     }
     #[inline(always)]
-    fn decide<R: PartialEq>(self, say: impl Fn(f64) -> R) -> R {
-        say(self)
+    fn decide<R: PartialEq>(self, predicate: impl Fn(f64) -> R) -> R {
+        predicate(self)
     }
     #[inline(always)]
-    fn decide_with<R: PartialEq>(self, other: Self, say: impl Fn(f64, f64) -> R) -> R {
-        say(self, other)
+    fn decide_with<R: PartialEq>(self, other: Self, predicate: impl Fn(f64, f64) -> R) -> R {
+        predicate(self, other)
     }
     #[inline(always)]
-    fn mask_where(self, say: impl Fn(f64) -> bool) -> u32 {
-        u32::from(say(self))
+    fn mask_where(self, predicate: impl Fn(f64) -> bool) -> u32 {
+        u32::from(predicate(self))
     }
     #[inline(always)]
     fn leading(self) -> f64 {
@@ -274,7 +274,7 @@ impl Values for f64 {
     }
 }
 
-impl<const P: usize> Lane for Dual<P> {
+impl<const P: usize> KernelFloat for Dual<P> {
     const DERIVATIVES: bool = true;
 
     const RUNS: u32 = 1;
@@ -282,7 +282,7 @@ impl<const P: usize> Lane for Dual<P> {
     type Values = f64;
 
     #[inline(always)]
-    fn all(value: f64) -> Self {
+    fn splat(value: f64) -> Self {
         Self::new(value, [0.0; P])
     }
     #[inline(always)]
@@ -316,8 +316,8 @@ impl<const P: usize> Lane for Dual<P> {
         self.chain(value, value)
     }
     #[inline(always)]
-    fn grown<const F: bool>(self, x: Self) -> Self {
-        let factor = growth::<F>(x.re);
+    fn times_small_exp<const F: bool>(self, x: Self) -> Self {
+        let factor = small_exp::<F>(x.re);
         self * x.chain(factor, factor)
     }
     #[inline(always)]
@@ -347,7 +347,7 @@ mod tests {
     proptest! {
         #[test]
         fn small_growth_agrees_with_the_library(x in -SMALL..SMALL) {
-            for value in [growth::<false>(x), growth::<true>(x)] {
+            for value in [small_exp::<false>(x), small_exp::<true>(x)] {
                 prop_assert!((value / x.exp() - 1.0).abs() < 3e-14);
             }
         }
@@ -356,8 +356,8 @@ mod tests {
     #[test]
     fn fused_and_plain_products_of_duals_agree_to_round_off() {
         let (a, b) = (Dual::<2>::new(1.7, [0.3, -2.0]), Dual::<2>::new(-0.4, [1.1, 5.0]));
-        let (fused, plain) = (a.fma::<true>(b, a), a * b + a);
-        for (x, y) in fused.eps.iter().zip(plain.eps) {
+        let (fused, unfused) = (a.fma::<true>(b, a), a * b + a);
+        for (x, y) in fused.eps.iter().zip(unfused.eps) {
             assert!((x - y).abs() < 1e-14);
         }
     }

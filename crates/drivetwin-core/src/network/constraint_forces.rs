@@ -10,7 +10,7 @@ use crate::number::Number;
 ///
 /// Rows are dealt with as constraints are: some speeds follow from the others, and the torques from the balance
 /// of these. The shorter way, τ from `G A⁻¹ B`, loses all digits where a member has next to no mass.
-pub struct Hold<'a, T> {
+pub struct ConstraintSolver<'a, T> {
     /// A: generalised force per acceleration, speeds × speeds.
     pub inertia: &'a Matrix<T>,
     /// B: generalised force that each torque takes away, speeds × rows; none where that is `Gᵀ`.
@@ -22,24 +22,25 @@ pub struct Hold<'a, T> {
 }
 
 /// Accelerations, speeds × columns, and torques, rows × columns, for each column of f and g.
-pub struct Held<T> {
+pub struct ConstraintForces<T> {
     pub acceleration: Matrix<T>,
     pub torque: Matrix<T>,
     /// True if more rows are held than there are speeds.
     pub redundant: bool,
 }
 
-impl<T: Number> Hold<'_, T> {
+impl<T: Number> ConstraintSolver<'_, T> {
     /// Solve for the accelerations and the holding torques. Prescribed rows take precedence over rows that
     /// contradict them. Torques of redundant rows minimise `Σ (τ_j / weight_j)²`. `None` if the
     /// efficiencies leave the accelerations undetermined.
     pub fn solve(
         &self,
-        (f, g): (&Matrix<T>, Option<&Matrix<T>>),
+        f: &Matrix<T>,
+        g: Option<&Matrix<T>>,
         weights: impl FnOnce() -> Vec<T>,
-    ) -> Option<Held<T>> {
+    ) -> Option<ConstraintForces<T>> {
         let kept = self.independent();
-        let (left, acceleration) = self.motion(&kept, (f, g))?;
+        let (left, acceleration) = self.motion(&kept, f, g)?;
         let redundant = kept.len() < self.rows.rows;
         let torque = if redundant {
             let all: Vec<usize> = (0..f.rows).collect();
@@ -50,7 +51,7 @@ impl<T: Number> Hold<'_, T> {
             let place = |row| kept.iter().position(|&k| k == row);
             found.select_rows(&(0..kept.len()).filter_map(place).collect::<Vec<_>>())
         };
-        Some(Held { acceleration, torque, redundant })
+        Some(ConstraintForces { acceleration, torque, redundant })
     }
 
     /// Change of the speeds by impulses that reduce the held speeds by `excess` (rows × 1, rad/s). `None` as
@@ -59,7 +60,7 @@ impl<T: Number> Hold<'_, T> {
         let mut taken = Matrix::zeros(excess.rows, 1);
         taken.subtract(excess);
         let nothing = Matrix::zeros(self.inertia.rows, 1);
-        self.motion(&self.independent(), (&nothing, Some(&taken))).map(|(_, change)| change)
+        self.motion(&self.independent(), &nothing, Some(&taken)).map(|(_, change)| change)
     }
 
     /// Impulses of the rows that change the speeds so.
@@ -80,7 +81,8 @@ impl<T: Number> Hold<'_, T> {
     fn motion(
         &self,
         kept: &[usize],
-        (f, g): (&Matrix<T>, Option<&Matrix<T>>),
+        f: &Matrix<T>,
+        g: Option<&Matrix<T>>,
     ) -> Option<(Coordinates<T>, Matrix<T>)> {
         let all: Vec<usize> = (0..self.inertia.rows).collect();
         let left = Coordinates::under(self.rows.select_rows(kept), &all)?;

@@ -1,36 +1,45 @@
 // SPDX-License-Identifier: MIT
 //! Chosen outputs of several runs side by side.
 
-use super::trajectory::{Column, Entry, Target, passing_terms, value};
+use super::trajectory::{Column, Entry, Target, output_terms, value};
 use crate::network::Network;
-use crate::number::{FOUR, Lane, Number, transpose};
+use crate::number::{FOUR, KernelFloat, Number, transpose};
 use crate::solver::{
     BLOCK, HybridState, Inputs, Kernel, LANES, LaneSink, Lanes, NO_POINT, SampleBlock, Samples,
     dispatch_simd,
 };
 use smallvec::SmallVec;
 
+/// Points of a grid at the knots of the inputs.
+#[derive(Clone, Copy)]
+pub(super) struct GridPoints<'p> {
+    /// Point of the grid at every knot, or [`NO_POINT`].
+    pub at_knots: &'p [usize],
+    /// Number of points.
+    pub count: usize,
+}
+
 /// Fills columns while runs advance, each at its own samples.
 pub(super) struct Recorder<'p, 'v> {
     /// Inputs of every run.
     inputs: [&'p Inputs<f64>; LANES],
-    /// Point of the grid at every knot, or [`NO_POINT`]; number of points.
-    points: (&'p [usize], usize),
+    /// Points of the grid at the knots.
+    points: GridPoints<'p>,
     columns: Vec<Column<Lanes>>,
     /// Of every run, outputs × points.
     values: Vec<&'v mut [f64]>,
     /// Working space: the basis at an instant, and one output over a block of samples, of every run.
     basis: Vec<Lanes>,
-    block: Block,
+    block: OutputBlock,
 }
 
 impl<'p, 'v> Recorder<'p, 'v> {
-    /// Columns of a network, to be filled into `values`, outputs × points of every run; with the point at
-    /// every knot and their number.
+    /// Columns of a network, to be filled into `values`, outputs × points of every run.
     pub fn new(
         network: &Network<Lanes>,
         targets: &[Target],
-        (inputs, points): ([&'p Inputs<f64>; LANES], (&'p [usize], usize)),
+        inputs: [&'p Inputs<f64>; LANES],
+        points: GridPoints<'p>,
         values: Vec<&'v mut [f64]>,
     ) -> Self {
         let columns = targets.iter().map(|&target| Column::of(network, target)).collect();
@@ -47,17 +56,18 @@ impl LaneSink for Recorder<'_, '_> {
         samples: Samples<'_, Lanes>,
         stretch: &SampleBlock,
     ) {
-        dispatch_simd(Passed { recorder: self, state, active, samples, stretch });
+        dispatch_simd(BlockWriter { recorder: self, state, active, samples, stretch });
     }
 
     fn write_sample(
         &mut self,
         state: &HybridState<'_, Lanes>,
-        (runs, knots): (u32, &[usize; LANES]),
+        runs: u32,
+        knots: &[usize; LANES],
         h: Lanes,
     ) {
         state.expansion.basis_at(state.network, h, &mut self.basis);
-        let (points, count) = self.points;
+        let GridPoints { at_knots: points, count } = self.points;
         for (output, column) in self.columns.iter().enumerate() {
             let now = value(column, state, &self.basis);
             for (run, values) in self.values.iter_mut().enumerate() {
@@ -71,7 +81,7 @@ impl LaneSink for Recorder<'_, '_> {
 }
 
 /// Samples to be added to the columns, with the widest instructions.
-struct Passed<'r, 'p, 'v, 'a> {
+struct BlockWriter<'r, 'p, 'v, 'a> {
     recorder: &'r mut Recorder<'p, 'v>,
     state: &'r HybridState<'a, Lanes>,
     active: &'r [usize],
@@ -79,19 +89,20 @@ struct Passed<'r, 'p, 'v, 'a> {
     stretch: &'r SampleBlock,
 }
 
-impl Kernel for Passed<'_, '_, '_, '_> {
+impl Kernel for BlockWriter<'_, '_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<const F: bool>(self) {
         let Self { recorder, state, active, samples, stretch } = self;
         let Recorder { inputs, points, columns, values, block, .. } = recorder;
-        let (points, per_output) = (&points.0[stretch.first..][..stretch.count], points.1);
+        let per_output = points.count;
+        let points = &points.at_knots[stretch.first..][..stretch.count];
         if points.iter().all(|&point| point == NO_POINT) {
             return;
         }
         for (output, column) in columns.iter().enumerate() {
-            let terms = &*passing_terms(column, state);
+            let terms = &*output_terms(column, state);
             let entry = |position| Entry::at(position, state.network, active);
             let given: Vec<Vec<Lanes>> = terms
                 .iter()
@@ -109,21 +120,21 @@ impl Kernel for Passed<'_, '_, '_, '_> {
             }
             transpose(
                 #[inline(always)]
-                |at| total(&sum, at),
+                |at| sum_terms(&sum, at),
                 block,
                 stretch.count,
             );
             for (run, values) in values.iter_mut().enumerate() {
                 let (from, to) = stretch.spans[run];
                 let values = &mut values[output * per_output..][..per_output];
-                hand_out(&block[run % LANES][from..to], &points[from..to], values);
+                scatter_to_grid(&block[run % LANES][from..to], &points[from..to], values);
             }
         }
     }
 }
 
 /// One output over a block of samples, of every run.
-type Block = [[f64; BLOCK + FOUR]; LANES];
+type OutputBlock = [[f64; BLOCK + FOUR]; LANES];
 
 /// Terms of an output: entries of the basis over samples, in whole fours, and their factors.
 type Terms<'s> = SmallVec<[(&'s [Lanes], Lanes); 8]>;
@@ -138,28 +149,28 @@ fn other_entry(
     match entry {
         Entry::State(_) | Entry::Torque(_) => None,
         Entry::Input(i) => {
-            let at = |knot| Lanes::gathered(|run| inputs[run].knot_value(knot, i));
+            let at = |knot| Lanes::from_lanes(|run| inputs[run].knot_value(knot, i));
             let mut values: Vec<Lanes> = (first..first + count).map(at).collect();
             values.resize(fours, Lanes::zero_());
             Some(values)
         }
-        Entry::One => Some(vec![Lanes::all(1.0); fours]),
+        Entry::One => Some(vec![Lanes::splat(1.0); fours]),
         Entry::Nothing => Some(vec![Lanes::zero_(); fours]),
     }
 }
 
 /// Sum of terms at four samples.
 #[inline(always)]
-fn total(terms: &Terms<'_>, at: usize) -> [Lanes; FOUR] {
+fn sum_terms(terms: &Terms<'_>, at: usize) -> [Lanes; FOUR] {
     let Some((&(samples, factor), others)) = terms.split_first() else {
         return [Lanes::zero_(); FOUR];
     };
-    let mut sums = *four(samples, at);
+    let mut sums = *read_four(samples, at);
     for sum in &mut sums {
         *sum *= factor;
     }
     for &(samples, factor) in others {
-        for (sum, &sample) in sums.iter_mut().zip(four(samples, at)) {
+        for (sum, &sample) in sums.iter_mut().zip(read_four(samples, at)) {
             *sum += sample * factor;
         }
     }
@@ -167,13 +178,13 @@ fn total(terms: &Terms<'_>, at: usize) -> [Lanes; FOUR] {
 }
 
 #[inline(always)]
-fn four(samples: &[Lanes], at: usize) -> &[Lanes; FOUR] {
+fn read_four(samples: &[Lanes], at: usize) -> &[Lanes; FOUR] {
     samples[at..].first_chunk().expect("entries in whole fours")
 }
 
 /// Give one run its values at the points of the grid.
 #[inline(always)]
-fn hand_out(samples: &[f64], points: &[usize], values: &mut [f64]) {
+fn scatter_to_grid(samples: &[f64], points: &[usize], values: &mut [f64]) {
     let [Some(&first), Some(&last)] = [points.first(), points.last()] else { return };
     if first != NO_POINT && last != NO_POINT && last - first == points.len() - 1 {
         values[first..=last].copy_from_slice(samples);

@@ -2,17 +2,17 @@
 //! Values of several runs side by side.
 
 use super::Number;
-use super::lane::{Factor, Lane, Values, growth};
-use super::vote::{leader, vote};
+use super::consensus::{branch, leader_lane};
+use super::kernel_float::{Coefficient, KernelFloat, Values, small_exp};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// `K` values, one of each run. The loops over the runs compile to vector instructions of the set that
 /// is active where they are inlined. Aligned to the cache's lines, so that no vector straddles two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
-pub struct Pack<const K: usize>(pub [f64; K]);
+pub struct SimdVector<const K: usize>(pub [f64; K]);
 
-impl<const K: usize> Pack<K> {
+impl<const K: usize> SimdVector<K> {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         let mut out = [0.0; K];
@@ -41,7 +41,7 @@ impl<const K: usize> Pack<K> {
     }
 }
 
-impl<const K: usize> Add for Pack<K> {
+impl<const K: usize> Add for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
@@ -49,7 +49,7 @@ impl<const K: usize> Add for Pack<K> {
     }
 }
 
-impl<const K: usize> Sub for Pack<K> {
+impl<const K: usize> Sub for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
@@ -57,7 +57,7 @@ impl<const K: usize> Sub for Pack<K> {
     }
 }
 
-impl<const K: usize> Mul for Pack<K> {
+impl<const K: usize> Mul for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
@@ -65,7 +65,7 @@ impl<const K: usize> Mul for Pack<K> {
     }
 }
 
-impl<const K: usize> Div for Pack<K> {
+impl<const K: usize> Div for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn div(self, o: Self) -> Self {
@@ -73,7 +73,7 @@ impl<const K: usize> Div for Pack<K> {
     }
 }
 
-impl<const K: usize> Add<f64> for Pack<K> {
+impl<const K: usize> Add<f64> for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: f64) -> Self {
@@ -81,7 +81,7 @@ impl<const K: usize> Add<f64> for Pack<K> {
     }
 }
 
-impl<const K: usize> Sub<f64> for Pack<K> {
+impl<const K: usize> Sub<f64> for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: f64) -> Self {
@@ -89,7 +89,7 @@ impl<const K: usize> Sub<f64> for Pack<K> {
     }
 }
 
-impl<const K: usize> Mul<f64> for Pack<K> {
+impl<const K: usize> Mul<f64> for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: f64) -> Self {
@@ -97,7 +97,7 @@ impl<const K: usize> Mul<f64> for Pack<K> {
     }
 }
 
-impl<const K: usize> Div<f64> for Pack<K> {
+impl<const K: usize> Div<f64> for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn div(self, o: f64) -> Self {
@@ -105,7 +105,7 @@ impl<const K: usize> Div<f64> for Pack<K> {
     }
 }
 
-impl<R, const K: usize> AddAssign<R> for Pack<K>
+impl<R, const K: usize> AddAssign<R> for SimdVector<K>
 where
     Self: Add<R, Output = Self>,
 {
@@ -115,7 +115,7 @@ where
     }
 }
 
-impl<R, const K: usize> SubAssign<R> for Pack<K>
+impl<R, const K: usize> SubAssign<R> for SimdVector<K>
 where
     Self: Sub<R, Output = Self>,
 {
@@ -125,7 +125,7 @@ where
     }
 }
 
-impl<R, const K: usize> MulAssign<R> for Pack<K>
+impl<R, const K: usize> MulAssign<R> for SimdVector<K>
 where
     Self: Mul<R, Output = Self>,
 {
@@ -135,7 +135,7 @@ where
     }
 }
 
-impl<R, const K: usize> DivAssign<R> for Pack<K>
+impl<R, const K: usize> DivAssign<R> for SimdVector<K>
 where
     Self: Div<R, Output = Self>,
 {
@@ -145,12 +145,12 @@ where
     }
 }
 
-impl<const K: usize> Number for Pack<K> {
+impl<const K: usize> Number for SimdVector<K> {
     #[inline(always)]
     fn promote(values: Self) -> Self {
         values
     }
-    fn gathered(value: impl Fn(usize) -> f64) -> Self {
+    fn from_lanes(value: impl Fn(usize) -> f64) -> Self {
         Self(std::array::from_fn(value))
     }
     #[inline(always)]
@@ -171,7 +171,7 @@ impl<const K: usize> Number for Pack<K> {
     }
 }
 
-impl<const K: usize> Neg for Pack<K> {
+impl<const K: usize> Neg for SimdVector<K> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -179,7 +179,7 @@ impl<const K: usize> Neg for Pack<K> {
     }
 }
 
-impl<const K: usize> Lane for Pack<K> {
+impl<const K: usize> KernelFloat for SimdVector<K> {
     const DERIVATIVES: bool = false;
 
     const RUNS: u32 = (1 << K) - 1;
@@ -187,7 +187,7 @@ impl<const K: usize> Lane for Pack<K> {
     type Values = Self;
 
     #[inline(always)]
-    fn all(value: f64) -> Self {
+    fn splat(value: f64) -> Self {
         Self([value; K])
     }
     #[inline(always)]
@@ -200,7 +200,7 @@ impl<const K: usize> Lane for Pack<K> {
     }
     #[inline(always)]
     fn fma_times<const F: bool>(self, factor: f64, b: Self) -> Self {
-        self.fma::<F>(Self::all(factor), b)
+        self.fma::<F>(Self::splat(factor), b)
     }
     #[inline(always)]
     fn fma_values<const F: bool>(self, factor: Self, b: Self) -> Self {
@@ -215,8 +215,8 @@ impl<const K: usize> Lane for Pack<K> {
         self.each(|a| a.exponential::<F>())
     }
     #[inline(always)]
-    fn grown<const F: bool>(self, x: Self) -> Self {
-        self.zip(x, |value, x| value * growth::<F>(x))
+    fn times_small_exp<const F: bool>(self, x: Self) -> Self {
+        self.zip(x, |value, x| value * small_exp::<F>(x))
     }
     #[inline(always)]
     fn replace_where(self, runs: u32, other: Self) -> Self {
@@ -232,18 +232,18 @@ impl<const K: usize> Lane for Pack<K> {
     }
 }
 
-impl<const K: usize> Factor<Self> for Pack<K> {
+impl<const K: usize> Coefficient<Self> for SimdVector<K> {
     #[inline(always)]
-    fn product(self, a: Self) -> Self {
+    fn multiply(self, a: Self) -> Self {
         self * a
     }
     #[inline(always)]
-    fn onto<const F: bool>(self, a: Self, b: Self) -> Self {
+    fn multiply_add<const F: bool>(self, a: Self, b: Self) -> Self {
         self.fma::<F>(a, b)
     }
 }
 
-impl<const K: usize> Values for Pack<K> {
+impl<const K: usize> Values for SimdVector<K> {
     #[inline(always)]
     fn magnitude(self) -> Self {
         self.each(f64::abs)
@@ -257,12 +257,12 @@ impl<const K: usize> Values for Pack<K> {
         self.zip(other, |a, b| a.smaller(b))
     }
     #[inline(always)]
-    fn negative_with(self, other: Self) -> Self {
-        self.zip(other, |a, b| a.negative_with(b))
+    fn either_negative(self, other: Self) -> Self {
+        self.zip(other, |a, b| a.either_negative(b))
     }
     #[inline(always)]
-    fn negative(self) -> u32 {
-        self.bits(|a| a.negative())
+    fn negative_mask(self) -> u32 {
+        self.bits(|a| a.negative_mask())
     }
     #[inline(always)]
     fn any_negative(self) -> bool {
@@ -273,19 +273,19 @@ impl<const K: usize> Values for Pack<K> {
         any >> 63 == 1
     }
     #[inline(always)]
-    fn decide<R: PartialEq>(self, say: impl Fn(f64) -> R) -> R {
-        vote(|run| say(self.0[run % K]))
+    fn decide<R: PartialEq>(self, predicate: impl Fn(f64) -> R) -> R {
+        branch(|run| predicate(self.0[run % K]))
     }
     #[inline(always)]
-    fn decide_with<R: PartialEq>(self, other: Self, say: impl Fn(f64, f64) -> R) -> R {
-        vote(|run| say(self.0[run % K], other.0[run % K]))
+    fn decide_with<R: PartialEq>(self, other: Self, predicate: impl Fn(f64, f64) -> R) -> R {
+        branch(|run| predicate(self.0[run % K], other.0[run % K]))
     }
     #[inline(always)]
-    fn mask_where(self, say: impl Fn(f64) -> bool) -> u32 {
-        self.bits(|a| u32::from(say(a)))
+    fn mask_where(self, predicate: impl Fn(f64) -> bool) -> u32 {
+        self.bits(|a| u32::from(predicate(a)))
     }
     fn leading(self) -> f64 {
-        self.0[leader() % K]
+        self.0[leader_lane() % K]
     }
     #[inline(always)]
     fn run_value(self, run: usize) -> f64 {
@@ -299,13 +299,14 @@ mod tests {
 
     #[test]
     fn a_guard_has_fallen_where_either_sign_is_negative() {
-        let (one, other) = (Pack::<4>([1.0, -1.0, 0.0, -2.0]), Pack([0.0, 3.0, -4.0, -5.0]));
-        assert_eq!(one.negative_with(other).negative(), 0b1110);
+        let (one, other) =
+            (SimdVector::<4>([1.0, -1.0, 0.0, -2.0]), SimdVector([0.0, 3.0, -4.0, -5.0]));
+        assert_eq!(one.either_negative(other).negative_mask(), 0b1110);
     }
 
     #[test]
     fn infinities_and_what_is_no_number_are_unbounded() {
-        let values = Pack::<4>([1.0, f64::NAN, f64::NEG_INFINITY, f64::INFINITY]);
-        assert_eq!(values.unbounded(), 0b1110);
+        let values = SimdVector::<4>([1.0, f64::NAN, f64::NEG_INFINITY, f64::INFINITY]);
+        assert_eq!(values.nonfinite_mask(), 0b1110);
     }
 }

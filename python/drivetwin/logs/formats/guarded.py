@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""Recordings whose library runs in a child process with limits on memory and time.
+
+Libraries that parse binary formats crash, hang or exhaust the memory on some damaged files. In a
+child such a file costs the child, and becomes a ReaderFailureError. Samples come back as plain
+bytes, straight into their arrays.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Timer
+from typing import Any, NoReturn
+
+import numpy as np
+
+from drivetwin import errors
+from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.shiftlog import FloatArray
+from drivetwin.errors import DrivetwinError, ReaderFailureError, Where
+from drivetwin.logs.formats.parser_limits import ParserLimits, compute_parser_limits
+from drivetwin.logs.raw import Opener, RawChannel, Recording, Window
+
+GRACE = 2.0
+"""Time [s] for the child to end after the last column."""
+_DAMAGED = "the file is damaged, or the library has a fault: record or export the log again"
+_TOO_LARGE = "if the log is only long, read a shorter one; else record or export it again"
+
+_guards_parsers = True
+
+
+def trust_parsers() -> None:
+    """Read files in this process from now on: for a process that is itself guarded and limited."""
+    global _guards_parsers
+    _guards_parsers = False
+
+
+@dataclass(frozen=True)
+class OpenRequest:
+    """First request to the child: the function that opens the file, and its arguments."""
+
+    module: str
+    function: str
+    path: Path
+    options: ReadOptions
+    limits: ParserLimits
+
+
+@dataclass(frozen=True)
+class LoadRequest:
+    """Request for the samples of a column."""
+
+    index: int
+    window: Window | None
+
+
+def open_guarded(
+    opener: Opener, path: Path, options: ReadOptions
+) -> AbstractContextManager[Recording]:
+    """Open a recording by `opener`, a function of a module, in a child process.
+
+    Raises ReaderFailureError where the child crashes or exceeds its limits, and the errors of
+    `opener`, each when the file is opened or a column is loaded.
+    """
+    return _open_in_child(opener, path, options) if _guards_parsers else opener(path, options)
+
+
+@contextmanager
+def _open_in_child(opener: Opener, path: Path, options: ReadOptions) -> Iterator[Recording]:
+    limits = compute_parser_limits(path)
+    request = OpenRequest(opener.__module__, opener.__qualname__, path, options, limits)
+    with _ReaderProcess(path, limits.seconds) as reader:
+        reply = reader.ask(request)
+        columns = tuple(Column(**column) for column in reply["columns"])
+        yield GuardedRecording(reader, columns, tuple(reply["warnings"]))
+
+
+class GuardedRecording:
+    """A recording that is open in a child process; see `Recording`."""
+
+    def __init__(
+        self, reader: _ReaderProcess, columns: tuple[Column, ...], warnings: tuple[str, ...]
+    ) -> None:
+        self.columns = columns
+        self.warnings = warnings
+        self._reader = reader
+
+    def load(self, index: int, window: Window | None = None) -> RawChannel:
+        """Read the column at `index` of `columns`; see `Recording`. Raises ReaderFailureError."""
+        reply = self._reader.ask(LoadRequest(index, window))
+        self.warnings = tuple(reply["warnings"])
+        return RawChannel(
+            reply["name"],
+            reply["unit"],
+            reply["time"],
+            reply["values"],
+            reply["group"],
+            tuple(reply["notes"]),
+        )
+
+
+class _ReaderProcess:
+    """The child; a context manager that ends it."""
+
+    def __init__(self, path: Path, seconds: float) -> None:
+        self._path = path
+        self._seconds = seconds
+        self._late = False
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "drivetwin.logs.formats.reader_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._stderr,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )
+
+    def __enter__(self) -> _ReaderProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        try:
+            self._process.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process.stdout.close()
+        self._stderr.close()
+
+    def ask(self, request: OpenRequest | LoadRequest) -> dict[str, Any]:
+        """Return the reply to a request, with `time` and `values` of a column.
+
+        Raises ReaderFailureError without a reply, else the error that it names.
+        """
+        watch = Timer(self._seconds, self._end_late)
+        watch.daemon = True
+        watch.start()
+        try:
+            return self._exchange(request)
+        except (BrokenPipeError, EOFError):
+            self._raise_failure()
+        finally:
+            watch.cancel()
+
+    def _exchange(self, request: OpenRequest | LoadRequest) -> dict[str, Any]:
+        pipe, replies = self._process.stdin, self._process.stdout
+        assert pipe is not None
+        assert replies is not None
+        pickle.dump(request, pipe)
+        pipe.flush()
+        line = replies.readline()
+        if not line.endswith(b"\n"):
+            raise EOFError
+        reply: dict[str, Any] = json.loads(line)
+        if "error" in reply:
+            raise _parse_error(reply)
+        for name in ("time", "values") if "size" in reply else ():
+            reply[name] = self._read_numbers(reply["size"])
+        return reply
+
+    def _read_numbers(self, size: int) -> FloatArray:
+        assert self._process.stdout is not None
+        numbers = np.empty(size)
+        if self._process.stdout.readinto(numbers.view(np.uint8)) != numbers.nbytes:  # type: ignore[attr-defined]
+            raise EOFError
+        return numbers
+
+    def _end_late(self) -> None:
+        self._late = True
+        self._process.kill()
+
+    def _raise_failure(self) -> NoReturn:
+        """Name the cause for which the child ended without an answer."""
+        where = Where(file=str(self._path))
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(GRACE)
+        code = self._process.returncode
+        if self._late or (code is not None and code == -getattr(signal, "SIGXCPU", sys.maxsize)):
+            what = f"it is not read after {self._seconds:.0f} s: the library that reads it hangs"
+            raise ReaderFailureError(what, _TOO_LARGE, where) from None
+        if code is not None and code < 0:
+            ended = f"was ended by {signal.Signals(-code).name}"
+        else:
+            ended = f"ended with code {code}{self._read_last_stderr()}"
+        what = f"the library that reads this format crashes on the file: its process {ended}"
+        raise ReaderFailureError(what, _DAMAGED, where) from None
+
+    def _read_last_stderr(self) -> str:
+        self._stderr.seek(max(0, self._stderr.seek(0, os.SEEK_END) - 2000))
+        lines = self._stderr.read().decode("utf-8", "replace").strip().splitlines()
+        return f": {lines[-1][:300]}" if lines else ""
+
+
+def make_memory_error(path: Path, memory: int) -> ReaderFailureError:
+    """Return the error for a file that takes more than its `memory` [bytes]."""
+    return ReaderFailureError(
+        f"reading it takes more than {memory / 2**30:.1f} GiB of memory",
+        _TOO_LARGE,
+        Where(file=str(path)),
+    )
+
+
+def format_error(error: DrivetwinError) -> dict[str, Any]:
+    """Return a typed error as a reply."""
+    where = error.where
+    return {
+        "error": type(error).__name__,
+        "what": error.what,
+        "remedy": error.remedy,
+        "where": [where.file, where.channel, where.time, where.key],
+    }
+
+
+def _parse_error(reply: dict[str, Any]) -> Exception:
+    kind = getattr(errors, reply["error"], None)
+    if not (isinstance(kind, type) and issubclass(kind, DrivetwinError)):
+        return RuntimeError(reply["what"])  # a fault of the reader itself, as without a child
+    error: DrivetwinError = kind(reply["what"], reply["remedy"], Where(*reply["where"]))
+    return error
