@@ -139,10 +139,9 @@ def build_columns(
     shifts: list[_ShiftColumns] = []
     for part in problem.parts:
         at = evaluate_operating_point(part, point)
-        one = None if at is None else _build_shift_columns(at, priors, only)
-        if one is None:
+        if at is None:
             return None
-        shifts.append(one)
+        shifts.append(_build_shift_columns(at, priors, only))
     keys = list(dict.fromkeys(key for one in shifts for key in one.keys))
     empty = np.ones(len(keys), dtype=bool)
     for one in shifts:
@@ -197,13 +196,14 @@ class _ShiftColumns:
 
 def _build_shift_columns(
     at: OperatingPoint, priors: EffectPriors, only: Collection[Group] | None
-) -> _ShiftColumns | None:
-    """Build the columns of one shift; None if they are not finite."""
+) -> _ShiftColumns:
+    """Build the columns of one shift; those that are not finite are left out."""
     named = [one for one in _number_columns(at, priors) if only is None or one[0][0] in only]
     disturbances = [one for _, one in named]
     matrix = observe(at, disturbances)
-    if not np.all(np.isfinite(matrix)):
-        return None
+    finite = np.all(np.isfinite(matrix), axis=0)
+    named = [one for one, kept in zip(named, finite, strict=True) if kept]
+    disturbances, matrix = [one for _, one in named], matrix[:, finite]
     stated = list(_build_known(at, priors))
     known = observe(at, [one for one, _ in stated]) @ np.array([sign for _, sign in stated])
     inputs: dict[str, FloatArray] = {}

@@ -86,8 +86,10 @@ def _compute_transitions(matrix: FloatArray, step: FloatArray) -> tuple[FloatArr
     scaled = matrix * step[:, None, None]
     change = np.max(np.abs(np.diff(scaled, axis=0)), axis=(1, 2))
     first = np.concatenate([[True], change > EQUAL * np.max(np.abs(scaled))])
+    largest = float(np.max(np.sum(np.abs(scaled[first]), axis=2)))
+    doublings = max(3, int(np.ceil(np.log2(max(largest, 1.0)))) + 1)
     with np.errstate(over="ignore", invalid="ignore"):
-        transition, mean = compute_exponential(scaled[first])
+        transition, mean = compute_exponential(scaled[first], doublings)
     place = np.cumsum(first) - 1
     return transition[place], mean[place]
 

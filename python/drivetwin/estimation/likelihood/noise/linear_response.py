@@ -186,19 +186,19 @@ def build_output_row(model: DualClutch, name: str) -> FloatArray:
     return np.array(rows[name])
 
 
-def compute_exponential(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
+def compute_exponential(matrix: FloatArray, doublings: int = 3) -> tuple[FloatArray, FloatArray]:
+    """Compute e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
 
-    Taylor's series of an eighth, doubled three times.
+    Taylor's series of M over 2^`doublings`, doubled so many times.
     """
-    eighth = matrix / 8.0
+    part = matrix / 2.0**doublings
     identity = np.eye(matrix.shape[-1])
-    result, mean, power = identity + eighth, identity + eighth / 2.0, eighth
+    result, mean, power = identity + part, identity + part / 2.0, part
     for order in (2, 3, 4):
-        power = power @ eighth / order
+        power = power @ part / order
         result = result + power
         mean = mean + power / (order + 1.0)
-    for _ in range(3):
+    for _ in range(doublings):
         mean = 0.5 * (result + identity) @ mean
         result = result @ result
     return np.asarray(result), np.asarray(mean)
