@@ -7,6 +7,7 @@ their results.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.paper.pipeline import PaperShift
     from drivetwin.estimation.result.cause import Cause
     from drivetwin.estimation.result.multi_log import Several
+    from drivetwin.estimation.result.spread import PredictedSpread
     from drivetwin.estimation.result.suggestion import ExperimentRanking
     from drivetwin.estimation.result.validation import HeldOut, Validation
 
@@ -46,6 +48,8 @@ class StageResults:
     their mean; empty where the shifts of a log share one."""
     cause: Cause | None = None
     """Departure from the model that the log shows, by the likelihood method; None without one."""
+    spread: tuple[Mapping[str, PredictedSpread], ...] = ()
+    """Predicted spread of the free-running simulation of each shift by signal; likelihood only."""
     several: Several | None = None
     """The logs behind a fit of several, from `identify_joint`; None of one log."""
     suggestions: tuple[ExperimentRanking, ...] = ()

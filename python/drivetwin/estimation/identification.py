@@ -16,6 +16,7 @@ from drivetwin.estimation.result.estimate import (
     SignalFit,
 )
 from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.spread import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.shifts.shift import RejectedShift, Shift
 
@@ -27,7 +28,7 @@ class Identification(DisplayMixin):
     `fit[signal][phase]` with signals `output_torque`, `input_speed`, `output_speed` and phases
     `all`, `before`, `torque`, `inertia`, `after`. `evidence` holds the results of each stage; the
     report draws from it. `correlation` is over `correlation_ids`. `load` is None where the load
-    torque is constant.
+    torque is constant. `status` is that of the free-running simulation.
     """
 
     estimates: dict[str, Estimate]
@@ -47,3 +48,4 @@ class Identification(DisplayMixin):
     correlation_ids: tuple[str, ...] = ()
     correlation: FloatArray | None = None
     load: LoadLaw | None = None
+    status: ModelStatus = ModelStatus.NOT_VALIDATED

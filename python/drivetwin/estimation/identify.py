@@ -83,7 +83,9 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         validity=_compute_validity(log.signals, found),
         inputs=dict(log.inputs),
         settings=_collect_settings(design, method),
-        evidence=replace(evidence, signals=log.signals, loads=found.loads, cause=found.cause),
+        evidence=replace(
+            evidence, signals=log.signals, loads=found.loads, cause=found.cause, spread=found.spread
+        ),
         findings=findings,
         assumptions=(
             *((BEHIND_CONVERTER,) if log.turbine_driven else ()),

@@ -22,6 +22,7 @@ from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory, simulate
 from drivetwin.twin.twin import Twin
+from drivetwin.validation.gate import assess_model
 from drivetwin.validation.initial_state import estimate_start_state, find_quiescent_time
 from drivetwin.vehicle.spec import PriorValue
 
@@ -119,7 +120,7 @@ def replace_run(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) 
 
 
 def attach_fit(found: Identification, validations: Sequence[Validation]) -> Identification:
-    """Identification with the fits of its validations entered: pooled over the shifts.
+    """Enter the fits of validations, pooled over the shifts, and set the status of the model.
 
     Of their findings count runs that ended early and those that left the speeds of their own log:
     all other ranges are those of these logs.
@@ -127,11 +128,13 @@ def attach_fit(found: Identification, validations: Sequence[Validation]) -> Iden
     if not validations:
         return found
     findings = tuple(each for one in validations for each in _check_divergence(one))
-    return replace(
-        found,
-        fit=_compute_pooled_fit(validations),
-        evidence=replace(found.evidence, validation=tuple(validations)),
-        findings=found.findings + findings,
+    return assess_model(
+        replace(
+            found,
+            fit=_compute_pooled_fit(validations),
+            evidence=replace(found.evidence, validation=tuple(validations)),
+            findings=found.findings + findings,
+        )
     )
 
 

@@ -32,6 +32,7 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     make_log_id,
 )
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, build_friction_curves
+from drivetwin.estimation.likelihood.uncertainty.predicted_spread import predict_spread
 from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
 from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
@@ -123,6 +124,7 @@ def build_estimates(
         ),
         _build_load_law(fit, told),
         collect_loads(fit),
+        predict_spread(fit, told),
         cause,
     )
 

@@ -102,6 +102,7 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
         likelihood=fit,
         loads=told.loads,
         cause=told.cause,
+        spread=told.spread,
         several=several,
     )
     return replace(_join_results(alone, told, several), evidence=evidence)

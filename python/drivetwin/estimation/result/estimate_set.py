@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -13,6 +13,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.result.cause import Cause
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
+from drivetwin.estimation.result.spread import PredictedSpread
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import make_shift_labels
 
@@ -31,6 +32,8 @@ class EstimateSet:
     findings: tuple[Finding, ...]
     load: LoadLaw | None = None
     loads: tuple[float, ...] = ()
+    spread: tuple[Mapping[str, PredictedSpread], ...] = ()
+    """Predicted spread of the free-running simulation of each shift by signal; likelihood only."""
     cause: Cause | None = None
     """Departure from the model that the log shows; likelihood method only."""
 

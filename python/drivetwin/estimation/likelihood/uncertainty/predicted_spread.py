@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Spread of a simulation driven by measured inputs, as predicted from all known uncertainties.
+
+A right model misses the measurement by sensor noise, by the noise of its inputs sent through the
+driveline, and by the errors of its parameters and effects. The variance of each compared sample is
+the sum of the three.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.effects.correction import Correction
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.noise.linear_response import STATES, build_output_row
+from drivetwin.estimation.likelihood.noise.residual_covariance import NoisePath
+from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.result.spread import PredictedSpread
+
+
+def predict_spread(fit: LikelihoodFit, told: Correction) -> tuple[dict[str, PredictedSpread], ...]:
+    """Predict the standard deviation of simulated less measured signals, for each shift by signal.
+
+    A shift whose weighting has no input noise has none.
+    """
+    found = []
+    joint = told.joint_covariance
+    for part, slopes, z in zip(
+        fit.problem.parts, fit.normal.slopes, told.step.columns.matrices, strict=True
+    ):
+        rows = np.column_stack([slopes, z])
+        variance = part.record.sigma**2 + np.einsum("np,pq,nq->n", rows, joint, rows)
+        if part.weighting.path is not None:
+            variance += _propagate_inputs(part, fit.point, part.weighting.path)
+        found.append(_split(part, np.sqrt(variance)))
+    return tuple(found)
+
+
+def _propagate_inputs(part: ShiftTerm, point: ParameterVector, path: NoisePath) -> FloatArray:
+    """Compute the variance (n,) of the compared samples by the noise of the inputs."""
+    response = path.response
+    push = sum(
+        path.power[name][:, None, None] * drive[:, :, None] * drive[:, None, :]
+        for name, drive in response.drive.items()
+    )
+    state = np.zeros((part.record.time.size, STATES, STATES))
+    for k, (step, change) in enumerate(zip(response.transition, np.asarray(push), strict=True)):
+        state[k + 1] = step @ state[k] @ step.T + change
+    model = part.structure.build_model(point)
+    found = []
+    for out in part.record.outputs:
+        row = build_output_row(model, out.name)
+        found.append(np.einsum("i,kij,j->k", row, state[out.centre], row))
+    return np.concatenate(found)
+
+
+def _split(part: ShiftTerm, std: FloatArray) -> dict[str, PredictedSpread]:
+    """Split stacked standard deviations (n,) by signal."""
+    found, first = {}, 0
+    for out in part.record.outputs:
+        rows = slice(first, first + out.values.size)
+        first = rows.stop
+        name = "input_speed" if out.name == "engine_speed" else out.name
+        found[name] = PredictedSpread(part.record.time[out.place], std[rows])
+    return found

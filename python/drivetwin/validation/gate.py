@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""Gate behind an identification: the free-running simulation against the measurement.
+
+The measured inputs drive the identified model. In each phase its error must lie within the spread
+predicted from noise, parameters and effects. Where it does not, no value is identified, whatever
+its interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.estimation.result.spread import ModelStatus, PredictedSpread
+from drivetwin.estimation.result.validation import SignalTrace, Validation
+from drivetwin.estimation.result.verdict import apply_errors
+from drivetwin.findings import Code, Finding, Severity, report
+from drivetwin.validation.suspects import find_suspects
+
+
+@dataclass(frozen=True)
+class GateSettings:
+    """Limits of the free-running simulation and of plausible values."""
+
+    least_fit: float = 50.0
+    """Fit of a signal over the whole shift [%] below which half of what moves is not explained."""
+    largest_error: float = 5.0
+    """Root mean square error of a phase over the predicted spread from which it is no chance."""
+    friction: tuple[float, float] = (0.03, 0.3)
+    """Range of μ of wet clutches; outside it the clutch gain on the card is wrong."""
+    least_efficiency: float = 0.6
+    """Least efficiency of a gearbox."""
+
+
+GATE = GateSettings()
+
+
+def assess_model(found: Identification) -> Identification:
+    """Hold the validations of an identification against their prediction and set its status.
+
+    A model that fails keeps its values, none of them identified, and a finding names the entries
+    of the card that are most likely wrong.
+    """
+    validations = found.evidence.validation
+    if not validations:
+        return found
+    failures = [*_check_runs(found), *_check_spread(found)]
+    doubts = list(_check_plausibility(found))
+    estimates = apply_errors(found.estimates, failures)
+    suspects = find_suspects(found, friction=GATE.friction) if failures or doubts else []
+    status = ModelStatus.VALID
+    if failures:
+        status = ModelStatus.NOT_VALID
+    elif doubts or _has_limits(found):
+        status = ModelStatus.LIMITED
+    findings = (*failures, *doubts, *suspects, *found.findings)
+    return replace(found, estimates=estimates, findings=findings, status=status)
+
+
+def _has_limits(found: Identification) -> bool:
+    """Return whether a finding or a verdict restricts the use of the model."""
+    return any(one.severity is Severity.ERROR for one in found.findings) or any(
+        one.verdict in (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE) for one in found.estimates.values()
+    )
+
+
+def _check_runs(found: Identification) -> Iterator[Finding]:
+    """Find signals that the simulation does not follow over the whole shift."""
+    for name, phases in found.fit.items():
+        percent = phases["all"].fit_percent
+        if not percent >= GATE.least_fit and np.isfinite(phases["all"].rmse):
+            channel = name.replace("_", " ")
+            yield report(Code.SIMULATION_MISSES, channel=channel, fit=percent)
+    for one in found.evidence.validation:
+        if one.status != "completed":
+            yield report(Code.SIMULATION_INCOMPLETE, reason=one.status)
+
+
+def _check_spread(found: Identification) -> Iterator[Finding]:
+    """Find phases in which the error exceeds its predicted spread."""
+    for one, spread in zip(found.evidence.validation, found.evidence.spread, strict=False):
+        for name, trace in one.traces.items():
+            if name in spread:
+                yield from _check_phases(one, name, trace, spread[name])
+
+
+def _check_phases(
+    one: Validation, name: str, trace: SignalTrace, spread: PredictedSpread
+) -> Iterator[Finding]:
+    std = np.interp(trace.time, spread.time, spread.std)
+    if name == "input_speed":
+        std = std / one.model.i_in
+    for phase, (start, end) in one.phases.items():
+        inside = (trace.time >= start) & (trace.time <= end)
+        if not np.any(inside):
+            continue
+        error = float(np.sqrt(np.mean((trace.simulated - trace.measured)[inside] ** 2)))
+        usual = float(np.sqrt(np.mean(std[inside] ** 2)))
+        if error > GATE.largest_error * usual:
+            yield report(
+                Code.SIMULATION_OUTSIDE_SPREAD,
+                channel=name.replace("_", " "),
+                phase=phase,
+                ratio=error / usual,
+                shift=f"{one.shift.start_gear}-{one.shift.end_gear}",
+            )
+
+
+def _check_plausibility(found: Identification) -> Iterator[Finding]:
+    """Find values that no gearbox has."""
+    low, high = GATE.friction
+    for name, curve in found.friction.items():
+        middle = float(np.median(curve.mu))
+        if not curve.over_eta and not low <= middle <= high:
+            yield report(Code.FRICTION_IMPLAUSIBLE, element=name, mu=middle, low=low, high=high)
+    eta = found.estimates.get("eta")
+    if eta is not None and eta.value is not None and eta.value < GATE.least_efficiency:
+        yield report(Code.EFFICIENCY_IMPLAUSIBLE, value=eta.value)
