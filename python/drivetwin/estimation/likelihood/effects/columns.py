@@ -24,6 +24,9 @@ from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import SensorTolerance
 
+CURVED_SIZES = (0.05, 5.0)
+"""Sizes, in stated ones, between which the column of a curved effect is formed."""
+
 
 @dataclass(frozen=True, eq=False)
 class EffectPriors:
@@ -97,6 +100,15 @@ class EffectColumns:
         )
         return replace(found, known=known)
 
+    def form_again(self, amounts: FloatArray) -> FormedAgain:
+        """Describe the columns of a second step after `amounts` (q,) of these."""
+        sizes = {
+            group.effect: float(np.clip(abs(amount) * scale, *CURVED_SIZES))
+            for group, amount, scale in zip(self.groups, amounts, self.scale, strict=True)
+            if group.effect is not None and EFFECTS[group.effect].curved
+        }
+        return FormedAgain(set(self.groups), sizes)
+
     def find_columns(self, group: Group) -> list[int]:
         """Return the numbers of the columns of a group."""
         return [k for k, one in enumerate(self.groups) if one == group]
@@ -128,12 +140,11 @@ def build_columns(
     problem: LikelihoodObjective,
     point: ParameterVector,
     priors: EffectPriors,
-    only: Collection[Group] | None = None,
+    again: FormedAgain | None = None,
 ) -> EffectColumns | None:
     """Build the columns of all effects that are not off; None if a shift has no linear response.
 
-    `only` restricts them to some groups.
-
+    `again` describes those of a second step.
     A column that changes no compared sample is left out.
     """
     shifts: list[_ShiftColumns] = []
@@ -141,7 +152,7 @@ def build_columns(
         at = evaluate_operating_point(part, point)
         if at is None:
             return None
-        shifts.append(_build_shift_columns(at, priors, only))
+        shifts.append(_build_shift_columns(at, priors, again or FormedAgain()))
     keys = list(dict.fromkeys(key for one in shifts for key in one.keys))
     empty = np.ones(len(keys), dtype=bool)
     for one in shifts:
@@ -160,6 +171,15 @@ def build_columns(
             for one in shifts
         ),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FormedAgain:
+    """Columns of a second step: the `groups` of the first (None for all), and by curved effect the
+    size at which its column is formed, in stated ones."""
+
+    groups: Collection[Group] | None = None
+    sizes: Mapping[EffectId, float] = field(default_factory=dict)
 
 
 _Key = tuple[Group, int]
@@ -195,12 +215,18 @@ class _ShiftColumns:
 
 
 def _build_shift_columns(
-    at: OperatingPoint, priors: EffectPriors, only: Collection[Group] | None
+    at: OperatingPoint, priors: EffectPriors, again: FormedAgain
 ) -> _ShiftColumns:
     """Build the columns of one shift; those that are not finite are left out."""
-    named = [one for one in _number_columns(at, priors) if only is None or one[0][0] in only]
+    groups = again.groups
+    named = [
+        one
+        for one in _number_columns(at, priors, again.sizes)
+        if groups is None or one[0][0] in groups
+    ]
     disturbances = [one for _, one in named]
-    matrix = observe(at, disturbances)
+    sizes = np.array([_get_size(again.sizes, key[0]) for key, _ in named])
+    matrix = observe(at, disturbances) / sizes
     finite = np.all(np.isfinite(matrix), axis=0)
     named = [one for one, kept in zip(named, finite, strict=True) if kept]
     disturbances, matrix = [one for _, one in named], matrix[:, finite]
@@ -215,20 +241,27 @@ def _build_shift_columns(
     return _ShiftColumns(keys, matrix, known, at.middle, inputs)
 
 
+def _get_size(sizes: Mapping[EffectId, float], group: Group) -> float:
+    """Return the size at which the columns of a group are formed, in stated ones."""
+    return 1.0 if group.effect is None else sizes.get(group.effect, 1.0)
+
+
 def _number_columns(
-    at: OperatingPoint, priors: EffectPriors
-) -> Iterator[tuple[tuple[Group, int], Disturbance]]:
+    at: OperatingPoint, priors: EffectPriors, sizes: Mapping[EffectId, float]
+) -> Iterator[tuple[_Key, Disturbance]]:
     """Yield the disturbances of one prior standard deviation with their group and number."""
-    found = list(_build_random(at, priors))
+    found = list(_build_random(at, priors, sizes))
     keys = number_groups([group for group, _ in found])
     yield from zip(keys, (one for _, one in found), strict=True)
 
 
-def _build_random(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Group, Disturbance]]:
+def _build_random(
+    at: OperatingPoint, priors: EffectPriors, sizes: Mapping[EffectId, float]
+) -> Iterator[tuple[Group, Disturbance]]:
     for name, effect in EFFECTS.items():
         prior = priors.get_prior(name)
         if prior.std > 0.0:
-            for one in effect.build(at, prior.std):
+            for one in effect.build(at, sizes.get(name, 1.0) * prior.std):
                 yield Group(name, one.subject), one
     for one in build_sensor_columns(at, priors.sensors):
         yield Group(None, one.subject), one

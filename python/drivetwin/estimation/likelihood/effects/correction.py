@@ -90,7 +90,7 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     sums = weight_columns(fit.problem, fit.normal, columns)
     evidence = compute_evidence(sums, fit.normal.information, fit.chi2)
     sums = select_one_mode(sums, evidence)
-    sums = scale_by_evidence(sums, fit.normal.information, fit.chi2)
+    sums = scale_by_evidence(sums, fit.normal.information, fit.chi2, evidence)
     step, normal, point = take_joint_step(fit.problem, fit.normal, sums), fit.normal, fit.point
     second = np.zeros_like(step.moves)
     size = second.size
@@ -173,8 +173,8 @@ def _expand_with_inputs(
     ]
     problem = replace(fit.problem, parts=tuple(parts))
     normal = problem.normal(point)
-    kept = set(first.columns.groups)
-    columns = None if normal is None else build_columns(problem, point, priors, kept)
+    formed = first.columns.form_again(first.amounts)
+    columns = None if normal is None else build_columns(problem, point, priors, formed)
     if normal is None or columns is None:
         return None
     columns = columns.follow(first.columns, acting)

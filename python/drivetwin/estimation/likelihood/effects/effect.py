@@ -40,7 +40,8 @@ class Effect:
     `std` is the default standard deviation of its normal prior about zero in `unit`, `source` the
     reason for it. `meaning` completes "the log shows ..."; `remedy` is advice where it is found.
     A `random` effect is a sample of a random process: no single value of it can be stated.
-    The columns grow with the `power` of the size.
+    The columns grow with the `power` of the size. A `curved` effect is not proportional to its
+    size: a second step forms its column at the size found by the first.
     """
 
     id: EffectId
@@ -52,3 +53,4 @@ class Effect:
     build: Builder
     random: bool = False
     power: float = 1.0
+    curved: bool = False

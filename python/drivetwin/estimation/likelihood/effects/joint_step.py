@@ -35,10 +35,12 @@ from drivetwin.vehicle.effects import EffectId
 class SizeSettings:
     """Settings of the prior sizes by evidence."""
 
-    smallest: float = 0.4
+    smallest: float = 0.2
     """Least size of an effect that the log does not show, as a share of the stated one."""
     largest: float = 5.0
     """Greatest size, as a factor of the stated one: beyond it the stated prior is refuted."""
+    evidence: float = 3.0
+    """Log evidence from which an effect may be larger than stated: odds of 20 against chance."""
     rounds: int = 30
     """Greatest number of fixed-point iterations."""
     rtol: float = 0.02
@@ -153,19 +155,28 @@ def weight_columns(
 
 
 def scale_by_evidence(
-    sums: WeightedColumns, information: FloatArray, chi2: float
+    sums: WeightedColumns,
+    information: FloatArray,
+    chi2: float,
+    evidence: Mapping[Group, GroupEvidence],
 ) -> WeightedColumns:
     """Scale the columns of each group to the prior size of greatest evidence, all groups together.
 
     Fixed point of MacKay (Neural Computation 4, 1992): the prior variance of a group becomes the
-    mean square of its amounts, posterior variance included. Stated sensor tolerances stay.
+    mean square of its amounts, posterior variance included. Only a group with `evidence` becomes
+    larger than stated. Stated sensor tolerances stay.
     """
+    if sums.pull.size == 0:
+        return sums
     follows = invert_information(information) @ sums.cross
     power = max(chi2, 1.0)
     own = (sums.own - sums.cross.T @ follows) / power
     pull = (sums.pull + follows.T @ sums.gradient) / power
     groups = [
-        sums.columns.find_columns(one)
+        (
+            sums.columns.find_columns(one),
+            SIZES.largest if evidence[one].nats > SIZES.evidence else 1.0,
+        )
         for one in dict.fromkeys(sums.columns.groups)
         if one.effect is not None
     ]
@@ -175,9 +186,9 @@ def scale_by_evidence(
         spread = np.linalg.inv(np.eye(pull.size) + np.outer(scale, scale) * own)
         amounts = spread @ (scale * pull)
         square = amounts**2 + np.diag(spread)
-        for k in groups:
+        for k, largest in groups:
             size = scale[k] * np.sqrt(np.mean(square[k]))
-            scale[k] = np.clip(size, SIZES.smallest, SIZES.largest)
+            scale[k] = np.clip(size, SIZES.smallest, largest)
         if np.max(np.abs(scale / before - 1.0)) < SIZES.rtol:
             break
     return sums.rescale(scale)
@@ -186,7 +197,12 @@ def scale_by_evidence(
 def compute_evidence(
     sums: WeightedColumns, information: FloatArray, chi2: float
 ) -> dict[Group, GroupEvidence]:
-    """Compute the evidence of each group alone, with residual power `chi2` per sample."""
+    """Compute the evidence of each group alone, with residual power `chi2` per sample.
+
+    Stated tolerances of sensors act in any case: they are unknowns beside those of the fit.
+    """
+    size = sums.gradient.size
+    sums, information = _join_tolerances(sums, information)
     follows = invert_information(information) @ sums.cross
     power = max(chi2, 1.0)
     own = (sums.own - sums.cross.T @ follows) / power
@@ -204,9 +220,27 @@ def compute_evidence(
             np.sqrt(np.diag(spread)),
             tuple(k),
             own[:, k] @ amounts,
-            -follows[:, k] @ amounts,
+            -follows[:size, k] @ amounts,
         )
     return found
+
+
+def _join_tolerances(
+    sums: WeightedColumns, information: FloatArray
+) -> tuple[WeightedColumns, FloatArray]:
+    """Return the sums and the information with the tolerances of sensors among the unknowns.
+
+    The columns themselves stay; a tolerance has no evidence beside itself.
+    """
+    sensors = [k for k, one in enumerate(sums.columns.groups) if one.effect is None]
+    own = sums.own[np.ix_(sensors, sensors)] + np.eye(len(sensors))
+    cross = sums.cross[:, sensors]
+    joined = replace(
+        sums,
+        cross=np.vstack([sums.cross, sums.own[sensors]]),
+        gradient=np.concatenate([sums.gradient, -sums.pull[sensors]]),
+    )
+    return joined, np.block([[information, cross], [cross.T, own]])
 
 
 def select_one_mode(

@@ -21,7 +21,7 @@ EFFECT = Effect(
     EffectId.OUTPUT_TORQUE_OFFSET,
     "an offset of the output torque",
     "of the largest shaft torque",
-    0.002,
+    0.001,
     "zero error of torque flanges and telemetry, 0.1 to 0.3 % of full scale by data sheet",
     "zero the output torque sensor with the driveline unloaded",
     build,

@@ -51,9 +51,10 @@ EFFECT = Effect(
     EffectId.TYRE_SLIP,
     "slip of the driven tyres",
     "slip at the largest shaft torque",
-    0.002,
+    0.001,
     "longitudinal stiffness of truck tyres, 0.2 to 1 % slip at a third of the grip (Pacejka, Tire "
     "and Vehicle Dynamics)",
     "measure a wheel speed and the vehicle speed, or use a chassis dynamometer with known slip",
     build,
+    curved=True,
 )
