@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from drivetwin.estimation.likelihood.effects.columns import (
 from drivetwin.estimation.likelihood.effects.joint_step import (
     GroupEvidence,
     JointStep,
+    WeightedColumns,
     compute_evidence,
     scale_by_evidence,
     select_one_mode,
@@ -29,6 +30,7 @@ from drivetwin.estimation.likelihood.fit import (
     compute_covariance,
     invert_information,
 )
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import Group
 
@@ -37,6 +39,9 @@ from drivetwin.estimation.result.cause import Group
 class CorrectionSettings:
     """Settings of the correction for effects."""
 
+    evidence: float = 3.0
+    """Log evidence from which an effect moves the values: odds of 20. Effects with less widen the
+    intervals, and the values stay those that simulate best without them."""
     linear_moves: float = 0.5
     """Largest move of an unknown, in its new standard deviations, up to which one step is taken:
     the error of a linear step is of second order in it."""
@@ -81,8 +86,10 @@ class Correction:
 def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     """Estimate the unknowns with all effects at their priors; None without a linear response.
 
-    The first step is from the minimum of the fit. Where it leaves the range in which the columns
-    are linear, they are formed anew where it ends, and a second step is taken from there.
+    Effects with evidence move the values. The others have a posterior mean too; it is not applied,
+    and the variance grows by its square. The first step is from the minimum of the fit. Where it
+    leaves the range in which the columns are linear, they are formed anew where it ends, and a
+    second step is taken from there.
     """
     columns = build_columns(fit.problem, fit.point, priors)
     if columns is None:
@@ -91,29 +98,20 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     evidence = compute_evidence(sums, fit.normal.information, fit.chi2)
     sums = select_one_mode(sums, evidence)
     sums = scale_by_evidence(sums, fit.normal.information, fit.chi2, evidence)
-    step, normal, point = take_joint_step(fit.problem, fit.normal, sums), fit.normal, fit.point
-    second = np.zeros_like(step.moves)
-    size = second.size
-    std = np.sqrt(np.diag(step.covariance)[:size])
-    if np.max(np.abs(step.moves) / std) > CORRECTION.linear_moves:
-        again = _take_second_step(fit, step, priors)
+    shown = {one for one, each in evidence.items() if each.nats > CORRECTION.evidence}
+    base = _Expansion(fit.problem, fit.normal, fit.point, sums)
+    first = base.take_step(shown)
+    second = np.zeros_like(first.moves)
+    std = np.sqrt(np.diag(first.covariance)[: second.size])
+    if np.max(np.abs(first.moves) / std) > CORRECTION.linear_moves:
+        again = _expand_again(fit, first.moves, priors, base.spread_amounts(first, shown))
         if again is None:
             second = np.full_like(second, np.inf)
         else:
-            first = step.moves
-            step, normal, point = again.step, again.normal, again.point
-            second = point.values + step.moves - fit.point.values - first
-    extra = fit.covariance - compute_covariance(fit.problem, fit.normal, fit.chi2)
-    values = fit.mean.values + point.values - fit.point.values + step.moves
-    values = np.clip(values, fit.problem.lower, fit.problem.upper)
-    return Correction(
-        fit.mean.replace_values(values),
-        step.covariance[:size, :size] + extra,
-        _compute_noise(normal, step) + extra,
-        step,
-        second,
-        evidence,
-    )
+            base = again
+            moved = base.take_step(shown).moves
+            second = base.point.values + moved - fit.point.values - first.moves
+    return _conclude(fit, base, shown, second, evidence)
 
 
 def keep_fit(fit: LikelihoodFit) -> Correction:
@@ -134,28 +132,77 @@ def keep_fit(fit: LikelihoodFit) -> Correction:
 
 
 @dataclass(frozen=True, eq=False)
-class _SecondStep:
-    """Joint step from `point`, the end of the first, with the expansion there."""
+class _Expansion:
+    """Point, expansion of Q there, and the weighted sums of all columns."""
 
-    step: JointStep
+    problem: LikelihoodObjective
     normal: NormalEquations
     point: ParameterVector
+    sums: WeightedColumns
+
+    def take_step(self, groups: Collection[Group] | None = None) -> JointStep:
+        """Take the joint step with the columns of some `groups`, or of all."""
+        sums = self.sums
+        if groups is not None:
+            named = enumerate(sums.columns.groups)
+            sums = sums.select([k for k, one in named if one in groups])
+        return take_joint_step(self.problem, self.normal, sums)
+
+    def spread_amounts(self, step: JointStep, groups: Collection[Group]) -> _Amounts:
+        """Return the amounts of a step with the columns of `groups` among all columns."""
+        amounts = np.zeros(self.sums.pull.size)
+        amounts[[k for k, one in enumerate(self.sums.columns.groups) if one in groups]] = (
+            step.amounts
+        )
+        return _Amounts(self.sums.columns, amounts)
 
 
-def _take_second_step(
-    fit: LikelihoodFit, first: JointStep, priors: EffectPriors
-) -> _SecondStep | None:
-    """Form the columns anew at the end of the first step, and step from there.
+@dataclass(frozen=True, eq=False)
+class _Amounts:
+    """Columns of all effects with their amounts (q,); zero for effects without evidence."""
 
-    The effects that act through inputs drive the run with the amounts of the first step, so they
-    are no longer linear; the others stay columns. Where no run completes, the first step is halved.
+    columns: EffectColumns
+    values: FloatArray
+
+
+def _conclude(
+    fit: LikelihoodFit,
+    base: _Expansion,
+    shown: Collection[Group],
+    second: FloatArray,
+    evidence: Mapping[Group, GroupEvidence],
+) -> Correction:
+    """Form values and covariances at the last expansion."""
+    step, chosen = base.take_step(), base.take_step(shown)
+    size = second.size
+    rest = step.moves - chosen.moves
+    extra = fit.covariance - compute_covariance(fit.problem, fit.normal, fit.chi2)
+    values = fit.mean.values + base.point.values - fit.point.values + chosen.moves
+    return Correction(
+        fit.mean.replace_values(np.clip(values, fit.problem.lower, fit.problem.upper)),
+        step.covariance[:size, :size] + np.outer(rest, rest) + extra,
+        _compute_noise(base.normal, step) + extra,
+        step,
+        second,
+        evidence,
+    )
+
+
+def _expand_again(
+    fit: LikelihoodFit, moves: FloatArray, priors: EffectPriors, amounts: _Amounts
+) -> _Expansion | None:
+    """Form the columns anew at the end of the first step of `moves` (p,).
+
+    Where no run completes there, the step is halved.
     """
     share = 1.0
     with limit_evaluations(np.inf):
         while share > CORRECTION.shortest_step:
-            values = fit.problem.retract(fit.point, share * first.moves)
+            values = fit.problem.retract(fit.point, share * moves)
             values = np.clip(values, fit.problem.lower, fit.problem.upper)
-            found = _expand_with_inputs(fit, first, share, fit.point.replace_values(values), priors)
+            acting = _Amounts(amounts.columns, share * amounts.values)
+            point = fit.point.replace_values(values)
+            found = _expand_with_inputs(fit.problem, point, priors, acting)
             if found is not None:
                 return found
             share *= 0.5
@@ -163,23 +210,27 @@ def _take_second_step(
 
 
 def _expand_with_inputs(
-    fit: LikelihoodFit, first: JointStep, share: float, point: ParameterVector, priors: EffectPriors
-) -> _SecondStep | None:
-    """Take the joint step from `point` with `share` of the first amounts in the inputs."""
-    acting = share * first.amounts * first.columns.acts_on_inputs
-    changes = first.columns.compute_inputs(acting)
+    problem: LikelihoodObjective, point: ParameterVector, priors: EffectPriors, amounts: _Amounts
+) -> _Expansion | None:
+    """Expand Q at `point` with effects in the inputs; None if a run does not complete.
+
+    The effects that act through inputs drive the run with their `amounts`, so they are no longer
+    linear; the others stay columns.
+    """
+    first = amounts.columns
+    acting = amounts.values * first.acts_on_inputs
+    changes = first.compute_inputs(acting)
     parts = [
-        part.add_to_inputs(point, one) for part, one in zip(fit.problem.parts, changes, strict=True)
+        part.add_to_inputs(point, one) for part, one in zip(problem.parts, changes, strict=True)
     ]
-    problem = replace(fit.problem, parts=tuple(parts))
+    problem = replace(problem, parts=tuple(parts))
     normal = problem.normal(point)
-    formed = first.columns.form_again(first.amounts)
+    formed = first.form_again(amounts.values)
     columns = None if normal is None else build_columns(problem, point, priors, formed)
     if normal is None or columns is None:
         return None
-    columns = columns.follow(first.columns, acting)
-    sums = weight_columns(problem, normal, columns)
-    return _SecondStep(take_joint_step(problem, normal, sums), normal, point)
+    sums = weight_columns(problem, normal, columns.follow(first, acting))
+    return _Expansion(problem, normal, point, sums)
 
 
 def _compute_noise(normal: NormalEquations, step: JointStep) -> FloatArray:

@@ -35,7 +35,7 @@ from drivetwin.vehicle.effects import EffectId
 class SizeSettings:
     """Settings of the prior sizes by evidence."""
 
-    smallest: float = 0.2
+    smallest: float = 0.1
     """Least size of an effect that the log does not show, as a share of the stated one."""
     largest: float = 5.0
     """Greatest size, as a factor of the stated one: beyond it the stated prior is refuted."""
