@@ -91,14 +91,15 @@ def _check_spread(found: Identification) -> Iterator[Finding]:
 def _check_phases(
     one: Validation, name: str, trace: SignalTrace, spread: PredictedSpread
 ) -> Iterator[Finding]:
-    std = np.interp(trace.time, spread.time, spread.std)
-    if name == "input_speed":
-        std = std / one.model.i_in
+    factor = one.model.i_in if name == "input_speed" else 1.0
+    std = np.interp(trace.time, spread.time, spread.std) / factor
+    expected = np.interp(trace.time, spread.time, spread.mean) / factor
+    missed = trace.measured - trace.simulated - expected
     for phase, (start, end) in one.phases.items():
         inside = (trace.time >= start) & (trace.time <= end)
         if not np.any(inside):
             continue
-        error = float(np.sqrt(np.mean((trace.simulated - trace.measured)[inside] ** 2)))
+        error = float(np.sqrt(np.mean(missed[inside] ** 2)))
         usual = float(np.sqrt(np.mean(std[inside] ** 2)))
         if error > GATE.largest_error * usual:
             yield report(

@@ -20,8 +20,12 @@ class ModelStatus(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class PredictedSpread:
-    """Standard deviation `std` (n,) at `time` (n,) [s] of a simulated less a measured signal that
-    a right model has, SI; engine-side speeds are those of the engine."""
+    """Distribution at `time` (n,) [s] of a measured less a simulated signal if the model is right.
+
+    `mean` (n,) is the action of the effects that the log shows and the simulation lacks, `std`
+    (n,) the standard deviation; SI, speeds of the engine side those of the engine.
+    """
 
     time: FloatArray
+    mean: FloatArray
     std: FloatArray

@@ -45,6 +45,9 @@ class CorrectionSettings:
     linear_moves: float = 0.5
     """Largest move of an unknown, in its new standard deviations, up to which one step is taken:
     the error of a linear step is of second order in it."""
+    more_steps: int = 2
+    """Greatest number of steps after the first: the third changes values by a tenth of the second,
+    unless the effects are beyond a linear correction."""
     shortest_step: float = 0.1
     """Share of the first step below which the second is not tried."""
 
@@ -57,8 +60,8 @@ class Correction:
     """Fit corrected for effects.
 
     `mean` are the corrected unknowns with `covariance` (p, p) (total) and `noise` (p, p), that of
-    noise alone. `step` is the last joint step; `second` (p,) the move of the unknowns between the
-    first and the second, zero where one was enough. `evidence` is that of each group at the
+    noise alone. `step` is the last joint step; `last` (p,) the move of the unknowns between the
+    last two steps, zero where one was enough. `evidence` is that of each group at the
     minimum of the fit.
     """
 
@@ -66,7 +69,7 @@ class Correction:
     covariance: FloatArray
     noise: FloatArray
     step: JointStep
-    second: FloatArray
+    last: FloatArray
     evidence: Mapping[Group, GroupEvidence]
 
     @property
@@ -88,8 +91,8 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
 
     Effects with evidence move the values. The others have a posterior mean too; it is not applied,
     and the variance grows by its square. The first step is from the minimum of the fit. Where it
-    leaves the range in which the columns are linear, they are formed anew where it ends, and a
-    second step is taken from there.
+    leaves the range in which the columns are linear, they are formed anew where it ends, and
+    another step is taken from there.
     """
     columns = build_columns(fit.problem, fit.point, priors)
     if columns is None:
@@ -100,18 +103,21 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     sums = scale_by_evidence(sums, fit.normal.information, fit.chi2, evidence)
     shown = {one for one, each in evidence.items() if each.nats > CORRECTION.evidence}
     base = _Expansion(fit.problem, fit.normal, fit.point, sums)
-    first = base.take_step(shown)
-    second = np.zeros_like(first.moves)
-    std = np.sqrt(np.diag(first.covariance)[: second.size])
-    if np.max(np.abs(first.moves) / std) > CORRECTION.linear_moves:
-        again = _expand_again(fit, first.moves, priors, base.spread_amounts(first, shown))
+    step = base.take_step(shown)
+    size, total = step.moves.size, step.moves
+    change, last = total, np.zeros_like(total)
+    for _ in range(CORRECTION.more_steps):
+        std = np.sqrt(np.diag(step.covariance)[:size])
+        if np.max(np.abs(change) / std) <= CORRECTION.linear_moves:
+            break
+        again = _expand_again(fit, total, priors, base.spread_amounts(step, shown))
         if again is None:
-            second = np.full_like(second, np.inf)
-        else:
-            base = again
-            moved = base.take_step(shown).moves
-            second = base.point.values + moved - fit.point.values - first.moves
-    return _conclude(fit, base, shown, second, evidence)
+            last = np.full_like(total, np.inf)
+            break
+        base, step = again, again.take_step(shown)
+        change = base.point.values + step.moves - fit.point.values - total
+        total, last = total + change, change
+    return _conclude(fit, base, shown, last, evidence)
 
 
 def keep_fit(fit: LikelihoodFit) -> Correction:

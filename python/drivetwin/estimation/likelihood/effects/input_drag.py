@@ -24,7 +24,7 @@ EFFECT = Effect(
     EffectId.INPUT_DRAG,
     "drag at the gearbox input, or an offset of the engine torque",
     "of the largest engine torque",
-    0.003,
+    0.005,
     "open wet clutches and pump take 0.3 to 1 % of the rated torque (Kitabayashi et al., SAE "
     "2003-01-1973)",
     "calibrate the engine torque at zero load, or state the drag under [effects]",

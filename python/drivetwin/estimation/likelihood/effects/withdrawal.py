@@ -25,9 +25,9 @@ class WithdrawalSettings:
     so that the interval of what the effect moves is too."""
     moves: float = 1.0
     """Move of a value by such an effect, in its standard deviations, that makes it unreliable."""
-    second_step: float = 1.5
-    """Move of a value by the second step, in its standard deviations, from which the effects are
-    not linear: a third step would move it again."""
+    last_step: float = 1.5
+    """Move of a value by the last step, in its standard deviations, from which the effects are
+    not linear: one more step would move it again."""
     chi2: float = 1.1
     """Residual power per sample after the correction above which something is missing from the
     model that no effect describes."""
@@ -53,8 +53,8 @@ def find_unreliable(
     if chi2 > WITHDRAWAL.chi2:
         return [report(Code.RESIDUAL_UNEXPLAINED, chi2=chi2)]
     found = []
-    second = np.abs(jacobian @ correction.second)
-    for k in np.flatnonzero(~(second <= WITHDRAWAL.second_step * std)):
+    last = np.abs(jacobian @ correction.last)
+    for k in np.flatnonzero(~(last <= WITHDRAWAL.last_step * std)):
         found.append(report(Code.EFFECT_NOT_LINEAR, ids[int(k)]))
     for group in find_large_groups(correction):
         moves = np.abs(jacobian @ correction.step.contributions[group])

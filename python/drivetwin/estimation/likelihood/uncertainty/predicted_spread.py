@@ -21,20 +21,30 @@ from drivetwin.estimation.result.spread import PredictedSpread
 
 
 def predict_spread(fit: LikelihoodFit, told: Correction) -> tuple[dict[str, PredictedSpread], ...]:
-    """Predict the standard deviation of simulated less measured signals, for each shift by signal.
+    """Predict the distribution of measured less simulated signals, for each shift by signal.
 
-    A shift whose weighting has no input noise has none.
+    The simulation has the corrected unknowns and none of the effects. A shift that cannot be
+    simulated with them has no prediction.
     """
-    found = []
+    found: list[dict[str, PredictedSpread]] = []
     joint = told.joint_covariance
-    for part, slopes, z in zip(
-        fit.problem.parts, fit.normal.slopes, told.step.columns.matrices, strict=True
+    for part, slopes, z, residual in zip(
+        fit.problem.parts,
+        fit.normal.slopes,
+        told.step.columns.matrices or [np.zeros((p.record.size, 0)) for p in fit.problem.parts],
+        told.residuals,
+        strict=True,
     ):
+        run = part.simulate(told.mean)
+        if run is None:
+            found.append({})
+            continue
+        mean = part.compute_residual(run) - residual
         rows = np.column_stack([slopes, z])
         variance = part.record.sigma**2 + np.einsum("np,pq,nq->n", rows, joint, rows)
         if part.weighting.path is not None:
             variance += _propagate_inputs(part, fit.point, part.weighting.path)
-        found.append(_split(part, np.sqrt(variance)))
+        found.append(_split(part, mean, np.sqrt(variance)))
     return tuple(found)
 
 
@@ -56,12 +66,12 @@ def _propagate_inputs(part: ShiftTerm, point: ParameterVector, path: NoisePath) 
     return np.concatenate(found)
 
 
-def _split(part: ShiftTerm, std: FloatArray) -> dict[str, PredictedSpread]:
-    """Split stacked standard deviations (n,) by signal."""
+def _split(part: ShiftTerm, mean: FloatArray, std: FloatArray) -> dict[str, PredictedSpread]:
+    """Split stacked means and standard deviations (n,) by signal."""
     found, first = {}, 0
     for out in part.record.outputs:
         rows = slice(first, first + out.values.size)
         first = rows.stop
         name = "input_speed" if out.name == "engine_speed" else out.name
-        found[name] = PredictedSpread(part.record.time[out.place], std[rows])
+        found[name] = PredictedSpread(part.record.time[out.place], mean[rows], std[rows])
     return found
