@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.cli.identify_run import run_identification
+from drivetwin.cli.identify_run import Request, run_identification
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import convert_channels, format_card
 from drivetwin.dyno.scenario_file import load_scenario
@@ -28,7 +28,7 @@ def results(folder: Path, method: Method) -> dict[str, Identification]:
     for suffix in ("csv", "mf4", "mat", "parquet"):
         log = folder / f"log.{suffix}"
         write_log(log, convert_channels(bench))
-        found[suffix] = run_identification(log, card, None, method).found
+        found[suffix] = run_identification(log, Request(card, None, method)).found
     return found
 
 

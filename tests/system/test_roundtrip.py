@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.cli.identify_run import run_identification
+from drivetwin.cli.identify_run import Request, run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import format_card
@@ -31,7 +31,7 @@ def _identified(
 ) -> tuple[Identification, Truth]:
     bench = dyno.run(load_scenario(scenario), seed=11, noise=noise)
     log, card, _ = write_run(folder / "run.csv", bench)
-    return run_identification(log, card, None, method).found, bench.truth
+    return run_identification(log, Request(card, None, method)).found, bench.truth
 
 
 def _friction_error(curve: FrictionCurve, law: Stribeck | FrictionTable) -> float:
@@ -133,7 +133,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Identification:
     )
     card = folder / "card.toml"
     card.write_text(format_card(load_scenario(ScenarioName.PAPER)), encoding="utf-8")
-    return run_identification(folder / "log.csv", card, None, Method.INTEGRAL).found
+    return run_identification(folder / "log.csv", Request(card, None, Method.INTEGRAL)).found
 
 
 @pytest.mark.parametrize("parameter", WITHIN_HALF_A_PERCENT)

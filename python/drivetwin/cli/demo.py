@@ -39,14 +39,14 @@ def demo(
 ) -> None:
     """Make a log with the paper's numbers, identify it both ways, compare with the truth."""
     from drivetwin.cli.comparison import compare
-    from drivetwin.cli.identify_run import REPORT, run_identification, write_outcome
+    from drivetwin.cli.identify_run import REPORT, Request, run_identification, write_outcome
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run as run_dyno
     from drivetwin.dyno.scenario_file import load_scenario
 
     bench = run_dyno(load_scenario(scenario), seed, noise=noise)
     log, card, _ = write_run(output / f"{scenario}.csv", bench)
-    outcomes = {method: run_identification(log, card, None, method) for method in _METHODS}
+    outcomes = {method: run_identification(log, Request(card, None, method)) for method in _METHODS}
     for method, outcome in outcomes.items():
         write_outcome(outcome, output / method)
     found = {method: outcome.found for method, outcome in outcomes.items()}

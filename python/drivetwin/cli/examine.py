@@ -73,13 +73,13 @@ def examine(
     profile likelihood, which needs no linearity, parametric bootstrap, friction of free or monotone
     shape (with a twin that has it), and what departs from the friction law.
     """
-    from drivetwin.cli.identify_run import run_identification
+    from drivetwin.cli.identify_run import Request, run_identification
     from drivetwin.estimation.result.method import Method
 
     for name in profile or ():
         get_parameter_spec(name)
     asked = Asked(tuple(profile or ()), bootstrap, seed, friction, departures)
-    outcome = run_identification(log, vehicle, channels, Method.LIKELIHOOD)
+    outcome = run_identification(log, Request(vehicle, channels, Method.LIKELIHOOD))
     answers = list(_iterate_answers(outcome, asked))
     files = () if output is None else _write_outputs(output, answers)
     if as_json:

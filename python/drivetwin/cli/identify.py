@@ -12,6 +12,7 @@ import typer
 
 from drivetwin.cli.arguments import ChannelsFile, VehicleFile
 from drivetwin.cli.atomic_outputs import refuse_same_names
+from drivetwin.cli.identify_run import Request
 from drivetwin.cli.output import (
     JsonFlag,
     print_findings,
@@ -24,10 +25,15 @@ from drivetwin.cli.output import (
 )
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.estimation.result.spread import ModelStatus
 
 if TYPE_CHECKING:
     from drivetwin.estimation.identification import Identification
     from drivetwin.shifts.shift import Shift
+
+
+NOT_VALID = 3
+"""Exit code of a model that is not valid, with --strict."""
 
 
 def identify(
@@ -51,6 +57,17 @@ def identify(
             help="Predict instead of fit: number of a shift, a LOG, or LOG:NUMBER; repeatable.",
         ),
     ] = None,
+    effects: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effect",
+            metavar="NAME=STD",
+            help="Prior of an effect that the model leaves out, as tyre_slip=0.002; 0: none.",
+        ),
+    ] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit with 3 if a model is not valid.")
+    ] = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Identify the driveline behind a shift log.
@@ -63,17 +80,17 @@ def identify(
     of the engine torque are each log's own. What --hold-out names takes no part in the fit; it is
     simulated with what the others tell, and compared. It implies --together.
     """
+    how = Request(vehicle, channels, method, tuple(effects or ()))
     if together or hold_out:
-        _identify_joint(logs, (vehicle, channels, method), hold_out or [], output, as_json)
+        status = _identify_joint(logs, how, hold_out or [], output, as_json)
+        _exit_by_status([status], strict)
         return
     folders = _choose_folders(logs, output)
     results: list[dict[str, Any]] = []
     failed: DrivetwinError | None = None
     for log in logs:
         try:
-            results.append(
-                _identify_log(log, (vehicle, channels, method), folders.get(log), as_json)
-            )
+            results.append(_identify_log(log, how, folders.get(log), as_json))
         except DrivetwinError as error:
             error.where = replace(error.where, file=error.where.file or str(log))
             if len(logs) == 1 or error.where.file in (str(vehicle), str(channels)):
@@ -86,15 +103,20 @@ def identify(
         print_json(results[0] if len(results) == 1 else {"results": results})
     if failed is not None:
         raise typer.Exit(failed.exit_code)
+    _exit_by_status([one.get("status", "") for one in results], strict)
 
 
-def _identify_log(
-    log: Path, how: tuple[Path, Path | None, Method], folder: Path | None, as_json: bool
-) -> dict[str, Any]:
-    """Identify a log, write and print what was found; `how` are card, mapping and method."""
+def _exit_by_status(statuses: Sequence[str], strict: bool) -> None:
+    """Exit with `NOT_VALID` if a model is not valid and `strict` is set."""
+    if strict and ModelStatus.NOT_VALID in statuses:
+        raise typer.Exit(NOT_VALID)
+
+
+def _identify_log(log: Path, how: Request, folder: Path | None, as_json: bool) -> dict[str, Any]:
+    """Identify a log, write and print the result."""
     from drivetwin.cli.identify_run import run_identification, write_outcome
 
-    outcome = run_identification(log, *how)
+    outcome = run_identification(log, how)
     files = () if folder is None else write_outcome(outcome, folder)
     if not as_json:
         _print_result(outcome.found, {log.name: outcome.found.shifts})
@@ -105,23 +127,24 @@ def _identify_log(
 
 def _identify_joint(
     logs: list[Path],
-    how: tuple[Path, Path | None, Method],
+    how: Request,
     hold_out: list[str],
     output: Path | None,
     as_json: bool,
-) -> None:
-    """Fit all logs as one and predict what is held out; `how` are card, mapping and method."""
+) -> ModelStatus:
+    """Fit all logs as one and predict the held-out shifts; return the status of the model."""
     from drivetwin.cli.identify_joint import identify_logs, print_joint, write_joint
 
-    outcome = identify_logs(logs, *how, hold_out)
+    outcome = identify_logs(logs, how, hold_out)
     files = write_joint(outcome, output) if output is not None else ()
     if as_json:
         print_json(_to_document(outcome.found, files))
-        return
+        return outcome.found.status
     _print_result(outcome.found, outcome.shifts)
     print_joint(outcome.found)
     for file in files:
         print_line(f"wrote {file}")
+    return outcome.found.status
 
 
 def _choose_folders(logs: list[Path], output: Path | None) -> dict[Path, Path]:
@@ -168,4 +191,5 @@ def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) 
         print_table(build_suggestion_table(suggestions, found.estimates))
     if found.fit:
         print_table(build_fit_table(found.fit, "Simulation over measurement"))
+    print_line(f"model: {found.status}")
     print_findings(found.findings)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
 from drivetwin.cli.holdout_args import parse_holdouts
-from drivetwin.cli.identify_run import REPORT, RESULT, TWIN
+from drivetwin.cli.identify_run import REPORT, RESULT, TWIN, Request
 from drivetwin.cli.numbers import format_percent, format_quantity
 from drivetwin.cli.output import make_table, print_line, print_paragraph, print_table, show_step
 from drivetwin.report.labels import get_channel_unit
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.estimation.identification import Identification
-    from drivetwin.estimation.result.method import Method
     from drivetwin.estimation.result.multi_log import Several
     from drivetwin.estimation.result.validation import HeldOut
     from drivetwin.shifts.shift import Shift
@@ -50,9 +49,7 @@ class Joined:
 
 def identify_logs(
     logs: Sequence[Path],
-    vehicle: Path,
-    channels: Path | None,
-    method: Method,
+    how: Request,
     wanted: Sequence[str],
 ) -> Joined:
     """Read all logs, fit what is not held out together, predict the rest.
@@ -63,19 +60,18 @@ def identify_logs(
     from drivetwin.logs.read import read_log
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.multi_log import Source, identify_together
-    from drivetwin.vehicle.card import load_card
 
     refuse_same_names(logs, "rename one of them")
-    card = load_card(vehicle)
+    card = how.load_card()
     with show_step(f"reading {len(logs)} logs"):
-        read = tuple(read_log(log, card, channels) for log in logs)
+        read = tuple(read_log(log, card, how.channels) for log in logs)
         shifts = [require_shifts(log, card) for log in read]
     held = parse_holdouts(wanted, logs, shifts)
     sources = [
         Source(log, found, each) for log, found, each in zip(read, shifts, held, strict=True)
     ]
-    with show_step(f"identifying by the {method} method"):
-        made = identify_together(sources, card, method)
+    with show_step(f"identifying by the {how.method} method"):
+        made = identify_together(sources, card, how.method)
     with show_step("comparing experiments"):
         found = rank_experiments(made.found)
     return Joined(read, replace(made, found=found))

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.arguments import load_inputs
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_step
+from drivetwin.vehicle.effects import parse_priors
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
@@ -19,6 +19,30 @@ if TYPE_CHECKING:
     from drivetwin.vehicle.card import VehicleCard
 
 RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
+
+
+@dataclass(frozen=True)
+class Request:
+    """Card, channel mapping and method of an identification, and priors of effects as typed."""
+
+    vehicle: Path
+    channels: Path | None
+    method: Method
+    effects: tuple[str, ...] = ()
+
+    def load(self, log: Path) -> tuple[ShiftLog, VehicleCard]:
+        """Read a log and the card with these priors."""
+        from drivetwin.logs.read import read_log
+
+        card = self.load_card()
+        return read_log(log, card, self.channels), card
+
+    def load_card(self) -> VehicleCard:
+        """Read the card with the priors of effects."""
+        from drivetwin.vehicle.card import load_card
+
+        card = load_card(self.vehicle)
+        return replace(card, effects={**card.effects, **parse_priors(self.effects)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +55,7 @@ class Outcome:
     twin: Twin
 
 
-def run_identification(log: Path, vehicle: Path, channels: Path | None, method: Method) -> Outcome:
+def run_identification(log: Path, how: Request) -> Outcome:
     """Read, find shifts, identify, and validate by simulation.
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
@@ -43,13 +67,14 @@ def run_identification(log: Path, vehicle: Path, channels: Path | None, method: 
     from drivetwin.validation.simulate_log import attach_validation
 
     with show_step(f"reading {log.name}"):
-        recording, card = load_inputs(log, vehicle, channels)
+        recording, card = how.load(log)
         shifts = require_shifts(recording, card)
-    with show_step(f"identifying by the {method} method"):
-        found = identify(recording, card, shifts, method)
+    with show_step(f"identifying by the {how.method} method"):
+        found = identify(recording, card, shifts, how.method)
         twin = build_twin(found, card)
     with show_step("simulating the shifts"):
         found = attach_validation(found, twin, recording)
+        twin = build_twin(found, card)  # with the verdicts of the gate
     with show_step("comparing experiments"):
         found = rank_experiments(found)
     return Outcome(recording, card, found, twin)

@@ -14,6 +14,7 @@ from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.spread import ModelStatus
 from drivetwin.files.multi_log_records import HeldOutRecord, SeveralRecord
 from drivetwin.files.read import read_record
 from drivetwin.files.records import (
@@ -28,9 +29,10 @@ from drivetwin.files.records import (
     SchemaName,
     SuggestionRecord,
 )
+from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.shift_kind import ShiftKind
 
-RESULT_SCHEMA = "drivetwin/result-4"
+RESULT_SCHEMA = "drivetwin/result-5"
 
 
 class ShiftRecord(Record):
@@ -58,6 +60,25 @@ class RejectedRecord(Record):
     reason: str
 
 
+class GroupRecord(Record):
+    """An effect that the model leaves out, and the element, gear or frequency that has it."""
+
+    effect: EffectId
+    subject: str
+
+
+class CauseRecord(Record):
+    """Departure from the model that the log shows; `size` and `std` in the unit of the effect."""
+
+    group: GroupRecord
+    evidence: FiniteFloat
+    size: FiniteFloat
+    std: OptionalFloat
+    equivalent: list[GroupRecord]
+    next_evidence: FiniteFloat
+    is_certain: bool
+
+
 class ResultFile(Record):
     """The whole of `result.json`; all values SI."""
 
@@ -65,6 +86,8 @@ class ResultFile(Record):
     version: str
     method: Method
     loss_law: Literal["paper", "dissipative"]
+    status: ModelStatus
+    cause: CauseRecord | None = None
     parameters: dict[str, ParameterRecord]
     friction: dict[str, FrictionRecord]
     load: LoadRecord | None = None
@@ -90,6 +113,7 @@ class ResultFile(Record):
         return {name: getattr(source, name) for name in _SAME_NAME} | {
             "schema": RESULT_SCHEMA,
             "version": get_program_version(),
+            "cause": evidence.cause,
             "parameters": source.estimates,
             "settings": to_plain_values(source.settings),
             "correlation": _build_correlation(source),
@@ -105,7 +129,18 @@ class ResultFile(Record):
 
 
 _SAME_NAME = (
-    *("method", "loss_law", "friction", "load", "shifts", "rejected", "fit", "validity", "inputs"),
+    *(
+        "method",
+        "loss_law",
+        "status",
+        "friction",
+        "load",
+        "shifts",
+        "rejected",
+        "fit",
+        "validity",
+        "inputs",
+    ),
     *("findings", "assumptions"),
 )
 """Fields that an identification has under the same name."""

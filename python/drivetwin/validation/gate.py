@@ -62,7 +62,10 @@ def assess_model(found: Identification) -> Identification:
 
 
 def _has_limits(found: Identification) -> bool:
-    """Return whether a finding or a verdict restricts the use of the model."""
+    """Return whether an effect that the simulation lacks, a finding or a verdict restricts the
+    use of the model."""
+    if found.evidence.cause is not None:
+        return True
     return any(one.severity is Severity.ERROR for one in found.findings) or any(
         one.verdict in (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE) for one in found.estimates.values()
     )

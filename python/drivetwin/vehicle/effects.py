@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+
+from drivetwin.errors import InputError, Where
 
 
 class EffectId(StrEnum):
@@ -62,3 +66,27 @@ class EffectPrior:
     def is_off(self) -> bool:
         """True if the effect is stated not to exist."""
         return self.std == 0.0 and self.value == 0.0
+
+
+def parse_priors(texts: Iterable[str]) -> dict[EffectId, EffectPrior]:
+    """Parse `NAME=STD`, one for each effect; raises InputError that lists the names."""
+    found: dict[EffectId, EffectPrior] = {}
+    for text in texts:
+        name, _, size = text.partition("=")
+        if name not in list(EffectId):
+            raise InputError(
+                f"no effect {name!r}", f"give any of {', '.join(EffectId)}", Where(key="--effect")
+            )
+        try:
+            std = float(size)
+        except ValueError:
+            std = math.nan
+        if not 0.0 <= std < math.inf:
+            raise InputError(
+                f"{text!r} is no effect with a standard deviation",
+                "give a finite number from 0 on, as tyre_slip=0.002; the effects are "
+                f"{', '.join(EffectId)}",
+                Where(key="--effect"),
+            )
+        found[EffectId(name)] = EffectPrior(std)
+    return found

@@ -18,6 +18,7 @@ from drivetwin._util.display_units import (
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import run_residual_tests
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
+from drivetwin.estimation.result.spread import ModelStatus
 from drivetwin.findings import Finding, render, select_warnings
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.figures.parameters import plot_intervals
@@ -106,6 +107,8 @@ def _write_headline(found: Identification) -> str:
 
 def _write_answer(found: Identification) -> str:
     """Return the one-word answer, with the objections to a plain yes."""
+    if found.status is ModelStatus.NOT_VALID:
+        return "No: the simulation does not match the measurement; no value is identified."
     count, (passed, tests) = _count_verdicts(found), count_consistent_residuals(found)
     against = []
     if not found.fit:
@@ -137,8 +140,16 @@ def _count_verdicts(found: Identification) -> Counter[Verdict]:
     return Counter(estimate.verdict for estimate in found.estimates.values())
 
 
+STATUS_TONES = {
+    ModelStatus.VALID: Tone.GOOD,
+    ModelStatus.LIMITED: Tone.DOUBTFUL,
+    ModelStatus.NOT_VALID: Tone.UNKNOWN,
+    ModelStatus.NOT_VALIDATED: Tone.DOUBTFUL,
+}
+
+
 def _build_tiles(found: Identification) -> list[Tile]:
-    tiles = []
+    tiles = [Tile("model", found.status.value, STATUS_TONES[found.status])]
     for name, (label, display) in SIGNALS.items():
         fits = found.fit.get(name, {})
         if "all" in fits:

@@ -119,6 +119,11 @@ def report_cause(
     )
 
 
+def _capitalise(text: str) -> str:
+    """Write the first letter of a sentence as a capital."""
+    return text[:1].upper() + text[1:]
+
+
 def _format_size(cause: Cause, unit: str) -> str:
     """Format the size of a cause in its unit."""
     if cause.std is None:
