@@ -16,6 +16,7 @@ from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.prepare import build_driveline
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import ALL_BEFORE_LOSS
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import WITH_ETA, build_estimates
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
@@ -282,7 +283,7 @@ def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> N
     known = replace(card, known={"eta": PriorValue(0.9, 0.02)})
     driveline = build_driveline(known, found.shifts[0])
     fit, signals = get_likelihood_fit(found)
-    told = build_estimates(fit, signals, [driveline], {}, {}).estimates
+    told = build_estimates(fit, signals, [driveline], {}, EffectPriors()).estimates
     ratio = found.estimates["J_vehicle_over_eta"]
     assert ratio.value is not None
     assert told["J_vehicle"].value == pytest.approx(0.9 * ratio.value)

@@ -129,19 +129,8 @@ class ResultFile(Record):
 
 
 _SAME_NAME = (
-    *(
-        "method",
-        "loss_law",
-        "status",
-        "friction",
-        "load",
-        "shifts",
-        "rejected",
-        "fit",
-        "validity",
-        "inputs",
-    ),
-    *("findings", "assumptions"),
+    *("method", "loss_law", "status", "friction", "load", "shifts", "rejected", "fit", "validity"),
+    *("inputs", "findings", "assumptions"),
 )
 """Fields that an identification has under the same name."""
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.linear.multi_shift import apply_sensor_error
@@ -29,8 +30,8 @@ def _inertia(offset: float) -> Estimate:
     posed, start = problem(replace(made, signals=signals))
     fit = fit_local(posed, start)
     assert fit is not None
-    tolerances = {"output_torque": SensorTolerance(offset=OFFSET)}
-    return build_estimates(fit, [signals], [made.driveline], {}, tolerances).estimates["J_out"]
+    priors = EffectPriors(sensors={"output_torque": SensorTolerance(offset=OFFSET)})
+    return build_estimates(fit, [signals], [made.driveline], {}, priors).estimates["J_out"]
 
 
 def test_a_design_value_that_the_log_moves_is_as_wrong_as_its_sensors() -> None:
@@ -57,7 +58,7 @@ def test_a_drum_known_better_than_on_the_card_keeps_its_value_however_wide() -> 
     covariance[k, :] *= 0.022 / np.sqrt(fit.covariance[k, k])
     covariance[:, k] *= 0.022 / np.sqrt(fit.covariance[k, k])
     known = replace(fit, mean=fit.point.replace_values(values), covariance=covariance)
-    told = build_estimates(known, [made.signals], [made.driveline], {}, {}).estimates[
+    told = build_estimates(known, [made.signals], [made.driveline], {}, EffectPriors()).estimates[
         f"drum.{name}"
     ]
     assert told.value == pytest.approx(0.007)
@@ -71,7 +72,7 @@ def test_a_design_value_that_the_log_contradicts_is_told_with_what_rests_on_it()
     posed, start = problem(replace(made, driveline=wrong))
     fit = fit_local(posed, start)
     assert fit is not None
-    told = build_estimates(fit, [made.signals], [wrong], {}, {})
+    told = build_estimates(fit, [made.signals], [wrong], {}, EffectPriors())
     (one,) = [each for each in told.findings if each.code is Code.CARD_CONTRADICTED]
     assert one.subject == "J_out"
     assert one.numbers["card"].value == pytest.approx(2.0 * truth)
@@ -79,5 +80,5 @@ def test_a_design_value_that_the_log_contradicts_is_told_with_what_rests_on_it()
     assert "Without the design value of J_out" in told.estimates["k_o"].reason
     assert told.estimates["k_o"].verdict is Verdict.WEAK
     assert told.estimates["Tv_over_if"].verdict is Verdict.IDENTIFIED
-    sound = build_estimates(fitted(), [made.signals], [made.driveline], {}, {})
+    sound = build_estimates(fitted(), [made.signals], [made.driveline], {}, EffectPriors())
     assert Code.CARD_CONTRADICTED not in [one.code for one in sound.findings]

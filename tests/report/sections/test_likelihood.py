@@ -9,6 +9,7 @@ import numpy as np
 
 from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.effects.correction import keep_fit
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
 from drivetwin.report.html import render_report
 from drivetwin.report.sections.blocks import FigureBlock, TableBlock, TilesBlock, Tone
@@ -28,7 +29,7 @@ def found() -> Identification:
     return replace(
         identification(),
         shifts=(signals.shift,),
-        friction=build_friction_curves(fit, {}, np.zeros_like(fit.covariance)),
+        friction=build_friction_curves(fit, {}, keep_fit(fit)),
         evidence=StageResults(likelihood=fit, signals=(signals,)),
     )
 

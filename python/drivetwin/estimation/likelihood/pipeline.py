@@ -116,8 +116,9 @@ def estimate_likelihood(
 def _find_disagreements(told: EstimateSet, linear: EstimateSet) -> list[Finding]:
     """Return a finding for each parameter on which both methods differ by more than their noise.
 
-    Not compared where an effect moves the values of one method. `OF_A_CONSTANT_LOAD` is not compared if only one method has a load that grows with speed: the
-    difference is then expected, and the load is reported elsewhere.
+    Nothing is compared where an effect moves the values of one method. `OF_A_CONSTANT_LOAD` is not
+    compared if only one method has a load that grows with speed: the difference is then expected,
+    and the load is reported elsewhere.
     """
     if told.cause is not None:
         return []

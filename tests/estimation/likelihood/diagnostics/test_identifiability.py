@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.likelihood.diagnostics.identifiability import find_at_bounds
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
@@ -32,7 +33,7 @@ def test_an_age_at_the_limit_of_the_search_is_not_identified(side: float, word: 
     bounds[word][start.names.index("te_delay")] = limit
     fit = fit_local(replace(posed, upper=bounds["larger"], lower=bounds["smaller"]), start)
     assert fit is not None
-    told = build_estimates(fit, [made.signals], [made.driveline], {}, {})
+    told = build_estimates(fit, [made.signals], [made.driveline], {}, EffectPriors())
     age = told.estimates["te_delay"]
     assert age.value == pytest.approx(limit)
     assert age.verdict is Verdict.WEAK

@@ -11,6 +11,7 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     check_residuals,
     check_weighting,
 )
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.noise.residual_covariance import build_sensor_whitener
@@ -60,7 +61,9 @@ def test_a_fit_that_leaves_out_the_noise_of_its_inputs_says_so() -> None:
     bare = replace(
         fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record)),)
     )
-    told = build_estimates(replace(fit, problem=bare), [made.signals], [made.driveline], {}, {})
+    told = build_estimates(
+        replace(fit, problem=bare), [made.signals], [made.driveline], {}, EffectPriors()
+    )
     (one,) = [each for each in told.findings if each.code is Code.INPUT_NOISE_OMITTED]
     assert one.text.startswith("shift 2-3: ")
     assert all(one.verdict is not Verdict.IDENTIFIED for one in told.estimates.values())

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
@@ -40,7 +41,7 @@ def _fit(true: LossLaw, card: LossLaw) -> LikelihoodFit:
 
 
 def _said(made: Bench, fit: LikelihoodFit) -> list[str]:
-    told = build_estimates(fit, [made.signals], [made.driveline], {}, {})
+    told = build_estimates(fit, [made.signals], [made.driveline], {}, EffectPriors())
     return [text for text in render(told.findings) if "loss_law" in text]
 
 

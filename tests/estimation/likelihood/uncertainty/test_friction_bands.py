@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
+from drivetwin.estimation.likelihood.effects.correction import keep_fit
 from drivetwin.estimation.likelihood.objective import ShiftTerm
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
 from tests.estimation.likelihood.fixtures import fitted
@@ -22,10 +22,10 @@ def test_a_curve_goes_over_the_slips_of_all_shifts_and_not_of_the_first_alone() 
     assert run is not None
     lock = next(one.time for one in run.events if (one.kind, one.element) == ("lock", oncoming))
     brief = ShiftTerm.from_sensor_noise(whole.structure, whole.record.cut(lock - 0.15))
-    nothing = np.zeros_like(fit.covariance)
-    alone = build_friction_curves(fit, {}, nothing)[oncoming]
+    alone = build_friction_curves(fit, {}, keep_fit(fit))[oncoming]
     both = replace(fit, problem=replace(fit.problem, parts=(brief, whole)))
-    joined = build_friction_curves(both, {}, nothing)[oncoming]
+    joined = build_friction_curves(both, {}, keep_fit(fit))[oncoming]
     assert joined.slip[[0, -1]] == pytest.approx(alone.slip[[0, -1]])
     short = replace(fit, problem=replace(fit.problem, parts=(brief,)))
-    assert build_friction_curves(short, {}, nothing)[oncoming].slip[0] > 10.0 * alone.slip[0]
+    cut = build_friction_curves(short, {}, keep_fit(fit))[oncoming]
+    assert cut.slip[0] > 10.0 * alone.slip[0]

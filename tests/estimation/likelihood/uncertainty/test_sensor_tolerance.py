@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.effects.correction import keep_fit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
@@ -77,7 +78,7 @@ def test_the_shift_is_that_of_a_fit_of_older_values() -> None:
 @shared
 def found() -> Sensitivity:
     fit = fitted()
-    friction = build_friction_curves(fit, {}, np.zeros_like(fit.covariance))
+    friction = build_friction_curves(fit, {}, keep_fit(fit))
     return compute_sensitivity(fit, [bench().signals], friction)
 
 

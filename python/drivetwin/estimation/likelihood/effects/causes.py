@@ -103,7 +103,7 @@ def report_cause(
     """
     effect = cause.group.effect
     assert effect is not None, "tolerances of sensors are no candidates"
-    moves = jacobian @ correction.evidence[cause.group].moves
+    moves = jacobian @ correction.evidence[cause.group].moves[: jacobian.shape[1]]
     changes = [
         f"{name} by {format_with_unit(float(move), get_parameter_spec(name).unit, digits=2)}"
         for name, move, one in zip(values, moves, std, strict=True)
@@ -115,7 +115,7 @@ def report_cause(
         size=_format_size(cause, EFFECTS[effect].unit),
         evidence=cause.evidence,
         changes=", ".join(changes) or "no value by more than its interval",
-        advice=EFFECTS[effect].remedy,
+        advice=_capitalise(EFFECTS[effect].remedy),
     )
 
 

@@ -15,7 +15,7 @@ remains of it at the end of a search would look like an effect.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,7 +94,7 @@ class GroupEvidence:
     without it, `amounts` (k,) its posterior mean in prior standard deviations, `answer` (q,) the
     weighted scalar products of its fitted effect with all columns, the unknowns adjusted.
     `columns` (k,) are its numbers, `std` (k,) the standard deviations of the amounts, `moves` (p,)
-    what the unknowns move by them."""
+    what the unknowns move by them, those of the fit first."""
 
     nats: float
     amounts: FloatArray
@@ -199,16 +199,27 @@ def compute_evidence(
 ) -> dict[Group, GroupEvidence]:
     """Compute the evidence of each group alone, with residual power `chi2` per sample.
 
-    Stated tolerances of sensors act in any case: they are unknowns beside those of the fit.
+    Stated tolerances of sensors act in any case: beside an effect they are unknowns as those of
+    the fit. The evidence of a tolerance itself is that of the error against its absence.
     """
-    size = sums.gradient.size
-    sums, information = _join_tolerances(sums, information)
+    groups = dict.fromkeys(sums.columns.groups)
+    sensors = [one for one in groups if one.effect is None]
+    found = _evaluate_groups(sums, information, chi2, sensors)
+    effects = [one for one in groups if one.effect is not None]
+    beside = _evaluate_groups(*_join_tolerances(sums, information), chi2, effects)
+    return {one: (found | beside)[one] for one in groups}
+
+
+def _evaluate_groups(
+    sums: WeightedColumns, information: FloatArray, chi2: float, groups: Sequence[Group]
+) -> dict[Group, GroupEvidence]:
+    """Compute the evidence of some groups beside unknowns of this `information`."""
     follows = invert_information(information) @ sums.cross
     power = max(chi2, 1.0)
     own = (sums.own - sums.cross.T @ follows) / power
     pull = (sums.pull + follows.T @ sums.gradient) / power
     found = {}
-    for group in dict.fromkeys(sums.columns.groups):
+    for group in groups:
         k = sums.columns.find_columns(group)
         matrix = own[np.ix_(k, k)] + np.eye(len(k))
         spread = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
@@ -220,7 +231,7 @@ def compute_evidence(
             np.sqrt(np.diag(spread)),
             tuple(k),
             own[:, k] @ amounts,
-            -follows[:size, k] @ amounts,
+            -follows[:, k] @ amounts,
         )
     return found
 
@@ -230,7 +241,7 @@ def _join_tolerances(
 ) -> tuple[WeightedColumns, FloatArray]:
     """Return the sums and the information with the tolerances of sensors among the unknowns.
 
-    The columns themselves stay; a tolerance has no evidence beside itself.
+    The columns themselves stay.
     """
     sensors = [k for k, one in enumerate(sums.columns.groups) if one.effect is None]
     own = sums.own[np.ix_(sensors, sensors)] + np.eye(len(sensors))

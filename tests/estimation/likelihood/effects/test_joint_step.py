@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""Joint step and evidence against a dense linear Gaussian model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.effects.columns import EffectColumns
+from drivetwin.estimation.likelihood.effects.joint_step import (
+    WeightedColumns,
+    compute_evidence,
+    scale_by_evidence,
+)
+from drivetwin.estimation.result.cause import Group
+from drivetwin.vehicle.effects import EffectId
+
+DRAG, DRIFT = Group(EffectId.INPUT_DRAG), Group(EffectId.OUTPUT_TORQUE_DRIFT)
+SENSOR = Group(None, "output_torque offset")
+
+
+class Dense:
+    """n samples of unit variance with slopes J (n, p) and columns Z (n, q) of three groups."""
+
+    def __init__(self, seed: int, amounts: FloatArray | None = None) -> None:
+        rng = np.random.default_rng(seed)
+        self.J, self.Z = rng.standard_normal((60, 3)), 0.3 * rng.standard_normal((60, 5))
+        self.prior = np.diag([4.0, 1.0, 0.5])
+        acting = np.zeros(5) if amounts is None else amounts
+        self.y = self.J @ rng.standard_normal(3) * 0.3 + self.Z @ acting + rng.standard_normal(60)
+        self.groups = (DRAG, DRAG, DRIFT, DRIFT, SENSOR)
+
+    @property
+    def sums(self) -> WeightedColumns:
+        none = EffectColumns(self.groups, (self.Z,), (np.zeros(60),), np.ones(5), ({},))
+        return WeightedColumns(
+            none, self.Z.T @ self.Z, self.J.T @ self.Z, self.Z.T @ self.y, -self.J.T @ self.y, ()
+        )
+
+    @property
+    def information(self) -> FloatArray:
+        return np.asarray(self.J.T @ self.J + self.prior)
+
+    def log_likelihood(self, columns: list[int]) -> float:
+        """Marginal likelihood of the samples with some columns acting."""
+        Z = self.Z[:, columns]
+        covariance = np.eye(60) + self.J @ np.linalg.inv(self.prior) @ self.J.T + Z @ Z.T
+        return float(multivariate_normal(np.zeros(60), covariance).logpdf(self.y))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_evidence_is_the_ratio_of_marginal_likelihoods(seed: int) -> None:
+    """Stated tolerances of sensors act in both models."""
+    made = Dense(seed)
+    found = compute_evidence(made.sums, made.information, 1.0)
+    for group, columns in ((DRAG, [0, 1]), (DRIFT, [2, 3])):
+        expected = made.log_likelihood([*columns, 4]) - made.log_likelihood([4])
+        assert found[group].nats == pytest.approx(expected, abs=1e-9)
+
+
+def test_an_error_of_a_sensor_within_its_tolerance_is_no_evidence_for_an_effect() -> None:
+    made = Dense(0, np.array([0.0, 0.0, 0.0, 0.0, 4.0]))
+    found = compute_evidence(made.sums, made.information, 1.0)
+    expected = made.log_likelihood([4]) - made.log_likelihood([])
+    assert found[SENSOR].nats == pytest.approx(expected, abs=1e-9)
+    assert found[DRAG].nats < 3.0
+
+
+def test_an_effect_that_acts_has_most_evidence() -> None:
+    made = Dense(1, np.array([3.0, -3.0, 0.0, 0.0, 0.0]))
+    found = compute_evidence(made.sums, made.information, 1.0)
+    assert found[DRAG].nats > 5.0
+    assert found[DRAG].nats > found[DRIFT].nats + 3.0
+
+
+def test_only_an_effect_with_evidence_becomes_larger_than_stated() -> None:
+    made = Dense(1, np.array([9.0, -9.0, 0.0, 0.0, 0.0]))
+    sums = replace(made.sums, weighted=(made.Z,))
+    evidence = compute_evidence(sums, made.information, 1.0)
+    scale = scale_by_evidence(sums, made.information, 1.0, evidence).columns.scale
+    assert scale[0] == scale[1] > 1.5
+    assert scale[2] == scale[3] <= 1.0
+    assert scale[4] == 1.0
