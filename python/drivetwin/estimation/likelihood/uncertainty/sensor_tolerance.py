@@ -8,20 +8,20 @@ input acts through the linear response of the run to it, with the opposite sign.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Output, get_columns
+from drivetwin.estimation.likelihood.effects.columns import observe
+from drivetwin.estimation.likelihood.effects.operating_point import evaluate_operating_point
+from drivetwin.estimation.likelihood.effects.sensor_tolerance import build_sensor_columns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
-from drivetwin.estimation.likelihood.objective import ShiftTerm
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import FrictionCurve
-from drivetwin.simulation.dual_clutch import Trajectory
 from drivetwin.vehicle.spec import SensorTolerance
 
 SIZE = 0.01
@@ -40,69 +40,17 @@ def compute_sensor_shifts(
     Keys are `<role> gain`, `<role> offset` and `<role> age`; a sensor that the fit does not use has
     none.
     """
-    found = {}
+    pulls: dict[str, FloatArray] = {}
+    for part, regressors in zip(fit.problem.parts, fit.normal.regressors, strict=True):
+        at = evaluate_operating_point(part, fit.point)
+        errors = [] if at is None else list(build_sensor_columns(at, tolerances))
+        if at is None or not errors:
+            continue
+        columns = regressors.T @ observe(at, errors)
+        for one, pull in zip(errors, columns.T, strict=True):
+            pulls[one.subject] = pulls.get(one.subject, 0.0) + pull
     follows = invert_information(fit.normal.information)
-    for role, tolerance in tolerances.items():
-        for kind, size in asdict(tolerance).items():
-            if size == 0.0:
-                continue
-            pull = np.zeros(len(fit.point.names))
-            for part, regressors in zip(fit.problem.parts, fit.normal.regressors, strict=True):
-                error = _error(part, fit, role, kind)
-                if error is not None:
-                    pull += regressors.T @ error
-            if np.any(pull):
-                found[f"{role} {kind}"] = size * (follows @ pull)
-    return found
-
-
-def _error(part: ShiftTerm, fit: LikelihoodFit, role: str, kind: str) -> FloatArray | None:
-    """Change (n,) of the residuals for an error of size one of a `kind`; None for other roles.
-
-    Values that are older than their stamps lag by their rate: of an output that of the run, for
-    measured ones jitter.
-    """
-    name = "engine_speed" if role == "input_speed" else role
-    source = TORQUE if role == "engine_torque" else get_pressure_element(role)
-    run = part.simulate(fit.point)
-    if run is None:
-        return None
-    if name in [out.name for out in part.record.outputs]:
-        chosen = [
-            np.zeros_like(out.values) if out.name != name else _output_error(out, run, kind)
-            for out in part.record.outputs
-        ]
-        return np.concatenate(chosen)
-    if source is None or source not in (TORQUE, *part.record.pressures):
-        return None
-    error = _input_error(part, fit.point, source, kind)
-    return -part.respond_to_inputs(fit.point, run, {source: error})
-
-
-def _output_error(out: Output, run: Trajectory, kind: str) -> FloatArray:
-    """Compute the change of output samples (n,) by an error of size one."""
-    match kind:
-        case "gain":
-            return out.values
-        case "offset":
-            return np.ones_like(out.values)
-        case _:
-            return -out.sample(run.time, np.gradient(get_columns(run)[out.name], run.time))
-
-
-def _input_error(part: ShiftTerm, point: ParameterVector, source: str, kind: str) -> FloatArray:
-    """Compute the change of an input (N-1,) over each step of the grid by an error of size one."""
-    record, time = part.record, part.record.time
-    one = record.engine_torque if source == TORQUE else record.pressures[source]
-    match kind:
-        case "gain":
-            return np.interp(0.5 * (time[1:] + time[:-1]), one.time, one.values)
-        case "offset":
-            return np.ones(time.size - 1)
-        case _ if source == TORQUE:
-            return -record.compute_torque_rate(part.structure.get_value(point, "te_delay"))
-        case _:
-            return -np.diff(np.interp(time, one.time, one.values)) / np.diff(time)
+    return {error: follows @ pull for error, pull in pulls.items() if np.any(pull)}
 
 
 @dataclass(frozen=True, eq=False)
