@@ -27,8 +27,8 @@ EFFECT = Effect(
     "a load that grows with the square of the speed",
     "of the load",
     0.1,
-    "share of air drag in the road load of a truck below 40 km/h (Mitschke and Wallentowitz, "
-    "Dynamik der Kraftfahrzeuge)",
+    "typical share of air drag in the road load of a truck below 40 km/h, about a tenth; see "
+    "Mitschke and Wallentowitz, Dynamik der Kraftfahrzeuge, on driving resistances",
     "record a longer stretch in gear, or a coast-down from a higher speed",
     build,
 )

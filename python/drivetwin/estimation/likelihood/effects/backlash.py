@@ -34,8 +34,8 @@ EFFECT = Effect(
     "backlash in the driveline",
     "half gap times stiffness, of the largest shaft torque",
     0.03,
-    "1 to 3 degrees of backlash at the wheel, less what the preload takes (Lagerberg and Egardt, "
-    "IEEE Trans. CST 15, 2007)",
+    "typical range of 1 to 3 degrees at the wheel, less what the preload takes; see Lagerberg and "
+    "Egardt, IEEE Trans. CST 15, 2007, on backlash of powertrains",
     "use shifts in which the shaft torque keeps its sign",
     build,
 )

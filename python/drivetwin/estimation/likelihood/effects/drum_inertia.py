@@ -31,7 +31,8 @@ EFFECT = Effect(
     "a drum inertia that the card does not state",
     "kg m² per 1500 N m of engine torque",
     0.03,
-    "drums of heavy-duty boxes of 1500 N m weigh 5 to 10 kg at a radius of 0.08 m",
+    "engineering estimate for heavy-duty boxes of 1500 N m: drums of 5 to 10 kg at a radius of "
+    "0.08 m",
     "state drum_inertia_kgm2 of the element on the card",
     build,
 )

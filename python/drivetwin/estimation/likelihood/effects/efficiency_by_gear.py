@@ -26,7 +26,8 @@ EFFECT = Effect(
     "an efficiency that differs between the gears",
     "1",
     0.01,
-    "one more gear mesh in the power flow costs 0.5 to 1.5 % (Niemann, Maschinenelemente II)",
+    "typical loss of one more gear mesh in the power flow, 0.5 to 1.5 %; see Niemann and Winter, "
+    "Maschinenelemente II, on losses of gears",
     "state eta for one gear on the card, or identify each gear from pedal steps in it",
     build,
 )

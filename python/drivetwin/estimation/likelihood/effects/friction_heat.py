@@ -33,8 +33,8 @@ EFFECT = Effect(
     "friction that falls with the friction work",
     "of μ over the work of the shift",
     0.03,
-    "μ of paper linings falls by 3 to 10 % per 100 K, and a shift heats the surface by 30 to 60 K "
-    "(Maki, Wet Clutch Tribology, 2005)",
+    "typical range of paper linings: μ falls by 3 to 10 % per 100 K, a shift heats the surface by "
+    "30 to 60 K; see Mäki, Wet Clutch Tribology, 2005, on friction over temperature",
     "record shifts that differ in friction work",
     build,
 )

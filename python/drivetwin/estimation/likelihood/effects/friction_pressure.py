@@ -33,7 +33,8 @@ EFFECT = Effect(
     "friction that depends on pressure",
     "of μ over the range of pressure",
     0.03,
-    "μ of paper linings falls by 2 to 5 % per MPa (Maki, Wet Clutch Tribology, 2005)",
+    "typical range of paper linings: μ falls by 2 to 5 % per MPa; see Mäki, Wet Clutch Tribology, "
+    "2005, on friction over pressure",
     "record shifts at two pressure levels",
     build,
 )

@@ -82,7 +82,8 @@ EFFECT = Effect(
     "friction that departs from a Stribeck law over slip",
     "change of μ per shape",
     0.002,
-    "scatter of SAE No. 2 friction curves about a Stribeck law, 1 to 2 % of μ",
+    "engineering estimate: friction curves of paper linings scatter about a Stribeck law by 1 to "
+    "2 % of μ",
     "compare with friction of free shape (examine --friction free)",
     build,
     random=True,

@@ -25,8 +25,8 @@ EFFECT = Effect(
     "drag at the gearbox input, or an offset of the engine torque",
     "of the largest engine torque",
     0.005,
-    "open wet clutches and pump take 0.3 to 1 % of the rated torque (Kitabayashi et al., SAE "
-    "2003-01-1973)",
+    "typical range of open wet clutches and pump, 0.3 to 1 % of the rated torque; see Kitabayashi "
+    "et al., SAE 2003-01-1973, on drag of wet clutches",
     "calibrate the engine torque at zero load, or state the drag under [effects]",
     build,
 )

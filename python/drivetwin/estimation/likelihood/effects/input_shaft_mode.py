@@ -67,7 +67,7 @@ EFFECT = Effect(
     "a second torsional mode at the gearbox input",
     "of a mode with half of the engine's inertia in front of it",
     0.7,
-    "torsional dampers and input shafts of trucks and cars have modes at 30 to 100 Hz",
+    "typical range of torsional dampers and input shafts of trucks and cars, modes at 30 to 100 Hz",
     "the mode moves k_o, c_o and J′: state the input shaft, or record without its excitation",
     build,
 )

@@ -22,7 +22,7 @@ EFFECT = Effect(
     "a delay of the output torque against the speeds",
     "s",
     0.003,
-    "anti-aliasing filters and telemetry of torque sensors delay by 1 to 5 ms",
+    "typical range of anti-aliasing filters and telemetry of torque sensors, 1 to 5 ms",
     "set channels.output_torque.time_shift_s in the channel mapping and compare",
     build,
 )

@@ -30,7 +30,8 @@ EFFECT = Effect(
     "a drift of the output torque",
     "of the largest shaft torque over 5 s",
     0.003,
-    "warm-up and bending crosstalk of strain gauges on a shaft, 0.1 to 0.5 % of full scale",
+    "typical range of strain gauges on a shaft by warm-up and bending crosstalk, 0.1 to 0.5 % of "
+    "full scale",
     "let the torque sensor warm up and compare its zero before and after the recording",
     build,
     random=True,

@@ -22,7 +22,7 @@ EFFECT = Effect(
     "an offset of the output torque",
     "of the largest shaft torque",
     0.001,
-    "zero error of torque flanges and telemetry, 0.1 to 0.3 % of full scale by data sheet",
+    "typical range of the zero error of torque flanges and telemetry, 0.1 to 0.3 % of full scale",
     "zero the output torque sensor with the driveline unloaded",
     build,
 )

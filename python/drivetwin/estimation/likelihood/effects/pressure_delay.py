@@ -28,7 +28,8 @@ EFFECT = Effect(
     "a delay of the measured pressure",
     "s",
     0.003,
-    "lines between sensor port and piston, and filters of pressure sensors, delay by 1 to 5 ms",
+    "typical range of lines between sensor port and piston and of filters of pressure sensors, 1 "
+    "to 5 ms",
     "set time_shift_s of the pressure in the channel mapping and compare",
     build,
 )

@@ -21,8 +21,8 @@ EFFECT = Effect(
     "a shaft that stiffens with its twist",
     "of the stiffness at the largest shaft torque",
     0.015,
-    "joints, splines and tyres in series with a steel shaft make a characteristic progressive by "
-    "1 to 3 %",
+    "engineering estimate: joints, splines and tyres in series with a steel shaft make a "
+    "characteristic progressive by 1 to 3 %",
     "compare shifts at two torque levels",
     build,
 )

@@ -27,8 +27,8 @@ EFFECT = Effect(
     "a load that changes slowly, as by grade or wind",
     "of the load per square root of a second",
     0.004,
-    "grade of level test tracks changes by 0.01 to 0.05 % over 100 m, a hundredth of the rolling "
-    "resistance",
+    "engineering estimate for level roads: the grade changes by 0.01 to 0.05 % over 100 m, of the "
+    "order of a hundredth of the load",
     "record on a level track or a dynamometer, and several shifts in both directions",
     build,
     random=True,

@@ -6,6 +6,7 @@ from __future__ import annotations
 from drivetwin.estimation.likelihood.effects import (
     aero_load,
     backlash,
+    brake_drag,
     drum_inertia,
     efficiency_by_gear,
     friction_heat,
@@ -36,6 +37,7 @@ EFFECTS: dict[EffectId, Effect] = {
         output_torque_delay.EFFECT,
         slow_load.EFFECT,
         aero_load.EFFECT,
+        brake_drag.EFFECT,
         drum_inertia.EFFECT,
         pressure_delay.EFFECT,
         torque_lag.EFFECT,

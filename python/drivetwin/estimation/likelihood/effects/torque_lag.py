@@ -49,7 +49,7 @@ EFFECT = Effect(
     "a lag of the engine torque beside its delay",
     "s",
     0.02,
-    "engine controllers filter the torque that they send with 10 to 30 ms",
+    "typical range of filters by which engine controllers send their torque, 10 to 30 ms",
     "record the engine torque unfiltered, or at a faster rate",
     build,
     power=2.0,

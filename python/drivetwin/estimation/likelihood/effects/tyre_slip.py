@@ -52,8 +52,8 @@ EFFECT = Effect(
     "slip of the driven tyres",
     "slip at the largest shaft torque",
     0.001,
-    "longitudinal stiffness of truck tyres, 0.2 to 1 % slip at a third of the grip (Pacejka, Tire "
-    "and Vehicle Dynamics)",
+    "lower end of a typical range at the traction of a shift, 0.1 to 0.5 %; see Pacejka, Tire and "
+    "Vehicle Dynamics, on longitudinal stiffness",
     "measure a wheel speed and the vehicle speed, or use a chassis dynamometer with known slip",
     build,
     curved=True,
