@@ -12,9 +12,10 @@ import pytest
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.cli.synth import ScenarioOption
 from drivetwin.dyno.names import ScenarioName
+from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.parameters import SPECS, ParameterSpec
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 
 ROOT = Path(__file__).resolve().parents[2]
 REFERENCE = ROOT / "docs" / "reference"
@@ -35,6 +36,9 @@ def test_the_documented_vehicle_card_loads(tmp_path: Path) -> None:
     assert card.elements["B2"].P0.std == pytest.approx(5e3)
     assert card.elements["B3"].gain == pytest.approx(0.027)
     assert card.sensors["output_torque"].offset == pytest.approx(30.0)
+    assert card.effects[EffectId.TYRE_SLIP] == EffectPrior(std=0.002)
+    assert card.effects[EffectId.BACKLASH].is_off
+    assert card.effects[EffectId.INPUT_DRAG] == EffectPrior(std=0.0005, value=0.003)
 
 
 def test_the_documented_channel_mapping_loads(tmp_path: Path) -> None:
@@ -89,3 +93,19 @@ def test_every_scenario_and_effect_is_described() -> None:
     rows = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
     assert rows[: len(ScenarioName)] == list(ScenarioName)
     assert set(rows[len(ScenarioName) :]) == set(EffectId)
+
+
+def test_every_effect_of_the_likelihood_is_documented_as_declared() -> None:
+    page = (ROOT / "docs" / "explanation" / "departures.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if re.match(r"\| `\w+` \|.*\|.*\|.*\|.*\|", line)]
+    assert rows == [
+        f"| `{one.id}` | {one.meaning} | {one.unit} | {one.std:g} | {one.source} |"
+        for one in EFFECTS.values()
+    ]
+
+
+def test_effects_without_a_value_of_their_own_are_named() -> None:
+    page = (REFERENCE / "vehicle-card.md").read_text(encoding="utf-8")
+    (sentence,) = re.findall(r"State no `value` for ([^:]*):", page)
+    named = set(re.findall(r"`(\w+)`", sentence))
+    assert named == {one.id for one in EFFECTS.values() if one.random}

@@ -3,9 +3,9 @@
 
 A part of the model that is wrongly left out biases everything (a load that grows with speed moves
 J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
-kept where it is significant and allowed for where it is not (aero_load.py). Each
-shift has its own load unless one common load is consistent (per_shift_load.py). Outputs are samples
-or means, whichever gives the smaller residual (sampling_mode.py).
+kept where it is significant (aero_load.py); where it is not, the effect of that name widens the
+intervals. Each shift has its own load unless one common load is consistent (per_shift_load.py).
+Outputs are samples or means, whichever gives the smaller residual (sampling_mode.py).
 """
 
 from __future__ import annotations
