@@ -37,9 +37,9 @@ class Estimate:
     """One parameter's value and uncertainty, SI.
 
     `std_noise` comes from the sensors' noise; `std_systematic` from the card's tolerances of gain,
-    offset and delay, from delayed values in the log, and from effects that the model leaves out. `value` is None exactly when the verdict
-    is `not identifiable`. `reason` contains the cause of a verdict other than `identified`, and
-    the recording that would help.
+    offset and delay, from delayed values in the log, and from effects that the model leaves out.
+    `value` is None exactly when the verdict is `not identifiable`. `reason` contains the cause of
+    a verdict other than `identified`, and the recording that would help.
     """
 
     id: str
