@@ -20,6 +20,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.result.method import Method
 from drivetwin.pipeline import identify
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.shared_results import shared
 
@@ -29,7 +30,11 @@ RATE = 400.0
 
 
 def record_log(scenario: str, P0_std: float = 0.0) -> tuple[ShiftLog, VehicleCard]:
-    """Record a scenario and read its log; the card leaves P0 a spread of `P0_std` [Pa]."""
+    """Record a scenario and read its log.
+
+    The card leaves P0 a spread of `P0_std` [Pa] and states that the model leaves no effect out, as
+    is true of the dynamometer: intervals are those of noise.
+    """
     base = load_scenario(scenario)
     sensors = tuple(replace(s, rate=min(s.rate, RATE)) for s in base.sensors)
     made = run(replace(base, duration=DURATION, sensors=sensors), seed=3)
@@ -40,7 +45,8 @@ def record_log(scenario: str, P0_std: float = 0.0) -> tuple[ShiftLog, VehicleCar
             name: replace(one, P0=replace(one.P0, std=P0_std))
             for name, one in card.elements.items()
         }
-        card = replace(card, elements=elements)
+        none = {effect: EffectPrior(0.0) for effect in EffectId}
+        card = replace(card, elements=elements, effects=none)
         mapping = Path(folder) / "rows.toml"
         mapping.write_text("[time]\nsimultaneous = true\n", encoding="utf-8")
         return drivetwin.read_log(log_file, card, mapping), card

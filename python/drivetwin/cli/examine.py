@@ -160,13 +160,14 @@ def _identify_friction(outcome: Outcome, shape: FrictionShape) -> Answer:
     from drivetwin.cli.tables import build_friction_table
     from drivetwin.estimation.analysis.friction_shape import fit_friction_shape
     from drivetwin.estimation.data.prepare import collect_tolerances
+    from drivetwin.estimation.likelihood.effects.columns import EffectPriors
     from drivetwin.files.analysis_files import format_friction
     from drivetwin.twin.build import build_twin
 
     found = outcome.found
     with show_step(f"fitting {shape} friction"):
         tolerances = collect_tolerances(outcome.log, outcome.card, found.shifts[0])
-        one = fit_friction_shape(found, shape, tolerances)
+        one = fit_friction_shape(found, shape, EffectPriors(outcome.card.effects, tolerances))
     shaped = replace(found, friction={**found.friction, **one.curves})
     twin = build_twin(shaped, outcome.card)
     return Answer(FRICTION, format_friction(one), build_friction_table(one.curves), twin)

@@ -143,7 +143,7 @@ def test_what_sensors_decide_no_experiment_narrows() -> None:
     told = compute_rankings(replace(found, estimates={**found.estimates, "c_o": wide}))
     (one,) = (s for s in told if s.parameter == "c_o")
     assert not one.prospects
-    assert "calibrate" in one.text
+    assert "Calibrate the sensors" in one.text
 
 
 def test_other_methods_have_no_information_to_compare() -> None:

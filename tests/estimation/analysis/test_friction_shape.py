@@ -14,13 +14,17 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.analysis.friction_shape import BENDS, fit_friction_shape, project_shape
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.asked import by_the_paper, stepped
+
+NO_EFFECT = EffectPriors({effect: EffectPrior(0.0) for effect in EffectId})
 
 
 def test_free_shape_holds_the_truth() -> None:
     found = stepped()
-    one = fit_friction_shape(found, FrictionShape.FREE, {})
+    one = fit_friction_shape(found, FrictionShape.FREE, NO_EFFECT)
     curve = one.curves["B3"]
     truth = load_scenario("paper").model.elements[1].friction.evaluate(curve.slip)
     inside = (truth >= curve.mu_lo) & (truth <= curve.mu_hi)
@@ -34,27 +38,28 @@ def test_free_shape_holds_the_truth() -> None:
     assert one.bend in BENDS
 
 
-def test_falling_shape_falls_and_sensors_widen_its_band() -> None:
+def test_falling_shape_falls_and_sensors_and_effects_widen_its_band() -> None:
     tolerance = {"output_torque": SensorTolerance(gain=0.01)}
-    narrow, wide = (
+    narrow, by_sensors, by_effects = (
         fit_friction_shape(stepped(), FrictionShape.FALLING, given).curves["B3"]
-        for given in ({}, tolerance)
+        for given in (NO_EFFECT, replace(NO_EFFECT, sensors=tolerance), EffectPriors())
     )
     assert np.diff(narrow.mu).max() <= 1e-9
-    assert np.mean(wide.mu_hi - wide.mu_lo) > 1.5 * np.mean(narrow.mu_hi - narrow.mu_lo)
+    for wide in (by_sensors, by_effects):
+        assert np.mean(wide.mu_hi - wide.mu_lo) > 1.5 * np.mean(narrow.mu_hi - narrow.mu_lo)
 
 
 def test_without_a_torque_scale_a_shape_is_over_eta_as_its_law_was() -> None:
     found = stepped()
     ratio = replace(found, friction={"B3": replace(found.friction["B3"], over_eta=True)})
-    curve = fit_friction_shape(ratio, FrictionShape.FREE, {}).curves["B3"]
+    curve = fit_friction_shape(ratio, FrictionShape.FREE, NO_EFFECT).curves["B3"]
     assert curve.over_eta
     assert curve.method_text == "likelihood, free shape, μ over η"
 
 
 def test_other_methods_are_refused() -> None:
     with pytest.raises(IdentificationError, match="paper method"):
-        fit_friction_shape(by_the_paper(), FrictionShape.FREE, {})
+        fit_friction_shape(by_the_paper(), FrictionShape.FREE, NO_EFFECT)
 
 
 @settings(max_examples=40)

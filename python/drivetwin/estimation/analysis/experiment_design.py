@@ -7,7 +7,7 @@ An experiment adds its own information to that of the log:
 
 J are the core's derivatives along the simulated experiment, Σ the covariance of its residuals
 with the input noise of the log's sensors (residual_covariance.py). No experiment reduces the
-uncertainty from the sensors' gains and offsets.
+uncertainty from the sensors' gains and offsets, or from effects that the model leaves out.
 """
 
 from __future__ import annotations

@@ -21,19 +21,19 @@ from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import ShiftElementKinematics, ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord, build_record
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.parametrization import LAW, ShiftModel
 from drivetwin.estimation.likelihood.priors import split_spans
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
-from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensor_shifts
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import FrictionTable, ShiftElement, Stribeck
-from drivetwin.vehicle.spec import SensorTolerance
 
 KNOTS = 12
 BENDS = (3e-4, 1e-3, 3e-3, 1e-2)
@@ -80,7 +80,7 @@ class TableShiftModel(ShiftModel):
 
 @dataclass(frozen=True, eq=False)
 class ShapedFriction:
-    """Curves of friction by element with 95 % bands, sensors included.
+    """Curves of friction by element with 95 % bands, sensors and effects included.
 
     `gain` is by how much Q of the free shape falls below that of the Stribeck law, `bend` the
     smoothness that the log chose, `fit` what stands behind: the free shape, which a monotone one
@@ -95,37 +95,35 @@ class ShapedFriction:
 
 
 def fit_friction_shape(
-    found: Identification, shape: FrictionShape, tolerances: Mapping[str, SensorTolerance]
+    found: Identification, shape: FrictionShape, priors: EffectPriors
 ) -> ShapedFriction:
     """Fit μ over slip as a curve of `shape` for every element that has a friction curve.
 
+    `priors` are the card's statements on effects and sensors.
     Raises IdentificationError where the identification is by another method or no fit converges.
     """
     base, signals = get_likelihood_fit(found)
     tables = {name: KnotTable(_place_knots(curve)) for name, curve in found.friction.items()}
     problem, start = _build_problem(base, signals, tables)
     normal = problem.update_weighting(start).normal(start)
-    priors = {bend: _build_prior(problem.prior, start, tables, bend) for bend in BENDS}
+    smooth = {bend: _build_prior(problem.prior, start, tables, bend) for bend in BENDS}
     best: LikelihoodFit | None = None
     if normal is not None:
         bend = min(
-            BENDS, key=lambda one: _compute_evidence(normal, problem.prior, priors[one], start)
+            BENDS, key=lambda one: _compute_evidence(normal, problem.prior, smooth[one], start)
         )
-        best = fit_local(replace(problem, prior=priors[bend]), start)
+        best = fit_local(replace(problem, prior=smooth[bend]), start)
     if best is None:
         raise IdentificationError(
             "the fit with friction of free shape does not converge",
             "use the Stribeck law, which the identification has",
         )
-    systematic = sum(
-        (np.outer(s, s) for s in compute_sensor_shifts(best, tolerances).values()),
-        np.zeros_like(best.covariance),
-    )
+    told = correct_fit(best, priors) or keep_fit(best)
     gain = base.chi2 * base.problem.size - best.chi2 * best.problem.size
     return ShapedFriction(
         shape,
         {
-            name: _build_curve(best, (name, table, shape), found.friction[name], systematic)
+            name: _build_curve(told, (name, table, shape), found.friction[name])
             for name, table in tables.items()
         },
         gain,
@@ -237,20 +235,16 @@ def _compute_evidence(
 
 
 def _build_curve(
-    best: LikelihoodFit,
-    one: tuple[str, KnotTable, FrictionShape],
-    seen: FrictionCurve,
-    systematic: FloatArray,
+    told: Correction, one: tuple[str, KnotTable, FrictionShape], seen: FrictionCurve
 ) -> FrictionCurve:
-    """Interpolate μ between the knots over the observed slips, with the band of noise and
-    sensors."""
+    """Interpolate μ between the knots over the observed slips, with the band of noise, sensors
+    and effects."""
     name, table, shape = one
-    first = best.point.names.index(table.list_names(name)[0])
+    first = told.mean.names.index(table.list_names(name)[0])
     part = slice(first, first + table.knots.size)
     slip = np.linspace(float(seen.slip[0]), float(seen.slip[-1]), POINTS)
     between = np.array([np.interp(slip, table.knots, row) for row in np.eye(table.knots.size)]).T
-    total = (best.covariance + systematic)[part, part]
-    at_knots, spread = project_shape(shape, best.point.values[part], total)
+    at_knots, spread = project_shape(shape, told.mean.values[part], told.covariance[part, part])
     mu = between @ at_knots
     half = Z95 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
     return replace(

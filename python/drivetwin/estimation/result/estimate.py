@@ -37,9 +37,9 @@ class Estimate:
     """One parameter's value and uncertainty, SI.
 
     `std_noise` comes from the sensors' noise; `std_systematic` from the card's tolerances of gain,
-    offset and delay, and from delayed values in the log. `value` is None exactly when the verdict
-    is `not identifiable`. `reason` contains the cause of a verdict other than `identified`, and
-    the recording that would help.
+    offset and delay, from delayed values in the log, and from effects that the model leaves out.
+    `value` is None exactly when the verdict is `not identifiable`. `reason` contains the cause of
+    a verdict other than `identified`, and the recording that would help.
     """
 
     id: str
@@ -74,7 +74,7 @@ class Estimate:
 
     @property
     def ci95_total(self) -> tuple[float, float] | None:
-        """95 % interval with sensor tolerances included; the one to show first."""
+        """95 % interval with sensor tolerances and effects included; the one to show first."""
         return self._compute_interval(self.std_total)
 
 

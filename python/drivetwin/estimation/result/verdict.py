@@ -25,7 +25,7 @@ class VerdictSettings:
     prior_share: float = 0.8
     """Standard deviation over that of the prior from which the prior dominates [ratio]."""
     sensor_share: float = 0.8
-    """Share of the sensor tolerances in the standard deviation from which they dominate an
+    """Share of sensor tolerances and effects in the standard deviation from which they dominate an
     interval [ratio]."""
 
 
@@ -56,7 +56,10 @@ def get_experiment(parameter_id: str) -> str:
 
 
 def is_sensor_limited(std_noise: float, std_systematic: float | None) -> bool:
-    """Return True if sensor tolerances dominate an interval, so that no experiment narrows it."""
+    """Return True if sensor tolerances and effects that the model leaves out dominate an interval.
+
+    More data of the same kind do not narrow it.
+    """
     systematic = std_systematic or 0.0
     return systematic > VERDICT.sensor_share * float(np.hypot(std_noise, systematic))
 

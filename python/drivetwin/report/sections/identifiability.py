@@ -146,11 +146,11 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
         head = (
             Cell("parameter"),
             Cell("interval", number=True, note="95 %, of the value"),
-            Cell("from sensors", number=True, note="share of the variance"),
+            Cell("from sensors and effects", number=True, note="share of the variance"),
             Cell("what would narrow it"),
         )
         yield TableBlock(
-            "The least well known. Where tolerances of the sensors make the interval, no "
+            "The least well known. Where sensor tolerances and effects make the interval, no "
             "experiment narrows it.",
             head,
             rows,

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.effects.correction import Correction
+from drivetwin.estimation.likelihood.effects.correction import CORRECTION, Correction
 from drivetwin.estimation.likelihood.effects.friction_shape import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
@@ -32,7 +32,7 @@ def build_friction_curves(
 
     `linear` are the curves of the linear method: their points and slip range are shown. Its
     place is taken by the slips of the simulation where there is none. The band is that of the law
-    and of the shapes beside it, with all effects; the curve contains the shapes.
+    and of the shapes beside it, with all effects; the curve contains shapes with evidence.
     """
     found: dict[str, FrictionCurve] = {}
     parts = fit.problem.parts
@@ -81,7 +81,11 @@ def _add_shapes(
     both = [*index, *(size + k for k in columns)]
     rows = np.vstack([slopes, shapes.T])
     total = told.joint_covariance[np.ix_(both, both)]
-    return shapes @ told.step.amounts[columns], np.einsum("pn,pq,qn->n", rows, total, rows)
+    change = shapes @ told.step.amounts[columns]
+    variance = np.einsum("pn,pq,qn->n", rows, total, rows)
+    if told.evidence[group].nats > CORRECTION.evidence:
+        return change, variance
+    return np.zeros(slip.size), variance + change**2
 
 
 def _build_empty_curve(fit: LikelihoodFit, name: str) -> FrictionCurve:
