@@ -32,8 +32,9 @@ class GateSettings:
     """Root mean square error of a phase over the predicted spread from which it is no chance."""
     friction: tuple[float, float] = (0.03, 0.3)
     """Range of μ of wet clutches; outside it the clutch gain on the card is wrong."""
-    least_efficiency: float = 0.6
-    """Least efficiency of a gearbox."""
+    least_efficiency: float = 0.7
+    """Least efficiency of a gearbox; the torque of an output in lb·ft taken for N·m gives 0.74 of
+    the true one."""
 
 
 GATE = GateSettings()
@@ -42,21 +43,21 @@ GATE = GateSettings()
 def assess_model(found: Identification) -> Identification:
     """Hold the validations of an identification against their prediction and set its status.
 
-    A model that fails keeps its values, none of them identified, and a finding names the entries
-    of the card that are most likely wrong.
+    A likelihood that reached no plausible minimum fails too. A model that fails keeps its values,
+    none of them identified, and a finding names the entries of the card that are most likely wrong.
     """
-    validations = found.evidence.validation
-    if not validations:
-        return found
-    failures = [*_check_runs(found), *_check_spread(found)]
-    doubts = list(_check_plausibility(found))
+    failures = [*_check_runs(found), *_check_spread(found), *_check_efficiency(found)]
+    doubts = list(_check_friction(found))
     estimates = apply_errors(found.estimates, failures)
-    suspects = find_suspects(found, friction=GATE.friction) if failures or doubts else []
-    status = ModelStatus.VALID
-    if failures:
+    refuted = bool(failures or found.evidence.gave_up)
+    suspects = find_suspects(found, friction=GATE.friction) if refuted or doubts else []
+    if refuted:
         status = ModelStatus.NOT_VALID
-    elif doubts or _has_limits(found):
-        status = ModelStatus.LIMITED
+    elif not found.evidence.validation:
+        status = ModelStatus.NOT_VALIDATED
+    else:
+        limited = bool(doubts) or _has_limits(found)
+        status = ModelStatus.LIMITED if limited else ModelStatus.VALID
     findings = (*failures, *doubts, *suspects, *found.findings)
     return replace(found, estimates=estimates, findings=findings, status=status)
 
@@ -114,13 +115,18 @@ def _check_phases(
             )
 
 
-def _check_plausibility(found: Identification) -> Iterator[Finding]:
-    """Find values that no gearbox has."""
+def _check_friction(found: Identification) -> Iterator[Finding]:
+    """Find friction that no wet clutch has; it needs a wrong gain only."""
     low, high = GATE.friction
     for name, curve in found.friction.items():
         middle = float(np.median(curve.mu))
         if not curve.over_eta and not low <= middle <= high:
             yield report(Code.FRICTION_IMPLAUSIBLE, element=name, mu=middle, low=low, high=high)
+
+
+def _check_efficiency(found: Identification) -> Iterator[Finding]:
+    """Find an efficiency that no gearbox has: scale or sign of a torque is wrong, and with it all
+    values."""
     eta = found.estimates.get("eta")
     if eta is not None and eta.value is not None and eta.value < GATE.least_efficiency:
         yield report(Code.EFFICIENCY_IMPLAUSIBLE, value=eta.value)

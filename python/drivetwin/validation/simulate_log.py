@@ -148,7 +148,7 @@ def attach_validation(found: Identification, twin: Twin, log: ShiftLog) -> Ident
         return attach_fit(found, list(_simulate_shifts(twin, log, found)))
     except (MissingParameterError, DamagedChannelError) as incomplete:
         failed = report(Code.NOT_VALIDATED, why=incomplete.what)
-        return replace(found, findings=(*found.findings, failed))
+        return assess_model(replace(found, findings=(*found.findings, failed)))
 
 
 def _simulate_shifts(twin: Twin, log: ShiftLog, found: Identification) -> Iterator[Validation]:

@@ -7,10 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from drivetwin.estimation.data.shift_data import PLAUSIBLE_ETA
 from drivetwin.estimation.identification import Identification
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
 
+LEAST_SIZE = 3.0
+"""Deviation, in usual standard deviations, from which an efficiency is no scatter."""
 SHOWN = 2
 """Entries that are named."""
 TYPICAL_FRICTION = 0.11
@@ -34,6 +37,7 @@ def find_suspects(found: Identification, friction: tuple[float, float]) -> list[
     ranked = sorted(
         (
             *_rank_gains(found, friction),
+            *_rank_efficiency(found),
             *_rank_findings(found),
             *_rank_inertias(found),
         ),
@@ -49,6 +53,16 @@ def _rank_gains(found: Identification, friction: tuple[float, float]) -> Iterato
             factor = middle / TYPICAL_FRICTION
             size = abs(float(np.log(factor))) / SPREAD_OF_FRICTION
             yield size, f"gain of {name} (μ would be {middle:.3g}; {factor:.2g} times the gain)"
+
+
+def _rank_efficiency(found: Identification) -> Iterator[Suspect]:
+    """Rank scale and unit of the torques by the efficiency that they make."""
+    eta = found.estimates.get("eta")
+    if eta is not None and eta.value is not None:
+        size = (PLAUSIBLE_ETA.value - eta.value) / PLAUSIBLE_ETA.std
+        if size > LEAST_SIZE:
+            factor = PLAUSIBLE_ETA.value / eta.value
+            yield size, f"unit or scale of a torque (output torque too small by {factor:.2f}?)"
 
 
 def _rank_findings(found: Identification) -> Iterator[Suspect]:
