@@ -291,13 +291,11 @@ def observe(at: OperatingPoint, disturbances: Sequence[Disturbance]) -> FloatArr
     for k, one in enumerate(disturbances):
         if one.respond is not None:
             state[:, :, k] += one.respond()
-    state = state[at.rows]
-    found = []
+    time, found = at.record.time, []
     for out in at.record.outputs:
-        row = build_output_row(at.model, out.name)
-        seen = np.einsum("i,kiq->kq", row, state[out.centre])
+        seen = np.einsum("i,kiq->kq", build_output_row(at.model, out.name), state[at.rows])
         for k, one in enumerate(disturbances):
             if out.name in one.outputs:
-                seen[:, k] += out.sample(at.record.time, one.outputs[out.name][at.rows])
-        found.append(seen)
+                seen[:, k] += one.outputs[out.name][at.rows]
+        found.append(np.column_stack([out.sample(time, column) for column in seen.T]))
     return np.concatenate(found)
