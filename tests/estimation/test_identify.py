@@ -27,6 +27,7 @@ from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -283,8 +284,9 @@ def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> N
     known = replace(card, known={"eta": PriorValue(0.9, 0.02)})
     driveline = build_driveline(known, found.shifts[0])
     fit, signals = get_likelihood_fit(found)
-    told = build_estimates(fit, signals, [driveline], {}, EffectPriors()).estimates
-    ratio = found.estimates["J_vehicle_over_eta"]
+    none = EffectPriors({effect: EffectPrior(0.0) for effect in EffectId})
+    told = build_estimates(fit, signals, [driveline], {}, none).estimates
+    ratio = told["J_vehicle_over_eta"]
     assert ratio.value is not None
     assert told["J_vehicle"].value == pytest.approx(0.9 * ratio.value)
     assert told["J_vehicle"].std_systematic == pytest.approx(0.02 * ratio.value)

@@ -25,7 +25,7 @@ from drivetwin.cli.output import (
 )
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.estimation.result.spread import ModelStatus
+from drivetwin.estimation.result.status import ModelStatus
 
 if TYPE_CHECKING:
     from drivetwin.estimation.identification import Identification

@@ -16,7 +16,7 @@ from drivetwin.estimation.result.estimate import (
     SignalFit,
 )
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.spread import ModelStatus
+from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.shifts.shift import RejectedShift, Shift
 

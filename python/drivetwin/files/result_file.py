@@ -14,7 +14,7 @@ from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.spread import ModelStatus
+from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.files.multi_log_records import HeldOutRecord, SeveralRecord
 from drivetwin.files.read import read_record
 from drivetwin.files.records import (

@@ -15,7 +15,8 @@ import numpy as np
 
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.spread import ModelStatus, PredictedSpread
+from drivetwin.estimation.result.spread import PredictedSpread
+from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.estimation.result.verdict import apply_errors
 from drivetwin.findings import Code, Finding, Severity, report

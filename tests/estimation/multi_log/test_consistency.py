@@ -79,7 +79,7 @@ def test_logs_of_one_vehicle_agree() -> None:
     assert tested.agree
     assert tested.freedom >= 8
     assert tested.doubtful == {}
-    assert "agree on what they share" in tested.text
+    assert "The logs agree on their shared parameters" in tested.text
 
 
 def test_a_payload_is_named_with_its_log_and_sign() -> None:

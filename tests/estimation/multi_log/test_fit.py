@@ -155,7 +155,7 @@ def test_a_disagreement_widens_and_weakens_what_it_concerns() -> None:
     found = loaded().found
     estimate = found.estimates["J_vehicle"]
     assert estimate.verdict.value == "weak"
-    assert "the logs do not agree on it" in estimate.reason
+    assert "The logs do not agree: log 2" in estimate.reason
     low, high = estimate.ci95_total or (0.0, 0.0)
     light = scenario().model.J_v
     assert low < light < 1.03 * light < high

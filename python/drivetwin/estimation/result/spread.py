@@ -1,21 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Predicted spread of a simulated signal, and the status of a model that it is held against."""
+"""Predicted spread of a simulated signal."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 from drivetwin._util.arrays import FloatArray
-
-
-class ModelStatus(StrEnum):
-    """Status of an identified model by its free-running simulation."""
-
-    VALID = "valid"
-    LIMITED = "valid with limits"
-    NOT_VALID = "not valid"
-    NOT_VALIDATED = "not validated"
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from drivetwin._util.display_units import (
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import run_residual_tests
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
-from drivetwin.estimation.result.spread import ModelStatus
+from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Finding, render, select_warnings
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.figures.parameters import plot_intervals

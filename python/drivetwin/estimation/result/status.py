@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: MIT
+"""Status of an identified model."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class ModelStatus(StrEnum):
+    """Status of an identified model by its free-running simulation."""
+
+    VALID = "valid"
+    LIMITED = "valid with limits"
+    NOT_VALID = "not valid"
+    NOT_VALIDATED = "not validated"
