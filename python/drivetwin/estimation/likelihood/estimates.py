@@ -21,7 +21,7 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
 from drivetwin.estimation.likelihood.effects.causes import find_cause, report_cause
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
-from drivetwin.estimation.likelihood.effects.withdrawal import find_unreliable
+from drivetwin.estimation.likelihood.effects.withdrawal import compute_doubt, find_unreliable
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.selection.loss_law import check_other_law
 from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
@@ -42,6 +42,7 @@ from drivetwin.estimation.result.estimate_set import (
     collect_shift_labels,
 )
 from drivetwin.estimation.result.verdict import (
+    add_systematic,
     apply_errors,
     assess,
     assess_with_prior,
@@ -102,8 +103,12 @@ def build_estimates(
     disagreements = (
         *check_residuals(fit, labels, told.residuals),
         *check_weighting(fit, labels),
-        *find_unreliable(told, ids, matrix, std),
+        *(withdrawn := find_unreliable(told, ids, matrix, std)),
     )
+    doubt = dict(zip(ids, compute_doubt(told, matrix).tolist(), strict=True))
+    subjects = {one.subject for one in withdrawn}
+    for name in ids if "" in subjects else subjects:
+        estimates[name] = add_systematic(estimates[name], doubt[name])
     estimates = apply_errors(estimates, (*limits, *disagreements))
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
     cause = find_cause(told, priors)

@@ -164,6 +164,13 @@ def reject_identified(one: Estimate, why: str) -> Estimate:
     return replace(one, verdict=Verdict.WEAK, reason=join_reasons(why, one.reason))
 
 
+def add_systematic(one: Estimate, std: float) -> Estimate:
+    """Widen the total interval of an estimate by a systematic `std`; unchanged without value."""
+    if one.value is None or not np.isfinite(std):
+        return one
+    return replace(one, std_systematic=float(np.hypot(one.std_systematic or 0.0, std)))
+
+
 def apply_errors(
     estimates: Mapping[str, Estimate], findings: Iterable[Finding]
 ) -> dict[str, Estimate]:

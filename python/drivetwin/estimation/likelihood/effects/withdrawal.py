@@ -65,6 +65,17 @@ def find_unreliable(
     return found
 
 
+def compute_doubt(correction: Correction, jacobian: FloatArray) -> FloatArray:
+    """Compute how far (k,) each value has been moved by what makes it unreliable.
+
+    That is the last step, and the moves by groups beyond their priors. The interval of a value
+    that is withdrawn reaches back over them.
+    """
+    moves = [correction.last]
+    moves += [correction.step.contributions[one] for one in find_large_groups(correction)]
+    return np.asarray(np.linalg.norm([jacobian @ one for one in moves], axis=0))
+
+
 def find_large_groups(correction: Correction) -> list[Group]:
     """Return the groups whose amounts refute their priors."""
     step = correction.step
