@@ -26,9 +26,9 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
 from drivetwin.estimation.likelihood.objective import ShiftTerm
-from drivetwin.estimation.likelihood.score import compute_score
 from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
 from drivetwin.estimation.optimize.gauss_newton import minimise, solve_step
 
@@ -137,7 +137,7 @@ def _compute_step(
     effects = [e for e in _iterate_effects(fit, largest, temperature) if e.plausible > 0.0]
     columns = [_compute_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
     precision = np.array([e.plausible for e in effects]) ** -2.0
-    score = compute_score(fit.problem, fit.normal, columns)
+    score = compute_column_products(fit.problem, fit.normal, columns)
     normal = score.extend_expansion(fit.normal, precision, 0.0 if known is None else known)
     mine = slice(fit.point.values.size, None)
     covariance = compute_covariance(fit.problem, normal, fit.chi2)[mine, mine]

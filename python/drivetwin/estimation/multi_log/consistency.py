@@ -63,7 +63,7 @@ def check_consistency(
     shared = find_shared(fit)
     covariance = invert_information(fit.normal.information)
     root = compute_covariance_root(covariance[np.ix_(shared, shared)])
-    pulls = [_compute_score(fit, log, shared, root) for log in logs]
+    pulls = [_compute_column_products(fit, log, shared, root) for log in logs]
     square, freedom = compute_homogeneity(pulls)
     power = compute_variance_inflation(fit, np.eye(len(covariance))[shared])
     square /= power
@@ -81,7 +81,7 @@ def find_shared(fit: LikelihoodFit) -> list[int]:
     return [k for k, name in enumerate(fit.point.names) if name not in own | starts]
 
 
-def _compute_score(
+def _compute_column_products(
     fit: LikelihoodFit, log: int, shared: Sequence[int], root: FloatArray
 ) -> LogScore:
     """Compute information and gradient of one log on the shared unknowns at the common minimum.

@@ -22,10 +22,10 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
+from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.score import compute_score
 from drivetwin.estimation.optimize.objective import NormalEquations
 from drivetwin.estimation.result.cause import Group
 from drivetwin.vehicle.effects import EffectId
@@ -144,7 +144,7 @@ def weight_columns(
     problem: LikelihoodObjective, normal: NormalEquations, columns: EffectColumns
 ) -> WeightedColumns:
     """Form the weighted sums of `columns` at the point of the expansion `normal`."""
-    score = compute_score(problem, normal, columns.matrices)
+    score = compute_column_products(problem, normal, columns.matrices)
     pull, gradient = score.pull.copy(), normal.gradient.copy()
     for known, weighted, regressors in zip(
         columns.known, score.weighted, normal.regressors, strict=True

@@ -32,12 +32,12 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
+from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.optimize.staged_start import fit_lower_gear_only
-from drivetwin.estimation.likelihood.score import compute_score
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95
@@ -332,7 +332,9 @@ def _choices(
     problem: LikelihoodObjective, point: ParameterVector, normal: NormalEquations
 ) -> _Choices:
     """Expand Q at `point` over all choices by `normal`, with the weighting there."""
-    score = compute_score(problem, normal, [_changes(part, point) for part in problem.parts])
+    score = compute_column_products(
+        problem, normal, [_changes(part, point) for part in problem.parts]
+    )
     shown = {*_shown(problem), TORQUE}
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
     gradients = normal.gradient + flips @ score.cross.T

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Score of columns beside a fit: weighted scalar products with residual, slopes and themselves."""
+"""Weighted scalar products of columns beside a fit with residual, slopes and themselves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivetwin.estimation.optimize.objective import NormalEquations
 
 
 @dataclass(frozen=True, eq=False)
-class ScoreSums:
+class ColumnProducts:
     """Sums over all parts for q columns Z of the outputs, with J and r those of the fit.
 
     `own` (q, q) is ZᵀΣ⁻¹Z, `cross` (p, q) JᵀΣ⁻¹Z and `pull` (q,) ZᵀΣ⁻¹r; `weighted` (n, q) is
@@ -49,10 +49,10 @@ class ScoreSums:
         )
 
 
-def compute_score(
+def compute_column_products(
     problem: LikelihoodObjective, normal: NormalEquations, columns: Sequence[FloatArray]
-) -> ScoreSums:
-    """Score of `columns` (n, q) of each part at the point of the expansion `normal`."""
+) -> ColumnProducts:
+    """Form the products of `columns` (n, q) of each part at the point of the expansion `normal`."""
     size = columns[0].shape[1]
     own, cross = np.zeros((size, size)), np.zeros((normal.gradient.size, size))
     pull, every = np.zeros(size), []
@@ -64,4 +64,4 @@ def compute_score(
         cross += regressors.T @ z
         pull += weighted.T @ residual
         every.append(weighted)
-    return ScoreSums(own, cross, pull, tuple(every))
+    return ColumnProducts(own, cross, pull, tuple(every))
