@@ -14,12 +14,15 @@ from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.linear.multi_shift import apply_sensor_error
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.findings import Code
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 from tests.support.bench import Knowledge
 
 CLOSE = Knowledge(J_out=0.02)
 """A card that knows Jo′ better than the log does."""
+NO_EFFECT = EffectPriors({effect: EffectPrior(0.0) for effect in EffectId})
+"""Effects off: what is tested here is the card and its sensors."""
 OFFSET = 50.0
 """Error of the output torque [N m], one standard deviation of its tolerance."""
 
@@ -30,7 +33,7 @@ def _inertia(offset: float) -> Estimate:
     posed, start = problem(replace(made, signals=signals))
     fit = fit_local(posed, start)
     assert fit is not None
-    priors = EffectPriors(sensors={"output_torque": SensorTolerance(offset=OFFSET)})
+    priors = replace(NO_EFFECT, sensors={"output_torque": SensorTolerance(offset=OFFSET)})
     return build_estimates(fit, [signals], [made.driveline], {}, priors).estimates["J_out"]
 
 
@@ -58,10 +61,10 @@ def test_a_drum_known_better_than_on_the_card_keeps_its_value_however_wide() -> 
     covariance[k, :] *= 0.022 / np.sqrt(fit.covariance[k, k])
     covariance[:, k] *= 0.022 / np.sqrt(fit.covariance[k, k])
     known = replace(fit, mean=fit.point.replace_values(values), covariance=covariance)
-    told = build_estimates(known, [made.signals], [made.driveline], {}, EffectPriors()).estimates[
-        f"drum.{name}"
-    ]
-    assert told.value == pytest.approx(0.007)
+    estimates = build_estimates(known, [made.signals], [made.driveline], {}, NO_EFFECT).estimates
+    told = estimates[f"drum.{name}"]
+    # What remains of the gradient at the end of the search moves it by little.
+    assert told.value == pytest.approx(0.007, abs=0.01 * 0.022)
     assert told.verdict is Verdict.WEAK
 
 
@@ -72,7 +75,7 @@ def test_a_design_value_that_the_log_contradicts_is_told_with_what_rests_on_it()
     posed, start = problem(replace(made, driveline=wrong))
     fit = fit_local(posed, start)
     assert fit is not None
-    told = build_estimates(fit, [made.signals], [wrong], {}, EffectPriors())
+    told = build_estimates(fit, [made.signals], [wrong], {}, NO_EFFECT)
     (one,) = [each for each in told.findings if each.code is Code.CARD_CONTRADICTED]
     assert one.subject == "J_out"
     assert one.numbers["card"].value == pytest.approx(2.0 * truth)

@@ -51,7 +51,7 @@ from drivetwin.estimation.result.verdict import (
     refuse_parameter,
     reject_identified,
 )
-from drivetwin.findings import Code, explain
+from drivetwin.findings import Code, Finding, explain
 from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue
 
@@ -125,13 +125,24 @@ def build_estimates(
             *(one for one in disagreements if one.subject not in estimates),
             *find_null_directions(fit),
             *report_different_loads(collect_loads(fit)),
-            *check_other_law(fit, values, matrix, std),
+            *_check_other_law(fit, signals, matrix),
         ),
         _build_load_law(fit, told),
         collect_loads(fit),
         predict_spread(fit, told),
         cause,
     )
+
+
+def _check_other_law(
+    fit: LikelihoodFit, signals: Sequence[ShiftSignals], matrix: FloatArray
+) -> list[Finding]:
+    """Compare the loss laws by their fits without effects: an effect may stand in for a wrong law.
+
+    `matrix` (k, p) are the derivatives of the parameters by the unknowns.
+    """
+    values = compute_parameters(fit.problem, fit.mean, signals)
+    return check_other_law(fit, values, matrix, _compute_std(matrix, fit.covariance))
 
 
 def _estimate_fixed(

@@ -75,4 +75,4 @@ def test_a_log_that_tells_neither_law_from_the_other_says_so(
 ) -> None:
     monkeypatch.setattr(loss_law, "RULED_OUT", 1e6)
     (text,) = _said(_made("paper"), _fit("paper", "paper"))
-    assert "does not tell which of the two holds" in text
+    assert "does not decide between the laws" in text
