@@ -85,7 +85,7 @@ def build_estimates(
     fitted = FittedParameters(
         ids=tuple(values),
         values=np.array([*values.values()]),
-        covariance=covariance,
+        covariance=matrix @ told.noise @ matrix.T,
         std=noise,
         driveline=drivelines[0],
         systematic=dict(zip(values, np.sqrt(std**2 - noise**2).tolist(), strict=True)),

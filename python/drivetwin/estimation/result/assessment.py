@@ -24,8 +24,9 @@ from drivetwin.vehicle.spec import PriorValue
 class FittedParameters:
     """Parameters of a fit: `values` (q,) by id with `covariance` (q, q) and `std` (q,) from noise.
 
-    `systematic` are the standard deviations from sensor tolerances by id, `notes` findings by id.
-    `method` names the estimator, `prior_method` that of parameters whose design value took part.
+    `systematic` are the standard deviations from sensor tolerances and effects by id, `notes`
+    findings by id. `method` names the estimator, `prior_method` that of parameters whose design
+    value took part.
     """
 
     ids: tuple[str, ...]
