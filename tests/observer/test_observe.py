@@ -118,7 +118,7 @@ def test_a_gear_counts_as_far_as_its_torque_was_recorded(bench: Bench) -> None:
     log = _with_gap(bench.log, "engine_torque", end - 0.8, end - 0.5)
     one = estimate_torques(bench.twin, log, bench.shift)
     assert end - 0.5 < one.time[0] < end - 0.4
-    assert "counts from there on" in one.notes[0]
+    assert "used only from there on" in one.notes[0]
     assert _deviates(one.output_torque, bench.truth(one)["output_torque"]) < 2.0
 
 
