@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_step
+from drivetwin.estimation.result.method import Method
 from drivetwin.vehicle.effects import parse_priors
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.estimation.identification import Identification
-    from drivetwin.estimation.result.method import Method
     from drivetwin.twin.twin import Twin
     from drivetwin.vehicle.card import VehicleCard
 
