@@ -78,7 +78,7 @@ def test_a_design_value_that_the_log_contradicts_is_told_with_what_rests_on_it()
     posed, start = problem(replace(made, driveline=wrong))
     fit = fit_local(posed, start)
     assert fit is not None
-    told = build_estimates(fit, [made.signals], [wrong], {}, NO_EFFECT)
+    told = build_estimates(fit, [made.signals], [wrong], {}, EffectPriors())
     (one,) = [each for each in told.findings if each.code is Code.CARD_CONTRADICTED]
     assert one.subject == "J_out"
     assert one.numbers["card"].value == pytest.approx(2.0 * truth)

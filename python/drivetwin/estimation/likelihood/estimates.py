@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,6 +56,9 @@ from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue
 
 AGE = "te_delay"
+WRONG_ENTRY = 10.0
+"""Lead of log evidence of a wrong design value over any effect: entries of a card are rarely wrong
+(odds of e⁵ against it), and it must lead as a cause does (e⁵)."""
 WITH_ETA = "likelihood over η, times η from design"
 """Method of a torque-like parameter of a log without an output torque, where η is on the card."""
 WITH_PRIOR = "likelihood with design prior"
@@ -75,24 +78,12 @@ def build_estimates(
     statements on effects and sensors. Values and intervals allow for all effects that the model
     leaves out; where these are too large for that, no value is identified.
     """
+    told = keep_fit(fit)
+    own = _fit_parameters(fit, told, signals, drivelines)
     correction = correct_fit(fit, priors)
-    told = keep_fit(fit) if correction is None else correction
-    values = compute_parameters(fit.problem, told.mean, signals)
-    matrix = compute_jacobian(fit.problem, told.mean, np.sqrt(np.diag(fit.covariance)), signals)
-    covariance = matrix @ told.covariance @ matrix.T
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    noise = np.minimum(_compute_std(matrix, told.noise), std)
-    fitted = FittedParameters(
-        ids=tuple(values),
-        values=np.array([*values.values()]),
-        covariance=matrix @ told.noise @ matrix.T,
-        std=noise,
-        driveline=drivelines[0],
-        systematic=dict(zip(values, np.sqrt(std**2 - noise**2).tolist(), strict=True)),
-        notes=check_excitation(signals),
-        method=METHOD,
-        prior_method=WITH_PRIOR,
-    )
+    if correction is not None and not _is_card_likelier(own.fitted, correction):
+        told, own = correction, _fit_parameters(fit, correction, signals, drivelines)
+    fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
     limits = [
         one
@@ -116,7 +107,7 @@ def build_estimates(
         estimates,
         build_friction_curves(fit, linear, told),
         ids,
-        compute_correlation(covariance),
+        compute_correlation(own.covariance),
         (
             *dict.fromkeys(fitted.notes.values()),
             *(one.finding for one in fitted.conflicts),
@@ -143,6 +134,55 @@ def _check_other_law(
     """
     values = compute_parameters(fit.problem, fit.mean, signals)
     return check_other_law(fit, values, matrix, _compute_std(matrix, fit.covariance))
+
+
+@dataclass(frozen=True, eq=False)
+class _ReportedParameters:
+    """Reported parameters of a correction: `values` by id, their `jacobian` (k, p) by the
+    unknowns, total `covariance` (k, k) and `std` (k,)."""
+
+    fitted: FittedParameters
+    values: Mapping[str, float]
+    jacobian: FloatArray
+    covariance: FloatArray
+    std: FloatArray
+
+
+def _fit_parameters(
+    fit: LikelihoodFit,
+    told: Correction,
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[KnownDriveline],
+) -> _ReportedParameters:
+    """Compute the reported parameters with their noise and total covariance."""
+    values = compute_parameters(fit.problem, told.mean, signals)
+    matrix = compute_jacobian(fit.problem, told.mean, np.sqrt(np.diag(fit.covariance)), signals)
+    covariance = matrix @ told.covariance @ matrix.T
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    noise = np.minimum(_compute_std(matrix, told.noise), std)
+    fitted = FittedParameters(
+        ids=tuple(values),
+        values=np.array([*values.values()]),
+        covariance=matrix @ told.noise @ matrix.T,
+        std=noise,
+        driveline=drivelines[0],
+        systematic=dict(zip(values, np.sqrt(std**2 - noise**2).tolist(), strict=True)),
+        notes=check_excitation(signals),
+        method=METHOD,
+        prior_method=WITH_PRIOR,
+    )
+    return _ReportedParameters(fitted, values, matrix, covariance, std)
+
+
+def _is_card_likelier(fitted: FittedParameters, correction: Correction) -> bool:
+    """Return whether a wrong design value explains the log better than any effect.
+
+    A value that is `apart` so many standard deviations has the log evidence ½·apart² against it.
+    `fitted` are the parameters without effects.
+    """
+    against = max((0.5 * one.apart**2 for one in fitted.conflicts), default=0.0)
+    effects = max((one.nats for one in correction.evidence.values()), default=0.0)
+    return against > effects + WRONG_ENTRY
 
 
 def _estimate_fixed(
