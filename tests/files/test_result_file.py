@@ -25,7 +25,7 @@ def _saved(folder: Path) -> dict[str, object]:
 
 def test_keys_are_those_of_the_design(tmp_path: Path) -> None:
     tree = _saved(tmp_path)
-    assert tree["schema"] == "drivetwin/result-4"
+    assert tree["schema"] == "drivetwin/result-5"
     parameters = tree["parameters"]
     assert isinstance(parameters, dict)
     assert set(parameters["eta"]) == {
@@ -92,7 +92,7 @@ def test_round_trip(tmp_path: Path) -> None:
         ("[1, 2]", "cannot be read"),
         ("{}", "schema is None"),
         ('{"schema": "drivetwin/result-5"}', "newer"),
-        ('{"schema": "drivetwin/twin-1"}', "expected 'drivetwin/result-4'"),
+        ('{"schema": "drivetwin/twin-1"}', "expected 'drivetwin/result-5'"),
         ('{"schema": "drivetwin/result-1"}', "shifts: this key is required and missing"),
     ],
 )

@@ -347,7 +347,8 @@ def assert_goes_on_as_the_core(run: Steps, other: DualClutch, row: FloatArray) -
     signals = (core.engine_speed, core.output_speed, core.wheel_speed, core.twist)
     torques = (core.shaft_torque, *core.clutch_torque.values())
     expected = np.column_stack((*signals, *torques))[1:]
-    seen = np.array([values for status, values in told if status == "completed"])
+    rows = [values for status, values in told if status == "completed"]
+    seen = np.array(rows).reshape(len(rows), expected.shape[1])
     assert seen.shape == expected.shape or told[-1][0] == "engine stalled"
     scale = np.abs(expected).max(axis=0) + 1e-3
     assert np.all(np.abs(seen - expected[: len(seen)]) < 1e-7 * scale)

@@ -182,7 +182,7 @@ def _conclude(
     step, chosen = base.take_step(), base.take_step(shown)
     size = second.size
     rest = step.moves - chosen.moves
-    extra = fit.covariance - compute_covariance(fit.problem, fit.normal, fit.chi2)
+    extra = _compute_model_spread(fit)
     values = fit.mean.values + base.point.values - fit.point.values + chosen.moves
     return Correction(
         fit.mean.replace_values(np.clip(values, fit.problem.lower, fit.problem.upper)),
@@ -237,6 +237,16 @@ def _expand_with_inputs(
         return None
     sums = weight_columns(problem, normal, columns.follow(first, acting))
     return _Expansion(problem, normal, point, sums)
+
+
+def _compute_model_spread(fit: LikelihoodFit) -> FloatArray:
+    """Compute what averaging over models added to the covariance (p, p) of a fit; semidefinite."""
+    extra = fit.covariance - compute_covariance(fit.problem, fit.normal, fit.chi2)
+    std = np.sqrt(np.diag(fit.covariance))
+    scale = np.where(std > 0.0, std, 1.0)
+    power, directions = np.linalg.eigh(extra / np.outer(scale, scale))
+    root = scale[:, None] * directions * np.sqrt(np.maximum(power, 0.0))
+    return np.asarray(root @ root.T)
 
 
 def _compute_noise(normal: NormalEquations, step: JointStep) -> FloatArray:
