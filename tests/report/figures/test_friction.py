@@ -16,7 +16,7 @@ from tests.report.sample import friction
 def test_band_encloses_the_curve() -> None:
     figure = plot_friction("B3", friction())
     traces = {trace.name: trace for trace in figure.data}
-    band, curve = traces["95 % band, sensors included"], traces["curve of B3"]
+    band, curve = traces["95 % band, sensors and effects"], traces["curve of B3"]
     half = len(band.y) // 2
     assert np.all(band.y[:half] > curve.y)
     assert np.all(band.y[half:][::-1] < curve.y)

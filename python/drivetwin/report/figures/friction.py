@@ -27,7 +27,7 @@ def plot_friction(element: str, curve: FrictionCurve) -> go.Figure:
             name="points from the log",
             marker={"color": MEASURED, "size": 4, "opacity": 0.45},
         )
-    bounds = draw_band(curve, _BAND, name="95 % band, sensors included")
+    bounds = draw_band(curve, _BAND, name="95 % band, sensors and effects")
     if len(bounds.x):
         figure.add_trace(bounds)
     figure.add_scatter(

@@ -150,7 +150,7 @@ def build_friction_overlay_section(candidates: Sequence[Candidate]) -> Section:
         )
         for element in elements
     ]
-    return Section("friction", "Friction", "Bands hold 95 %, sensors included.", blocks)
+    return Section("friction", "Friction", "Bands hold 95 %, sensors and effects included.", blocks)
 
 
 def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> list[Section]:

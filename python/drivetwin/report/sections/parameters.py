@@ -70,8 +70,8 @@ def build_parameters_section(found: Identification) -> Section:
     blocks.append(
         FigureBlock(
             plot_intervals(found.estimates),
-            "How narrowly each parameter is known. Dots: sensor noise together with the sensors' "
-            "tolerances on the vehicle card and values shown late; bars: noise alone.",
+            "How narrowly each parameter is known. Dots: noise, sensor tolerances on the vehicle card "
+            "and effects that the model leaves out; bars: noise alone.",
         )
     )
     return Section("trust", "Can I trust this model?", _write_headline(found), blocks)
@@ -184,7 +184,7 @@ def build_parameter_table(found: Identification) -> TableBlock:
     head = (
         Cell("parameter"),
         Cell("value", number=True),
-        Cell("± 95 %", number=True, note="sensors included"),
+        Cell("± 95 %", number=True, note="sensors and effects"),
         Cell("± 95 %", number=True, note="noise alone"),
         Cell("unit"),
         Cell("verdict"),
