@@ -70,8 +70,8 @@ def build_parameters_section(found: Identification) -> Section:
     blocks.append(
         FigureBlock(
             plot_intervals(found.estimates),
-            "How narrowly each parameter is known. Dots: noise, sensor tolerances on the vehicle card "
-            "and effects that the model leaves out; bars: noise alone.",
+            "How narrowly each parameter is known. Dots: noise, sensor tolerances on the card and "
+            "effects that the model leaves out; bars: noise alone.",
         )
     )
     return Section("trust", "Can I trust this model?", _write_headline(found), blocks)
