@@ -93,6 +93,7 @@ class Code(StrEnum):
     EFFECT_POSSIBLE = auto()
     EFFECT_LARGE = auto()
     EFFECT_NOT_LINEAR = auto()
+    EFFECTS_OMITTED = auto()
     OTHER_LOSS_LAW = auto()
     METHODS_DIFFER = auto()
     LIKELIHOOD_FAILED = auto()

@@ -37,7 +37,7 @@ def test_the_documented_vehicle_card_loads(tmp_path: Path) -> None:
     assert card.elements["B3"].gain == pytest.approx(0.027)
     assert card.sensors["output_torque"].offset == pytest.approx(30.0)
     assert card.effects[EffectId.TYRE_SLIP] == EffectPrior(std=0.002)
-    assert card.effects[EffectId.BACKLASH].is_off
+    assert card.effects[EffectId.BACKLASH] == EffectPrior(0.0)
     assert card.effects[EffectId.INPUT_DRAG] == EffectPrior(std=0.0005, value=0.003)
 
 

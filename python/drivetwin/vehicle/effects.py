@@ -62,11 +62,6 @@ class EffectPrior:
     std: float
     value: float = 0.0
 
-    @property
-    def is_off(self) -> bool:
-        """True if the effect is stated not to exist."""
-        return self.std == 0.0 and self.value == 0.0
-
 
 def parse_priors(texts: Iterable[str]) -> dict[EffectId, EffectPrior]:
     """Parse `NAME=STD`, one for each effect; raises InputError that lists the names."""

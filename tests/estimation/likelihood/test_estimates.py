@@ -10,6 +10,7 @@ import pytest
 
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
+from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.linear.multi_shift import apply_sensor_error
 from drivetwin.estimation.result.estimate import Estimate, Verdict
@@ -59,11 +60,13 @@ def test_a_drum_known_better_than_on_the_card_keeps_its_value_however_wide() -> 
     assert fit is not None
     name = made.driveline.oncoming.name
     k = fit.point.names.index(f"{name}.drum")
-    values, covariance = fit.point.values.copy(), fit.covariance.copy()
+    values, information = fit.point.values.copy(), fit.normal.information.copy()
     values[k] = 0.007
-    covariance[k, :] *= 0.022 / np.sqrt(fit.covariance[k, k])
-    covariance[:, k] *= 0.022 / np.sqrt(fit.covariance[k, k])
-    known = replace(fit, mean=fit.point.replace_values(values), covariance=covariance)
+    information[k, k] += 0.022**-2 - 1.0 / fit.covariance[k, k]
+    normal = replace(fit.normal, information=information)
+    covariance = compute_covariance(fit.problem, normal, fit.chi2)
+    mean = fit.point.replace_values(values)
+    known = replace(fit, mean=mean, normal=normal, covariance=covariance)
     estimates = build_estimates(known, [made.signals], [made.driveline], {}, NO_EFFECT).estimates
     told = estimates[f"drum.{name}"]
     # What remains of the gradient at the end of the search moves it by little.

@@ -51,7 +51,7 @@ from drivetwin.estimation.result.verdict import (
     refuse_parameter,
     reject_identified,
 )
-from drivetwin.findings import Code, Finding, explain
+from drivetwin.findings import Code, Finding, explain, report
 from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue
 
@@ -78,11 +78,14 @@ def build_estimates(
     statements on effects and sensors. Values and intervals allow for all effects that the model
     leaves out; where these are too large for that, no value is identified.
     """
-    told = keep_fit(fit)
-    own = _fit_parameters(fit, told, signals, drivelines)
     correction = correct_fit(fit, priors)
-    if correction is not None and not _is_card_likelier(own.fitted, correction):
-        told, own = correction, _fit_parameters(fit, correction, signals, drivelines)
+    told = correction or keep_fit(fit)
+    own = _fit_parameters(fit, told, signals, drivelines)
+    sensors = None if correction is None else correct_fit(fit, priors.drop_effects())
+    if sensors is not None:
+        plain = _fit_parameters(fit, sensors, signals, drivelines)
+        if _is_card_likelier(plain.fitted, told):
+            told, own = sensors, plain
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
     limits = [
@@ -94,6 +97,7 @@ def build_estimates(
     disagreements = (
         *check_residuals(fit, labels, told.residuals),
         *check_weighting(fit, labels),
+        *(() if correction is not None else (report(Code.EFFECTS_OMITTED),)),
         *(withdrawn := find_unreliable(told, ids, matrix, std)),
     )
     doubt = dict(zip(ids, compute_doubt(told, matrix).tolist(), strict=True))
@@ -178,7 +182,7 @@ def _is_card_likelier(fitted: FittedParameters, correction: Correction) -> bool:
     """Return whether a wrong design value explains the log better than any effect.
 
     A value that is `apart` so many standard deviations has the log evidence ½·apart² against it.
-    `fitted` are the parameters without effects.
+    `fitted` are the parameters with the tolerances of sensors and without effects.
     """
     against = max((0.5 * one.apart**2 for one in fitted.conflicts), default=0.0)
     effects = max((one.nats for one in correction.evidence.values()), default=0.0)

@@ -39,6 +39,10 @@ class EffectPriors:
         """Return the prior of an effect in its unit."""
         return self.effects.get(effect, EffectPrior(EFFECTS[effect].std))
 
+    def drop_effects(self) -> EffectPriors:
+        """Return the statements on sensors with all effects off."""
+        return EffectPriors({one: EffectPrior(0.0) for one in EffectId}, self.sensors)
+
 
 @dataclass(frozen=True, eq=False)
 class InputColumns:

@@ -175,12 +175,12 @@ def _conclude(
     fit: LikelihoodFit,
     base: _Expansion,
     shown: Collection[Group],
-    second: FloatArray,
+    last: FloatArray,
     evidence: Mapping[Group, GroupEvidence],
 ) -> Correction:
     """Form values and covariances at the last expansion."""
     step, chosen = base.take_step(), base.take_step(shown)
-    size = second.size
+    size = last.size
     rest = step.moves - chosen.moves
     extra = _compute_model_spread(fit)
     values = fit.mean.values + base.point.values - fit.point.values + chosen.moves
@@ -189,7 +189,7 @@ def _conclude(
         step.covariance[:size, :size] + np.outer(rest, rest) + extra,
         _compute_noise(base.normal, step) + extra,
         step,
-        second,
+        last,
         evidence,
     )
 

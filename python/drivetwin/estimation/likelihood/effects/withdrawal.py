@@ -52,10 +52,13 @@ def find_unreliable(
     chi2 = correction.step.chi2
     if chi2 > WITHDRAWAL.chi2:
         return [report(Code.RESIDUAL_UNEXPLAINED, chi2=chi2)]
-    found = []
+    if not np.all(np.isfinite(correction.last)):
+        return [report(Code.EFFECT_NOT_LINEAR, name) for name in ids]
     last = np.abs(jacobian @ correction.last)
-    for k in np.flatnonzero(~(last <= WITHDRAWAL.last_step * std)):
-        found.append(report(Code.EFFECT_NOT_LINEAR, ids[int(k)]))
+    found = [
+        report(Code.EFFECT_NOT_LINEAR, ids[int(k)])
+        for k in np.flatnonzero(last > WITHDRAWAL.last_step * std)
+    ]
     for group in find_large_groups(correction):
         moves = np.abs(jacobian @ correction.step.contributions[group])
         found += [
@@ -71,7 +74,7 @@ def compute_doubt(correction: Correction, jacobian: FloatArray) -> FloatArray:
     That is the last step, and the moves by groups beyond their priors. The interval of a value
     that is withdrawn reaches back over them.
     """
-    moves = [correction.last]
+    moves = [np.nan_to_num(correction.last, posinf=0.0)]
     moves += [correction.step.contributions[one] for one in find_large_groups(correction)]
     return np.asarray(np.linalg.norm([jacobian @ one for one in moves], axis=0))
 
