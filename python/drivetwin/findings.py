@@ -43,6 +43,8 @@ class Code(StrEnum):
     AT_LARGEST_NUMBER = auto()
     AT_ONE_NUMBER = auto()
     COARSE_RESOLUTION = auto()
+    CHANNEL_FILLED = auto()
+    FILLING_UNKNOWN = auto()
     FINAL_DRIVE_DIFFERS = auto()
     TORQUES_DIFFER = auto()
     CLOCK_LATE = auto()

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.rich_display import DisplayMixin
+from drivetwin.channels.filling import Filling
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.update_raster import find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
@@ -81,6 +82,8 @@ class Channel:
     `time` (n,) in s strictly increasing; `values` (n,) in SI. `source_name` and `source_unit`
     are as in the file. `held` marks a slow signal that the logger repeated on a faster time base.
     `late` [s] is how much older than its stamp a value may be, as a row of a coarse table.
+    `filling` is how another tool had filled the channel up; where its knots are known they are the
+    samples of this channel, else the recorded samples are.
     """
 
     role: str
@@ -91,6 +94,7 @@ class Channel:
     source_unit: str
     held: bool = False
     late: float = 0.0
+    filling: Filling | None = None
 
     @property
     def step(self) -> float:

@@ -29,7 +29,11 @@ from drivetwin.logs.quality.consistency_checks import (
 )
 from drivetwin.logs.quality.time_alignment import check_speed_clocks
 from drivetwin.logs.quality.torque_delay import check_torque_delays
-from drivetwin.logs.quality.update_raster import find_raster, mark_late_samples
+from drivetwin.logs.quality.update_raster import (
+    find_raster,
+    mark_late_samples,
+    replace_filling,
+)
 from drivetwin.logs.raw import RawChannel, RawLog, Recording, Window
 from drivetwin.vehicle.card import VehicleCard
 
@@ -186,9 +190,10 @@ def _make_checked_channel(role: str, spec: ChannelSpec, raw: RawChannel, file: s
     """Return the checked channel of a role, and its findings."""
     place = Where(channel=raw.name)
     notes = [report(Code.RECORDING, "", place, text=note) for note in raw.notes]
-    found = check_channel(_convert_channel(role, spec, raw, file), file)
-    held = find_raster(found.channel) is not None
-    findings = (*notes, *_check_unit_override(spec, raw), *found.findings)
+    channel, filled = replace_filling(_convert_channel(role, spec, raw, file))
+    found = check_channel(channel, file)
+    held = channel.filling is None and find_raster(found.channel) is not None
+    findings = (*notes, *_check_unit_override(spec, raw), *filled, *found.findings)
     return Checked(replace(found.channel, held=held), findings)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from drivetwin.channels.filling import Filling, FillKind, find_filling
 from drivetwin.channels.mapping import ChannelSpec, Mapped, infer_candidates, make_spec
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
@@ -97,10 +98,16 @@ def survey_recording(
     }
     looked: list[Column] = []
     faults: list[str] = []
+    filled: list[str] = []
+    mapped = [found[0] for found in candidates.values() if len(found) == 1]
     for index, column in enumerate(columns):
         roles = tuple(role for role, found in candidates.items() if column in found)
         try:
-            looked.append(_make_column(column, recording.load(index), roles))
+            channel = recording.load(index)
+            filling = _find_filling(channel)
+            looked.append(_make_column(column, channel, filling, roles))
+            if filling is not None and column not in mapped:
+                filled.append(_describe_filling(column, filling))
         except DamagedChannelError as fault:
             faults.append(f"{column}: {fault.what}")
     return Survey(
@@ -108,19 +115,38 @@ def survey_recording(
         columns=tuple(looked),
         mapping=mapping,
         options=stated.options,
-        notes=(*recording.warnings, *faults, *_describe_open_roles(candidates, card)),
+        notes=(*recording.warnings, *faults, *filled, *_describe_open_roles(candidates, card)),
     )
 
 
-def _make_column(column: LogColumn, channel: RawChannel, roles: tuple[str, ...]) -> Column:
+def _make_column(
+    column: LogColumn, channel: RawChannel, filling: Filling | None, roles: tuple[str, ...]
+) -> Column:
     return Column(
         name=column.name,
         group=column.group,
         unit=column.unit,
-        rate=_estimate_update_rate(channel),
+        rate=_estimate_update_rate(channel) if filling is None else 1.0 / filling.period,
         range=channel.range,
         gaps=int(np.count_nonzero(~np.isfinite(channel.values))) + channel.pauses,
         roles=roles,
+    )
+
+
+def _find_filling(channel: RawChannel) -> Filling | None:
+    """Return the filling of a column that is evenly and often enough sampled."""
+    sent = _make_channel(channel)
+    if sent is None or find_raster(sent) is not None:
+        return None
+    return find_filling(sent.time, sent.values)
+
+
+def _describe_filling(column: LogColumn, filling: Filling) -> str:
+    if filling.kind is FillKind.UNKNOWN:
+        return f"{column}: filled up by interpolation; the measured samples cannot be found"
+    return (
+        f"{column}: filled up by {filling.kind} interpolation from {1e3 * filling.period:.4g} ms "
+        f"to {1e3 * filling.step:.4g} ms; only the measured samples are used"
     )
 
 
@@ -129,10 +155,16 @@ def _estimate_update_rate(channel: RawChannel) -> float | None:
     step = channel.step
     if step is None or step <= 0.0:
         return None
-    is_ordered = np.isfinite(channel.time).all() and np.all(np.diff(channel.time) > 0.0)
-    sent = Channel("", Quantity.FRACTION, channel.time, channel.values, channel.name, "")
-    raster = find_raster(sent) if is_ordered else None
+    sent = _make_channel(channel)
+    raster = None if sent is None else find_raster(sent)
     return 1.0 / (step if raster is None else raster.period)
+
+
+def _make_channel(channel: RawChannel) -> Channel | None:
+    """Build a channel of a column; None without rising time stamps."""
+    if not np.isfinite(channel.time).all() or not np.all(np.diff(channel.time) > 0.0):
+        return None
+    return Channel("", Quantity.FRACTION, channel.time, channel.values, channel.name, "")
 
 
 def _describe_open_roles(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Update raster of recorded channels, and tables whose rows show values late."""
+"""Update raster of recorded channels, filled ones, and tables whose rows show values late."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.channels import update_raster
+from drivetwin.channels.filling import FillKind, find_filling
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.channels.update_raster import UpdateRaster
@@ -24,6 +25,32 @@ def find_raster(channel: Channel) -> UpdateRaster | None:
     if channel.quantity is Quantity.STATE:
         return None
     return update_raster.find_raster(channel.time, channel.values)
+
+
+def replace_filling(channel: Channel) -> tuple[Channel, list[Finding]]:
+    """Reduce a channel that another tool filled up to its measured samples; return it and findings.
+
+    Comes before all other checks, which know the noise of measured samples only.
+    """
+    if channel.quantity in AUXILIARY or find_raster(channel) is not None:
+        return channel, []
+    filling = find_filling(channel.time, channel.values)
+    if filling is None:
+        return channel, []
+    if filling.kind is FillKind.UNKNOWN:
+        return replace(channel, filling=filling), [report(Code.FILLING_UNKNOWN, "", channel.place)]
+    period, step = Number(filling.period, "s"), Number(filling.step, "s")
+    measured = replace(channel, time=filling.time, values=filling.values, filling=filling)
+    return measured, [
+        report(
+            Code.CHANNEL_FILLED,
+            "",
+            channel.place,
+            period=period,
+            step=step,
+            kind=filling.kind.value,
+        )
+    ]
 
 
 def mark_late_samples(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Recognition of channels that another tool filled up, and their measured samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.channels.filling import FillKind, find_filling
+
+STEP = 1e-3
+NOISE = 0.3
+
+
+def measure_speed(time: FloatArray, seed: int, noise: float = NOISE) -> FloatArray:
+    """Return a speed [rpm] that falls in a shift and rings afterwards, with white noise."""
+    level = 1500.0 + 60.0 * time - 250.0 / (1.0 + np.exp(-(time - 2.0) / 0.05))
+    ring = 5.0 * np.exp(-np.clip(time - 2.2, 0.0, None) * 4.0) * np.sin(75.0 * time) * (time > 2.2)
+    return level + ring + noise * np.random.default_rng(seed).standard_normal(time.size)
+
+
+def fill(knots: FloatArray, values: FloatArray, kind: str, time: FloatArray) -> FloatArray:
+    """Interpolate measured samples onto a faster table, with an interpolant of SciPy."""
+    if kind == "linear":
+        return np.interp(time, knots, values)
+    if kind == "spline":
+        return CubicSpline(knots, values)(time)
+    if kind == "pchip":
+        return PchipInterpolator(knots, values)(time)
+    return Akima1DInterpolator(knots, values, method="makima")(time)
+
+
+def check_filling(
+    factor: float, kind: str, phase: float = 0.0, decimals: int = 6, seed: int = 0
+) -> None:
+    """Compare the knots that are found with those that were filled."""
+    knots = np.arange(phase * STEP, 5.0, factor * STEP)
+    values = measure_speed(knots, seed)
+    time = np.arange(np.ceil(phase), 4900.0) * STEP
+    found = find_filling(time, np.round(fill(knots, values, kind, time), decimals))
+    assert found is not None
+    assert found.kind is (FillKind.LINEAR if kind == "linear" else FillKind.CUBIC)
+    assert found.period == pytest.approx(factor * STEP, rel=1e-3)
+    assert found.time.size == pytest.approx(4.9 / (factor * STEP), rel=0.02)
+    # Instants and values: those that were measured, within what the rounding hides.
+    truth = np.interp(found.time, knots, values)
+    inner = slice(5, -5)
+    assert np.std((found.values - truth)[inner]) < max(0.7 * 10.0**-decimals, 0.02 * NOISE)
+
+
+@pytest.mark.parametrize("factor", [2, 3, 10, 20, 7.5])
+@pytest.mark.parametrize("kind", ["linear", "spline", "pchip", "makima"])
+def test_finds_the_measured_samples(factor: float, kind: str) -> None:
+    """Any ratio of rates, also one that does not divide."""
+    check_filling(factor, kind)
+
+
+@pytest.mark.parametrize("kind", ["linear", "spline", "pchip"])
+def test_finds_knots_behind_rounding(kind: str) -> None:
+    """Rounding after filling, to a third of the noise."""
+    check_filling(10, kind, phase=3, decimals=1)
+
+
+@pytest.mark.parametrize(
+    ("factor", "phase"), [(2, 1.0), (5, 0.3), (8, 1.5), (10, 0.7), (12.5, 0.9), (25, 1.1)]
+)
+def test_finds_linear_knots_anywhere(factor: float, phase: float) -> None:
+    """Knots between the samples of the table as well."""
+    check_filling(factor, "linear", phase=phase, seed=1)
+
+
+@settings(max_examples=25)
+@given(
+    seed=st.integers(0, 1000),
+    step=st.sampled_from([0.0, 0.03, 0.3, 3.0]),
+    rate=st.sampled_from([1, 10]),
+)
+def test_leaves_measured_samples_alone(seed: int, step: float, rate: int) -> None:
+    """A channel that was sampled at each row, rounded or not."""
+    time = np.arange(0.0, 5.0, rate * STEP)
+    values = measure_speed(time, seed)
+    values = np.round(values / step) * step if step else values
+    assert find_filling(time, values) is None
+
+
+def test_finds_knots_of_messages_that_jitter() -> None:
+    """Messages arrive unevenly; lines meet where they arrived."""
+    rng = np.random.default_rng(3)
+    knots = np.arange(0.0, 5.0, 0.01) + rng.uniform(-2e-3, 2e-3, 500)
+    values = measure_speed(knots, 3)
+    time = np.arange(0.01, 4.9, STEP)
+    found = find_filling(time, np.interp(time, knots, values))
+    assert found is not None
+    assert found.kind is FillKind.LINEAR
+    nearest = np.abs(found.time[1:-1, np.newaxis] - knots).min(axis=1)
+    assert np.quantile(nearest, 0.95) < 1e-4
+
+
+def test_names_a_filling_without_knots() -> None:
+    """Uneven cubic pieces are no samples, nor can their knots be told."""
+    rng = np.random.default_rng(4)
+    knots = np.cumsum(rng.uniform(1.2e-3, 2.9e-3, 2600))
+    time = np.arange(0.01, 4.9, STEP)
+    found = find_filling(time, np.interp(time, knots, measure_speed(knots, 4)))
+    assert found is None or found.kind is FillKind.UNKNOWN
+
+
+def test_rest_is_not_filled() -> None:
+    """A signal at one number has no knots."""
+    time = np.arange(0.0, 5.0, STEP)
+    assert find_filling(time, np.zeros(time.size)) is None
+
+
+def test_ignores_missing_values() -> None:
+    """Rows without a value are no samples."""
+    knots = np.arange(0.0, 5.0, 0.01)
+    time = np.arange(0.0, 4.9, STEP)
+    values = np.interp(time, knots, measure_speed(knots, 5))
+    values[1000:1100] = np.nan
+    found = find_filling(time, values)
+    assert found is not None
+    assert found.period == pytest.approx(0.01)
+    assert np.isfinite(found.values).all()
