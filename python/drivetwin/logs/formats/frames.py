@@ -47,6 +47,9 @@ class Signal:
 PAYLOAD, LONGEST = 8, 64
 """Most data bytes of a classical frame, and of one of CAN FD."""
 
+FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""Data bytes by the length code of CAN FD."""
+
 
 @dataclass(frozen=True, eq=False)
 class Frames:

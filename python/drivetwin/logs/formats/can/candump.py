@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
 
-_STAMP = rb"^[ \t]*\((?P<time>(?:\d{4}-\d{2}-\d{2} \d{2}:\d{2}:)?\d{1,12}\.\d{1,9})\)[ \t]+"
+_STAMP = rb"^[ \t]*\((?P<time>(?:\d{4}-\d{2}-\d{2} \d{2}:\d{2}:)?-?\d{1,12}\.\d{1,9})\)[ \t]+"
 _LINE = re.compile(
     _STAMP + rb"(?P<bus>[\w.:-]+)[ \t]+"
     rb"(?:(?:RX|TX|[-BE]{2})[ \t]+(?:[-BE]{2}[ \t]+)?)?(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})"

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
+from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.errors import FileFormatError, Where
+from drivetwin.errors import FileFormatError
 from drivetwin.logs.formats.frames import Signal
 
 Bytes = NDArray[np.uint8]
@@ -40,10 +41,7 @@ def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:
     messages: list[Message] = []
     for path in paths:
         cantools = import_extra("cantools.database", "can", "decoding a bus log", path)
-        if not path.is_file():
-            raise FileFormatError(
-                "there is no such DBC file", "correct dbc under [bus]", Where(file=str(path))
-            )
+        measure_regular_file(path, FileFormatError, "correct dbc under [bus]")
         with handle_parser_errors("a DBC file", path):
             text = path.read_text(encoding="cp1252", errors="replace")
             content = cantools.load_string(text, "dbc", strict=False)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib.resources import as_file, files
@@ -15,22 +15,36 @@ from drivetwin.logs.formats.can.blf import read_blf
 from drivetwin.logs.formats.can.candump import is_candump, read_candump
 from drivetwin.logs.formats.can.database import Message, read_database
 from drivetwin.logs.formats.can.recording import BusRecording
+from drivetwin.logs.formats.can.trc import is_trc, read_trc
 from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.raw import Recording
 
 
+_HEAD = 8192
+"""Number of bytes used to detect a format."""
+
+_TEXT_FORMATS: tuple[tuple[Callable[[bytes], bool], Callable[[bytes, str], Frames]], ...] = (
+    (is_trc, read_trc),
+    (is_candump, read_candump),
+    (is_asc, read_asc),
+)
+"""Test of the first bytes, and reader, of each bus log in text form."""
+
+
 def is_bus_text(head: bytes) -> bool:
     """Return True if the first bytes of a file are a bus log in text form."""
-    return is_candump(head) or is_asc(head)
+    return any(fits(head) for fits, _ in _TEXT_FORMATS)
 
 
 @contextmanager
 def open_bus_text(path: Path, options: ReadOptions) -> Iterator[Recording]:
-    """Open a candump or ASC log; raises FileFormatError, MissingExtraError, MissingChannelError."""
+    """Open a bus log in text form.
+
+    Raises FileFormatError, MissingExtraError, MissingChannelError.
+    """
     data = path.read_bytes()
-    read = read_candump if is_candump(data[:8192]) else read_asc
-    frames = read(data, str(path))
-    yield decode_recording(frames, options, path)
+    read = next(read for fits, read in _TEXT_FORMATS if fits(data[:_HEAD]))
+    yield decode_recording(read(data, str(path)), options, path)
 
 
 @contextmanager
