@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -17,6 +18,7 @@ from drivetwin.logs.formats.can.database import Message, read_database
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.trc import is_trc, read_trc
 from drivetwin.logs.formats.frames import Frames
+from drivetwin.logs.formats.j1939.matching import match_groups
 from drivetwin.logs.raw import Recording
 
 
@@ -55,7 +57,10 @@ def open_blf(path: Path, options: ReadOptions) -> Iterator[Recording]:
 
 def decode_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
     """Decode frames by the databases stated; raises MissingChannelError, MissingExtraError."""
-    return BusRecording(frames, _select_messages(options.bus.databases), options.bus, path)
+    stated = _select_messages(options.bus.databases)
+    messages, notes = match_groups(frames, stated, _load_j1939_messages)
+    frames = replace(frames, warnings=(*frames.warnings, *notes))
+    return BusRecording(frames, messages, options.bus, path)
 
 
 def _select_messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:
