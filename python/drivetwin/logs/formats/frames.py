@@ -20,7 +20,7 @@ class Signal:
     `start` is the bit as a DBC counts it (least significant bit for Intel, most significant for
     Motorola order). `limits` are the least and greatest value that is one, None where the database
     states none. `selector` is the code of the multiplexer (start, length) that admits the signal.
-    `spn` is its SAE J1939 number.
+    `spn` is its SAE J1939 number. `texts` are the codes that the database names.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Signal:
     limits: tuple[float, float] | None = None
     selector: tuple[Signal, frozenset[int]] | None = None
     spn: int | None = None
+    texts: tuple[tuple[int, str], ...] = ()
 
     @property
     def end(self) -> int:

@@ -16,6 +16,7 @@ from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError
 from drivetwin.logs.formats.frames import Signal
+from drivetwin.logs.formats.number_texts import select_numbers
 
 Bytes = NDArray[np.uint8]
 _MOST_BITS = 56
@@ -80,6 +81,7 @@ def _convert_signal(source: Any, by_name: dict[str, Any]) -> Signal:
         limits=(float(low), float(high)) if stated else None,
         selector=selector,
         spn=source.spn,
+        texts=tuple((int(code), str(text)) for code, text in (source.choices or {}).items()),
     )
 
 
@@ -104,13 +106,29 @@ def decode_codes(data: Bytes, signal: Signal) -> NDArray[np.int64]:
 
 
 def decode_physical(data: Bytes, signal: Signal) -> FloatArray:
-    """Return the values (n,) of a signal in its unit; ValueError as in `codes`."""
+    """Return the values (n,) of a signal in its unit; ValueError as in `decode_codes`.
+
+    Texts of the database that are numbers are the values of their codes, NaN where others beside
+    them are none.
+    """
     if signal.is_float:
         return signal.scale * _decode_floats(data, signal) + signal.offset
     raw = decode_codes(data, signal)
     if signal.signed:
         raw = np.where(raw >> (signal.length - 1), raw - (1 << signal.length), raw)
-    return signal.scale * raw.astype(np.float64) + signal.offset
+    values = signal.scale * raw.astype(np.float64) + signal.offset
+    named = _find_number_texts(signal)
+    for code, number in zip((code for code, _ in signal.texts), named, strict=False):
+        values[raw == code] = number
+    return values
+
+
+def _find_number_texts(signal: Signal) -> FloatArray:
+    """Return the value of each named code, NaN without one; empty where names are no values."""
+    codes = np.array([code for code, _ in signal.texts], np.float64)
+    physical = signal.scale * codes + signal.offset
+    found = select_numbers([text for _, text in signal.texts], physical)
+    return np.empty(0) if found is None else found.values
 
 
 def _decode_floats(data: Bytes, signal: Signal) -> FloatArray:

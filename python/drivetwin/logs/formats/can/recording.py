@@ -117,6 +117,10 @@ class BusRecording:
             if check.note:
                 notes.append(check.note)
             there[there] = check.valid
+        named = there & np.isnan(values) if signal.texts else np.zeros_like(there)
+        if named.any():
+            notes.append(f"{int(named.sum())} samples whose text is no number left out")
+            there &= ~named
         again = _find_repeats(track) & there
         if again.any():
             notes.append(f"{int(again.sum())} repeated frames, or with an earlier stamp, left out")
