@@ -86,7 +86,7 @@ def read_candump(data: bytes, file: str) -> Frames:
 
 def _parse_seconds(stamp: bytes) -> float | None:
     """A stamp [s], counted from 1970 where it is a date; None for a date that does not exist."""
-    if b"-" not in stamp:
+    if b":" not in stamp:
         return float(stamp)
     day, _, seconds = stamp.rpartition(b":")
     try:
