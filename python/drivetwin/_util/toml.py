@@ -23,9 +23,8 @@ MAX_DEPTH = 50
 MAX_TEXT = 100_000
 """Longest text or key [characters]."""
 
-_LONG_KEY = re.compile(
-    r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}""" % MAX_DEPTH, re.ASCII
-)
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}", re.ASCII)
 """A key of many parts, which takes the parser a time that grows with the square of their number."""
 
 

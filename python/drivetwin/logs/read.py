@@ -53,16 +53,17 @@ def read_log(
 
     Columns come from the `mapping` file, else from the card's [channels], else by name. `needed`
     are the roles that must exist (or their stand-in: engine for input speed, wheel for output
-    speed); what else there is comes along. A channel that cannot be used refuses the log if its
-    role is needed or one of `sound`, else it is left out and listed. By default all measured roles
-    must be `sound`, but for an engine speed beside an input speed and a card without a converter;
-    pedal, gear and flags only if they are mapped. Only mapped columns are read, in a `window` (first and
+    speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
     last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
     `card` no column is a pressure, and nothing is compared with the gearing.
 
-    Damaged samples are left out and listed in `findings`. Nothing is replaced. Raises FileFormatError, MissingExtraError,
-    MissingChannelError, MappingError, UnitError, TimeError, DamagedChannelError,
-    PlausibilityError; each contains a remedy.
+    A channel that cannot be used refuses the log if its role is needed or one of `sound`, else it
+    is left out and listed in `findings`. By default `sound` are all measured roles, without an
+    engine speed beside an input speed unless the card has a converter; pedal, gear and flags if
+    they are mapped. Damaged samples are left out and listed. Nothing is replaced.
+
+    Raises FileFormatError, MissingExtraError, MissingChannelError, MappingError, UnitError,
+    TimeError, DamagedChannelError, PlausibilityError; each contains a remedy.
     """
     path = Path(path)
     stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
@@ -134,7 +135,7 @@ def _select_strict_roles(
         STAND_INS[role] for role in needed if role in STAND_INS and role not in mapped
     }
     if sound is not None:
-        return frozenset(mapped).intersection(strict.union(sound))
+        return frozenset(mapped).intersection(strict | frozenset(sound))
     has_converter = card is not None and card.converter is not None
     spare = {"engine_speed"} if "input_speed" in mapped and not has_converter else set()
     usual = {role for role in mapped if role in specs or get_quantity(role) not in AUXILIARY}

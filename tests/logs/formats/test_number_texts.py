@@ -55,7 +55,7 @@ def read_mdf(folder: Path, table: dict[str, Any], codes: Any = CODES, kind: str 
 
 
 def first(channel: RawChannel) -> list[float]:
-    return channel.values[:4].tolist()
+    return [float(value) for value in channel.values[:4]]
 
 
 @pytest.mark.parametrize("kind", ["3.30", "4.10"])
@@ -67,7 +67,7 @@ def test_value_to_text(tmp_path: Path, kind: str) -> None:
 
 
 def test_the_table_of_texts_of_mdf_3(tmp_path: Path) -> None:
-    pairs = {"param_val_0": 3.0, "text_0": b"2", "param_val_1": 4.0, "text_1": b"3"}
+    pairs: dict[str, Any] = {"param_val_0": 3.0, "text_0": b"2", "param_val_1": 4.0, "text_1": b"3"}
     made = asammdf.Signal(samples=CODES, timestamps=np.arange(CODES.size) * 0.01, name="g")
     made.conversion = asammdf.blocks.v2_v3_blocks.ChannelConversion(
         conversion_type=11, ref_param_nr=2, unit=b"", **pairs

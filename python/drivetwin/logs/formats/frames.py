@@ -45,6 +45,17 @@ class Signal:
         return self.start // 8 + (7 - self.start % 8 + self.length + 7) // 8
 
 
+@dataclass(frozen=True)
+class Message:
+    """A message: `identifier` of 11 bits, or 29 if `extended`; `j1939`: only its group counts."""
+
+    name: str
+    identifier: int
+    extended: bool
+    j1939: bool
+    signals: tuple[Signal, ...]
+
+
 PAYLOAD, LONGEST = 8, 64
 """Most data bytes of a classical frame, and of one of CAN FD."""
 

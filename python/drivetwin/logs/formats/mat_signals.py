@@ -69,8 +69,13 @@ class _Search:
             exported = split_asammdf_name(name, vectors)
             if exported is not None:
                 own, group, time = exported
-                pair, factor = (vectors[time], values), self._get_seconds_factor(time, tree)
-                self._add_channel(prefix + own, _get_unit(name, tree), pair, factor, group)
+                self._add_channel(
+                    prefix + own,
+                    _get_unit(name, tree),
+                    (vectors[time], values),
+                    self._get_seconds_factor(time, tree),
+                    group,
+                )
                 continue
             stamps_of = times.get(name)
             if stamps_of is None:

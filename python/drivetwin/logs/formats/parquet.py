@@ -125,9 +125,9 @@ class ParquetRecording:
         kind = self._table.schema_arrow.field(field).type
         if pa.types.is_timestamp(kind):
             ticks = self._load_ticks(field, where)
-            return (ticks - ticks[:1]) * _TICKS[kind.unit]
+            return (ticks - ticks[:1]).astype(np.float64) * _TICKS[kind.unit]
         if pa.types.is_duration(kind) or pa.types.is_time(kind):
-            stamps = self._load_ticks(field, where) * _TICKS[kind.unit]
+            stamps = self._load_ticks(field, where).astype(np.float64) * _TICKS[kind.unit]
         else:
             factor = get_time_factor(asserted if asserted is not None else column.unit, where)
             values, present = self._load_numbers(field, where)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.read_options import BusOptions, ReadOptions
-from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError
+from drivetwin.errors import DamagedChannelError, MissingChannelError
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw

@@ -14,7 +14,6 @@ from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
 
-
 _RANGE = 2.0**64 * 1e-9
 """Time [s] after which 64 bits of nanoseconds start again."""
 

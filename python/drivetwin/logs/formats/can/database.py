@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,23 +14,12 @@ from drivetwin._util.optional_dependencies import handle_parser_errors, import_e
 from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.frames import Signal
+from drivetwin.logs.formats.frames import Message, Signal
 from drivetwin.logs.formats.number_texts import select_numbers
 
 Bytes = NDArray[np.uint8]
 _MOST_BITS = 56
 """Longer integers do not fit float64 exactly and carry no physical quantity."""
-
-
-@dataclass(frozen=True)
-class Message:
-    """A message: `identifier` of 11 bits, or 29 if `extended`; `j1939`: only its group counts."""
-
-    name: str
-    identifier: int
-    extended: bool
-    j1939: bool
-    signals: tuple[Signal, ...]
 
 
 def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:

@@ -14,13 +14,12 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.logs.formats.can.asc import is_asc, read_asc
 from drivetwin.logs.formats.can.blf import read_blf
 from drivetwin.logs.formats.can.candump import is_candump, read_candump
-from drivetwin.logs.formats.can.database import Message, read_database
+from drivetwin.logs.formats.can.database import read_database
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.trc import is_trc, read_trc
-from drivetwin.logs.formats.frames import Frames
+from drivetwin.logs.formats.frames import Frames, Message
 from drivetwin.logs.formats.j1939.matching import match_groups
 from drivetwin.logs.raw import Recording
-
 
 _HEAD = 8192
 """Number of bytes used to detect a format."""

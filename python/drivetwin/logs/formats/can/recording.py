@@ -15,12 +15,11 @@ from drivetwin.channels.read_options import BusOptions, Column
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError, MissingChannelError, Where
 from drivetwin.logs.formats.can.database import (
-    Message,
     decode_codes,
     decode_physical,
     select_valid_payloads,
 )
-from drivetwin.logs.formats.frames import Frames, Signal
+from drivetwin.logs.formats.frames import Frames, Message, Signal
 from drivetwin.logs.formats.j1939 import torque
 from drivetwin.logs.formats.j1939.codes import check_codes
 from drivetwin.logs.formats.j1939.identifier import (

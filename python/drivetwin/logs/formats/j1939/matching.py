@@ -12,8 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.logs.formats.can.database import Message
-from drivetwin.logs.formats.frames import Frames, Signal
+from drivetwin.logs.formats.frames import Frames, Message, Signal
 from drivetwin.logs.formats.j1939.identifier import (
     decode_group,
     decode_receiver,

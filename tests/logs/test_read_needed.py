@@ -43,7 +43,7 @@ def for_shifts(folder: Path, table: Table, units: dict[str, str]) -> ShiftLog:
 @pytest.mark.parametrize("name", ["TrqOut", "SpdWhl", "EngTrq", "PrsBrk2"])
 def test_a_channel_that_is_not_needed_is_left_out(tmp_path: Path, kind: str, name: str) -> None:
     log = for_shifts(tmp_path, *damage(kind, name))
-    left_out = [one.where.channel for one in log.findings if one.code is Code.CHANNEL_LEFT_OUT]
+    left_out = [one.place.channel for one in log.findings if one.code is Code.CHANNEL_LEFT_OUT]
     harmless = (kind, name) in (("dead", "EngTrq"), ("dead", "PrsBrk2"))
     other = {"sign": {"TrqOut": "TrqOut", "EngTrq": "TrqOut"}}.get(kind, {}).get(name, name)
     assert left_out == ([] if harmless else [other])
