@@ -106,6 +106,12 @@ def test_each_version(
     assert found.warnings == ((f"{other} remote or error frames left out",) if other else ())
 
 
+def test_a_mark_of_utf8_and_commas_in_stamps() -> None:
+    found = read("\ufeff" + VERSION_1_1.replace(".0 ", ",0 ").replace(".8 ", ",8 "))
+    assert found.time * 1e3 == pytest.approx([-1.8, 18.0, 22.9])
+    assert found.warnings == ("3 remote or error frames left out",)
+
+
 def test_bus_and_kind_of_identifier() -> None:
     found = read(VERSION_1_2)
     assert [found.buses[k] for k in found.bus] == ["channel 0", "channel 1"]

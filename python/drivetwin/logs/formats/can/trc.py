@@ -12,12 +12,13 @@ import re
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.frames import FD_LENGTHS, LONGEST, Frames, build_frames
 
+_BOM = b"\xef\xbb\xbf"
 _HEAD = re.compile(rb"^\s*;\$FILEVERSION\s*=", re.IGNORECASE)
 _COLUMNS = re.compile(rb"^;\$COLUMNS\s*=\s*([A-Za-z]+(?:\s*,\s*[A-Za-z]+)*)", re.MULTILINE)
 _STATED = 65536
 """Bytes in which the columns are stated."""
 
-_TIME = rb"(?P<time>[-+]?\d{1,15}(?:\.\d{1,6})?)"
+_TIME = rb"(?P<time>[-+]?\d{1,15}(?:[.,]\d{1,6})?)"
 _IDENTIFIER = rb"(?P<id>[0-9A-F]{3,8})"
 _DATA = rb"(?P<data>(?:[ \t]*[0-9A-F]{2})*)"
 _FLAGS = re.MULTILINE | re.IGNORECASE
@@ -52,7 +53,7 @@ _MOST = {False: 0x7FF, True: 0x1FFFFFFF}
 
 def is_trc(head: bytes) -> bool:
     """Return True if the first bytes of a file are a trace; version 1.0 does not state its name."""
-    head = head.removeprefix(b"\xef\xbb\xbf")
+    head = head.removeprefix(_BOM)
     named = _HEAD.match(head) is not None
     return named or (head.lstrip().startswith(b";") and _VERSION_1.search(head) is not None)
 
@@ -62,6 +63,7 @@ def read_trc(data: bytes, file: str) -> Frames:
 
     Raises FileFormatError without a single frame, and where the columns do not hold frames.
     """
+    data = data.removeprefix(_BOM)
     stated = _COLUMNS.search(data[:_STATED])
     line = _VERSION_1 if stated is None else _compile_line(stated[1], file)
     other = _OTHER_1 if stated is None else _compile_other(stated[1])
@@ -73,7 +75,7 @@ def read_trc(data: bytes, file: str) -> Frames:
         length = FD_LENGTHS[min(code, 15)] if stated_length is None else int(stated_length)
         identifier, extended = int(part["id"], 16), len(part["id"]) > 4
         if len(payload) == length <= LONGEST and identifier <= _MOST[extended]:
-            time = float(part["time"]) * 1e-3
+            time = float(part["time"].replace(b",", b".")) * 1e-3
             bus = f"channel {int(part.get('bus') or 1) - 1}"
             rows.append((time, identifier, extended, payload, bus))
     if not rows:
