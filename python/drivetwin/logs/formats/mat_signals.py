@@ -25,6 +25,9 @@ _NAME_FIELDS = ("name", "Name", "label", "title")
 _ENOUGH = 10
 """Rows from which a matrix of two columns may be a signal with its time."""
 
+_REFERENCE = 0xDD000000
+"""First number of a reference to an object of version 7.3."""
+
 _DEPTH = 12
 """Structs nested deeper than this are no log."""
 
@@ -277,13 +280,13 @@ class _Search:
         elif isinstance(value, np.ndarray) and value.ndim > 1:
             shape = "×".join(map(str, value.shape))
             self.found.unreadable[name] = f"a matrix {shape}: one vector for each signal is needed"
-        elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
+        elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction") or _is_closed(value):
             self.found.unreadable[name] = _describe_object(value)
 
 
 def _to_vector(value: Any) -> FloatArray | None:
     """A real numeric vector of two or more samples as (n,) float64, else None."""
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufb":
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufb" or _is_closed(value):
         return None
     squeezed = value.squeeze()
     return squeezed.astype(np.float64) if squeezed.ndim == 1 and squeezed.size > 1 else None
@@ -326,9 +329,15 @@ def _to_index(value: Any) -> int:
     return int(number) if number.is_integer() else 0
 
 
+def _is_closed(value: Any) -> bool:
+    """Return True for the reference that version 7.3 has in place of an object."""
+    is_array = isinstance(value, np.ndarray) and value.dtype == np.uint32 and value.size > 1
+    return is_array and int(value.reshape(-1)[0]) == _REFERENCE
+
+
 def _describe_object(value: Any) -> str:
     """Words for a closed object, with its class and the remedy for a time."""
-    names = getattr(value, "dtype", np.dtype(float)).names or ()
+    names = value.dtype.names or () if isinstance(value, np.ndarray) else ()
     kind = bytes(value["s2"].reshape(-1)[0]).decode("utf-8", "replace") if "s2" in names else ""
     remedy = {"duration": "seconds(x)", "datetime": "posixtime(x)"}.get(kind)
     words = f"a closed MATLAB object{f' ({kind})' if kind else ''}"

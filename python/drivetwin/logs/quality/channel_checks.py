@@ -120,7 +120,8 @@ def check_channel(channel: Channel, file: str) -> Checked:
     """
     where = Where(file=file, channel=channel.source_name)
     findings: list[Finding] = []
-    channel = _drop_damage(channel, _find_repeated_stamps(channel.time), findings)
+    repeated = _find_repeated_stamps(channel.time)
+    channel = _drop_damage(channel, repeated, findings, Where())
     check_order(channel.time, where)
     _check_count(channel, channel.time.size, where)
     _check_rate(channel, where)
@@ -273,11 +274,16 @@ def _has_sensor_noise(channel: Channel) -> bool:
     return channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
 
 
-def _drop_damage(channel: Channel, damage: Damage | None, findings: list[Finding]) -> Channel:
-    """Drop the damaged samples and add a finding."""
+def _drop_damage(
+    channel: Channel, damage: Damage | None, findings: list[Finding], place: Where | None = None
+) -> Channel:
+    """Drop the damaged samples and add a finding, by default on the channel.
+
+    A finding on the stamps has no channel: those of a table share them, and it stands once.
+    """
     if damage is None:
         return channel
-    findings.append(damage.report(channel.time, channel.place))
+    findings.append(damage.report(channel.time, channel.place if place is None else place))
     keep = ~damage.mask
     return replace(channel, time=channel.time[keep], values=channel.values[keep])
 
