@@ -146,7 +146,7 @@ def test_complex_numbers_are_told(tmp_path: Path) -> None:
     assert set(raw.unreadable.values()) == {"complex numbers: export their real part"}
 
 
-def test_objects_are_told(tmp_path: Path) -> None:
+def test_objects_are_told() -> None:
     reference = np.array([0xDD000000, 2, 1, 1, 1, 1], np.uint32)
     opaque = np.array(
         [(b"t", b"MCOS", b"duration", reference)],
