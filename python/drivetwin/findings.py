@@ -32,6 +32,7 @@ class Code(StrEnum):
     UNIT_OVERRIDDEN = auto()
     CHANNEL_LEFT_OUT = auto()
     NO_SAMPLES = auto()
+    STAMPS_REPEATED = auto()
     SAMPLES_MISSING = auto()
     SPIKES = auto()
     GLITCHES = auto()

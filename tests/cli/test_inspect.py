@@ -143,6 +143,31 @@ def test_why_a_log_is_refused_is_told_and_the_columns_all_the_same(
     assert len(found["columns"]) == 7
     assert found["refusal"]["type"] == "TimeError"
     assert main(["shifts", *arguments, "--json"]) == 2
-    assert json.loads(capsys.readouterr().out)["error"] == found["refusal"]
+    refusal = json.loads(capsys.readouterr().out)["error"]
+    assert (refusal["type"], refusal["what"]) == ("TimeError", found["refusal"]["what"])
     assert main(["inspect", *arguments]) == 0
     assert "shifts and identify refuse this log" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [("SpdIn", "shifts and identify refuse this log"), ("TrqOut", "identify refuses this log")],
+)
+def test_the_commands_that_refuse_a_log_are_named(
+    bench_files: Files,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    column: str,
+    words: str,
+) -> None:
+    log = tmp_path / "log.csv"
+    names, units, *rows = bench_files.log.read_text().splitlines()
+    place = names.split(",").index(column)
+    cells = [row.split(",") for row in rows]
+    for row in cells:
+        row[place] = "0.0"
+    log.write_text("\n".join([names, units, *(",".join(row) for row in cells)]) + "\n")
+    arguments = [str(log), "--vehicle", str(bench_files.card)]
+    assert main(["inspect", *arguments]) == 0
+    assert words in " ".join(capsys.readouterr().out.split())
+    assert main(["shifts", *arguments]) == (2 if column == "SpdIn" else 0)

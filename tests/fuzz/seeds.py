@@ -143,8 +143,7 @@ def _vector(suffix: str) -> Callable[[Path], bytes]:
         import can
 
         path = folder / f"seed{suffix}"
-        writer = can.ASCWriter(str(path)) if suffix == ".asc" else can.BLFWriter(str(path))
-        with writer:
+        with can.Logger(str(path)) as writer:
             for time, identifier, data in frames():
                 writer.on_message_received(
                     can.Message(
@@ -154,6 +153,18 @@ def _vector(suffix: str) -> Callable[[Path], bytes]:
         return path.read_bytes()
 
     return make
+
+
+def _asc_relative() -> bytes:
+    """The frames with stamps that count from frame to frame."""
+    lines = ["base hex  timestamps relative"]
+    last = 0.0
+    for time, identifier, data in frames():
+        step = round(time - last, 6)
+        last += step
+        text = data.hex(" ").upper()
+        lines.append(f"   {step:.6f} 1  {identifier:X}x  Rx   d {len(data)} {text}")
+    return ("\n".join(lines) + "\n").encode()
 
 
 SEEDS: dict[str, Callable[[Path], bytes]] = {
@@ -169,6 +180,8 @@ SEEDS: dict[str, Callable[[Path], bytes]] = {
     "candump": lambda _: candump(spaced=True),
     "candump-L": lambda _: candump(spaced=False),
     "asc": _vector(".asc"),
+    "asc-relative": lambda _: _asc_relative(),
+    "trc": _vector(".trc"),
     "blf": _vector(".blf"),
 }
 """By format: the bytes of a sound file, written in the folder given."""

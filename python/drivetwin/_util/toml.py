@@ -3,16 +3,29 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from drivetwin._util.regular_file import measure_regular_file
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import InputError, Where
+
+MAX_SIZE = 4_000_000
+"""Largest TOML file [bytes]."""
+MAX_DEPTH = 50
+"""Largest number of nested tables and arrays."""
+MAX_TEXT = 100_000
+"""Longest text or key [characters]."""
+
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}", re.ASCII)
+"""A key of many parts, which takes the parser a time that grows with the square of their number."""
 
 
 class StrictModel(BaseModel):
@@ -34,20 +47,61 @@ class Fault:
 
 def read_toml(path: Path | str, error: type[InputError]) -> dict[str, Any]:
     """Return the document in `path`; raises `error` where it cannot be read or is no TOML."""
+    file, where = Path(path), Where(file=str(path))
+    size = measure_regular_file(file, error)
+    if size > MAX_SIZE:
+        raise error(
+            f"the file has {size / 1e6:.1f} MB, at most {MAX_SIZE / 1e6:g} MB are read",
+            "hand in a TOML file written for this purpose",
+            where,
+        )
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+        return parse_toml(file.read_text(encoding="utf-8-sig"))
     except OSError as fault:
-        raise error(
-            f"cannot read the file: {fault.strerror}", "check the path", Where(file=str(path))
-        ) from None
+        raise error(f"cannot read the file: {fault.strerror}", "check the path", where) from None
     except UnicodeDecodeError:
-        raise error(
-            "the file is no UTF-8 text", "hand in a TOML text file", Where(file=str(path))
-        ) from None
-    except tomllib.TOMLDecodeError as fault:
-        raise error(
-            f"no valid TOML: {fault}", "correct the syntax at that line", Where(file=str(path))
-        ) from None
+        raise error("the file is no UTF-8 text", "hand in a TOML text file", where) from None
+    except ValueError as fault:
+        raise error(f"no valid TOML: {fault}", "correct the syntax there", where) from None
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the document in a text.
+
+    Raises ValueError where the text is no TOML or exceeds the limits on nesting, integers and
+    texts, which no file of this program reaches.
+    """
+    if _LONG_KEY.search(text):
+        raise ValueError(f"a dotted key has more than {MAX_DEPTH} parts")
+    try:
+        document = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("tables or arrays are nested too deep") from None
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError:  # an integer with more digits than Python converts
+        raise ValueError("an integer exceeds 64 bits") from None
+    if (excess := next(_iterate_excess(document), None)) is not None:
+        raise ValueError(excess)
+    return document
+
+
+def _iterate_excess(document: dict[str, Any]) -> Iterator[str]:
+    """Yield a description of each entry beyond the limits."""
+    waiting: list[tuple[Any, tuple[int | str, ...]]] = [(document, ())]
+    while waiting:
+        value, place = waiting.pop()
+        key = format_key_path(part if isinstance(part, int) else part[:40] for part in place)
+        if isinstance(value, (dict, list)):
+            if len(place) >= MAX_DEPTH:
+                yield f"{key[:80]}...: nested deeper than {MAX_DEPTH} levels"
+                return
+            inside = value.items() if isinstance(value, dict) else enumerate(value)
+            waiting += [(item, (*place, name)) for name, item in inside]
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            yield f"{key}: the integer exceeds 64 bits"
+        if any(isinstance(one, str) and len(one) > MAX_TEXT for one in (value, *place[-1:])):
+            yield f"{key}: a text of more than {MAX_TEXT} characters"
 
 
 def validate_schema(document: Mapping[str, Any], model: type[BaseModel]) -> list[Fault]:

@@ -176,15 +176,18 @@ def resolve_roles(
     elements: Mapping[str, str],
     needed: Iterable[str],
     file: str,
+    sound: Iterable[str] | None = None,
 ) -> Mapped:
     """Decide the column of every role from the `columns` of a file.
 
     The `stated` specs take precedence; other roles are inferred. Raises MappingError
-    where a stated column does not exist or a role has several candidates (only a warning for
-    throttle, gear and flags that are not needed), MissingChannelError where a needed role and its
-    stand-in have none.
+    where a stated column does not exist or a role has several candidates (only a warning where the
+    role is neither `needed` nor `sound`, by default all measured ones), MissingChannelError where a
+    needed role and its stand-in have none.
     """
     needed = frozenset(needed)
+    measured = [*MEASURED, *map(make_pressure_role, elements)]
+    strict = needed.union(measured if sound is None else sound)
     _refuse_unknown_elements(stated, elements, file)
     channels = {role: _require_column(role, spec, columns, file) for role, spec in stated.items()}
     free = [one for one in columns if not any(spec.matches(one) for spec in stated.values())]
@@ -197,7 +200,7 @@ def resolve_roles(
             findings += _find_other_senders(candidates[0], columns)
             continue
         named = ", ".join(map(str, candidates))
-        if role in needed or role in MEASURED or get_pressure_element(role) is not None:
+        if role in strict:
             what = f"{role!r} may be any of the columns {named}"
             raise MappingError(what, _suggest_choice(role, candidates), Where(file=file))
         findings.append(report(Code.COLUMN_AMBIGUOUS, role=role, columns=named))

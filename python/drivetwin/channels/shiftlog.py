@@ -22,15 +22,17 @@ from drivetwin.simulation.dual_clutch import LATEST
 
 FloatArray = NDArray[np.float64]
 
-GAP_STEPS = 5.0
-"""A pause of more than this many median steps is a gap: nothing is interpolated across it."""
+GAP_STEPS, GAP_QUANTILE = 5.0, 0.75
+"""A pause of more than so many usual steps is a gap: nothing is interpolated across it. The usual
+step is this quantile: the median may be the short one of two that alternate, as with a row for each
+message."""
 
 
 def compute_gap_limit(time: FloatArray) -> float:
     """Return the longest pause [s] between samples at `time` (n,) that is not a gap."""
     if time.size < 2:
         return np.inf
-    return GAP_STEPS * float(np.median(np.diff(time)))
+    return GAP_STEPS * float(np.quantile(np.diff(time), GAP_QUANTILE))
 
 
 def find_uncovered_ends(
@@ -124,7 +126,7 @@ class Channel:
     def interpolate(self, time: FloatArray) -> FloatArray:
         """Values at `time` (m,): linear between samples, held for states.
 
-        NaN outside the span, and for all but states inside a gap (more than GAP_STEPS median steps
+        NaN outside the span, and for all but states inside a gap (more than GAP_STEPS usual steps
         without a sample); a state that is sent on change only is known between its messages.
         """
         before = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)

@@ -29,9 +29,10 @@ ChannelsFile = Annotated[
 
 
 def load_inputs(log: Path, vehicle: Path, channels: Path | None) -> tuple[ShiftLog, VehicleCard]:
-    """Read card, mapping and log; raises the typed errors of their readers."""
+    """Read card, mapping and log for finding shifts; raises the typed errors of their readers."""
+    from drivetwin.channels.roles import FOR_SHIFTS
     from drivetwin.logs.read import read_log
     from drivetwin.vehicle.card import load_card
 
     card = load_card(vehicle)
-    return read_log(log, card, channels), card
+    return read_log(log, card, channels, sound=FOR_SHIFTS), card

@@ -62,7 +62,7 @@ def inspect(
     stated = Mapped({}) if channels is None else read_mapping(channels)
     with show_step(f"reading {log.name}"), open_recording(log, stated.options) as recording:
         found = survey_recording(recording, str(log), card, stated)
-        findings, refusal = _read_as_mapped_log(recording, log, card, stated)
+        findings, refusal, commands = _read_as_mapped_log(recording, log, card, stated)
     if write_mapping is not None:
         write_text(write_mapping, format_mapping(found.mapping, found.options, found.unitless))
     if as_json:
@@ -79,21 +79,27 @@ def inspect(
         )
     print_findings(one for one in findings if one.names.get("text") not in found.notes)
     if refusal is not None:
-        print_paragraph(f"shifts and identify refuse this log: {refusal}")
+        print_paragraph(f"{commands} this log: {refusal}")
     if write_mapping is not None:
         print_line(f"wrote {write_mapping}")
 
 
 def _read_as_mapped_log(
     recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped
-) -> tuple[tuple[Finding, ...], DrivetwinError | None]:
-    """Read a log as for use, missing roles allowed; return the findings or the error."""
+) -> tuple[tuple[Finding, ...], DrivetwinError | None, str]:
+    """Read a log as for use, missing roles allowed; return findings, error and who refuses it."""
+    from drivetwin.channels.roles import FOR_SHIFTS
     from drivetwin.logs.read import read_recording
 
     try:
-        return read_recording(recording, log, card, stated, needed=()).findings, None
+        return read_recording(recording, log, card, stated, needed=()).findings, None, ""
     except DrivetwinError as fault:
-        return (), fault
+        refusal = fault
+    try:
+        found = read_recording(recording, log, card, stated, needed=(), sound=FOR_SHIFTS)
+    except DrivetwinError as fault:
+        return (), fault, "shifts and identify refuse"
+    return found.findings, refusal, "identify refuses"
 
 
 def _build_table(columns: list[dict[str, Any]], source: str) -> Table:

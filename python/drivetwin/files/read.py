@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from drivetwin._util.regular_file import measure_regular_file
 from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.errors import ResultFileError, Where
 from drivetwin.files.records import Record
@@ -23,11 +24,12 @@ def read_record(path: Path | str, parse: Callable[[str], Any], schema: str, mode
     Raises ResultFileError where the file is missing, damaged or of a newer schema.
     """
     where = Where(file=str(path))
+    remedy = "check the path, or write it with `drivetwin identify`"
+    measure_regular_file(Path(path), ResultFileError, remedy)
     try:
         tree = parse(Path(path).read_text(encoding="utf-8"))
     except OSError as fault:
         what = f"cannot read the file: {fault.strerror}"
-        remedy = "check the path, or write it with `drivetwin identify`"
         raise ResultFileError(what, remedy, where) from None
     except (ValueError, RecursionError) as fault:
         raise ResultFileError(f"cannot be read: {fault}", _AGAIN, where) from None

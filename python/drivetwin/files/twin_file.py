@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +13,7 @@ from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.spelling import suggest_spelling
-from drivetwin._util.toml import Fault, raise_faults
+from drivetwin._util.toml import Fault, parse_toml, raise_faults
 from drivetwin.errors import InputError, ResultFileError
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.read import read_record
@@ -157,7 +156,7 @@ def read_twin_file(path: Path | str) -> TwinFile:
     Raises ResultFileError where the file is missing, damaged or of a newer schema, or where its
     tables contradict each other.
     """
-    content = read_record(path, tomllib.loads, TWIN_SCHEMA, TwinFile)
+    content = read_record(path, parse_toml, TWIN_SCHEMA, TwinFile)
     raise_faults(
         find_twin_faults(content),
         ResultFileError,

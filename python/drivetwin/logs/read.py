@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +12,17 @@ from drivetwin._util.progress import notify_progress
 from drivetwin.channels.mapping import ChannelSpec, Mapped, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, get_quantity
+from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.channels.units import find_unit, list_first_spellings, resolve_channel_unit
-from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, UnitError, Where
+from drivetwin.errors import (
+    DamagedChannelError,
+    DrivetwinError,
+    PlausibilityError,
+    TimeError,
+    UnitError,
+    Where,
+)
 from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.quality.channel_checks import Checked, check_channel
@@ -44,6 +51,7 @@ def read_log(
     mapping: Path | str | None = None,
     needed: Iterable[str] = FOR_SHIFTS,
     window: Window | None = None,
+    sound: Iterable[str] | None = None,
 ) -> ShiftLog:
     """Read a shift log: every mapped channel on its own time base, SI inside.
 
@@ -53,15 +61,18 @@ def read_log(
     last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
     `card` no column is a pressure, and nothing is compared with the gearing.
 
-    Damaged samples are left out and listed in `findings`; so is a damaged pedal, gear or flag
-    channel that is not `needed`. Nothing is replaced. Raises FileFormatError, MissingExtraError,
-    MissingChannelError, MappingError, UnitError, TimeError, DamagedChannelError,
-    PlausibilityError; each contains a remedy.
+    A channel that cannot be used refuses the log if its role is needed or one of `sound`, else it
+    is left out and listed in `findings`. By default `sound` are all measured roles, without an
+    engine speed beside an input speed unless the card has a converter; pedal, gear and flags if
+    they are mapped. Damaged samples are left out and listed. Nothing is replaced.
+
+    Raises FileFormatError, MissingExtraError, MissingChannelError, MappingError, UnitError,
+    TimeError, DamagedChannelError, PlausibilityError; each contains a remedy.
     """
     path = Path(path)
     stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
     with open_recording(path, stated.options) as recording:
-        log = read_recording(recording, path, card, stated, needed, window)
+        log = read_recording(recording, path, card, stated, needed, window, sound)
     mappings = {} if mapping is None else {Path(mapping).name: _compute_digest(Path(mapping))}
     return replace(log, mappings=mappings)
 
@@ -73,6 +84,7 @@ def read_recording(
     stated: Mapped,
     needed: Iterable[str] = FOR_SHIFTS,
     window: Window | None = None,
+    sound: Iterable[str] | None = None,
 ) -> ShiftLog:
     """Return the log of an open `recording` of the file `path` with the mapping `stated`.
 
@@ -80,30 +92,28 @@ def read_recording(
     """
     elements = {} if card is None else card.elements
     kinds = {name: element.kind for name, element in elements.items()}
-    channels: dict[str, Channel] = {}
     specs = {**({} if card is None else card.channels), **stated.channels}
-    mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path))
-    _refuse_unitless(recording, mapped.channels, specs, str(path))
+    needed = frozenset(needed)
+    mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path), sound)
+    strict = _select_strict_roles(mapped.channels, card, specs, needed, sound)
+    _refuse_unitless(recording, mapped.channels, strict, str(path))
     findings = [report(Code.RECORDING, text=text) for text in recording.warnings]
     findings += mapped.findings
+    channels: dict[str, Channel] = {}
     for count, (role, spec) in enumerate(mapped.channels.items()):
         notify_progress(count / len(mapped.channels))
         try:
             raw = recording.load(_load_column(recording, spec), window)
             checked = _make_checked_channel(role, spec, raw, str(path))
         except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
-            if role in specs or get_quantity(role) not in AUXILIARY:
+            if role in strict:
                 raise
-            place = Where(channel=spec.source)
-            findings.append(report(Code.CHANNEL_LEFT_OUT, "", place, why=fault.what))
+            findings.append(_report_left_out(spec.source, fault))
             continue
         channels[role] = checked.channel
         findings += checked.findings
-    check_common_span(channels, str(path))
-    if card is not None:
-        check_gearing(channels, card, str(path))
-    check_torque_signs(channels, str(path))
-    findings += check_coverage(channels)
+    channels, dropped = _drop_inconsistent(channels, strict, card, str(path))
+    findings += [*dropped, *check_coverage(channels)]
     if card is not None:
         findings += [*check_torque_balance(channels, card), *check_final_drive(channels, card)]
         findings += check_speed_clocks(channels, card)
@@ -114,13 +124,71 @@ def read_recording(
     return ShiftLog(channels, str(path), _compute_digest(path), tuple(dict.fromkeys(findings)))
 
 
+def _select_strict_roles(
+    mapped: Mapping[str, ChannelSpec],
+    card: VehicleCard | None,
+    specs: Mapping[str, ChannelSpec],
+    needed: Set[str],
+    sound: Iterable[str] | None,
+) -> frozenset[str]:
+    """Return the mapped roles whose channel refuses the log if it cannot be used; see `read_log`.
+
+    Without a channel of a needed role its stand-in is needed.
+    """
+    strict = needed | {
+        STAND_INS[role] for role in needed if role in STAND_INS and role not in mapped
+    }
+    if sound is not None:
+        return frozenset(mapped).intersection(strict | frozenset(sound))
+    has_converter = card is not None and card.converter is not None
+    spare = {"engine_speed"} if "input_speed" in mapped and not has_converter else set()
+    usual = {role for role in mapped if role in specs or get_quantity(role) not in AUXILIARY}
+    return frozenset(mapped).intersection(strict | (usual - spare))
+
+
+def _drop_inconsistent(
+    channels: Mapping[str, Channel], strict: Set[str], card: VehicleCard | None, file: str
+) -> tuple[dict[str, Channel], list[Finding]]:
+    """Drop the channels outside `strict` that contradict others; return the rest, and findings.
+
+    Raises TimeError or PlausibilityError where the strict ones contradict each other.
+    """
+    kept = {role: one for role, one in channels.items() if role in strict}
+    _check_consistency(kept, card, file)
+    findings = []
+    for role, channel in channels.items():
+        if role in strict:
+            continue
+        try:
+            _check_consistency({**kept, role: channel}, card, file)
+        except (TimeError, PlausibilityError) as fault:
+            findings.append(_report_left_out(channel.source_name, fault))
+        else:
+            kept[role] = channel
+    return {role: one for role, one in channels.items() if role in kept}, findings
+
+
+def _check_consistency(
+    channels: Mapping[str, Channel], card: VehicleCard | None, file: str
+) -> None:
+    """Raise TimeError or PlausibilityError where channels contradict each other or the card."""
+    check_common_span(channels, file)
+    if card is not None:
+        check_gearing(channels, card, file)
+    check_torque_signs(channels, file)
+
+
+def _report_left_out(name: str, fault: DrivetwinError) -> Finding:
+    return report(Code.CHANNEL_LEFT_OUT, "", Where(channel=name), why=fault.what)
+
+
 def _refuse_unitless(
     recording: Recording,
     channels: Mapping[str, ChannelSpec],
-    stated: Mapping[str, ChannelSpec],
+    strict: Set[str],
     file: str,
 ) -> None:
-    """Name all channels without a unit at once, but those that may be left out.
+    """Name all channels of `strict` roles without a unit at once.
 
     Columns without numbers are reported elsewhere.
     """
@@ -131,7 +199,7 @@ def _refuse_unitless(
         and not (column := recording.columns[_load_column(recording, spec)]).empty
         and not (column.unit or "").strip()
         and get_quantity(role) is not Quantity.STATE
-        and (role in stated or get_quantity(role) not in AUXILIARY)
+        and role in strict
     }
     if len(without) < 2:
         return

@@ -16,7 +16,6 @@ from drivetwin.logs.formats.detect import open_recording
     [
         (b"\x89HDF\r\n\x1a\n", "an HDF5 file without MATLAB header"),
         (b"\x1f\x8b\x08", "a gzip archive"),
-        (b";$FILEVERSION=2.1\n;$STARTTIME=45000.5\n;\n", "a PCAN trace"),
     ],
 )
 def test_what_has_no_reader_is_told_by_name(tmp_path: Path, head: bytes, name: str) -> None:

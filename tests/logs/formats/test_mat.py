@@ -15,9 +15,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.io import savemat
+from scipy.io.matlab import MatlabOpaque
 
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
 from drivetwin.errors import FileFormatError, MissingChannelError, MissingExtraError, UnitError
+from drivetwin.logs.formats.mat_signals import find_signals
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
@@ -142,6 +144,22 @@ def test_complex_numbers_are_told(tmp_path: Path) -> None:
     assert [one.name for one in raw.channels] == ["x"]
     assert raw.unreadable.keys() == {"n", "s"}
     assert set(raw.unreadable.values()) == {"complex numbers: export their real part"}
+
+
+def test_objects_are_told() -> None:
+    reference = np.array([0xDD000000, 2, 1, 1, 1, 1], np.uint32)
+    opaque = np.array(
+        [(b"t", b"MCOS", b"duration", reference)],
+        [("s0", "S9"), ("s1", "S9"), ("s2", "S9"), ("arr", object)],
+    )
+    found = find_signals(
+        {"t": T, "x": T + 1.0, "d": reference, "o": MatlabOpaque(opaque)}, TimeColumn(), "log.mat"
+    )
+    assert [one.name for one in found.channels] == ["x"]
+    assert found.unreadable == {
+        "d": "a closed MATLAB object",
+        "o": "a closed MATLAB object (duration): export seconds(x)",
+    }
 
 
 def version4(order: Literal["<", ">"], name: str, values: NDArray[Any], kind: int) -> bytes:

@@ -86,6 +86,27 @@ def test_time_stamps_count_from_the_first(tmp_path: Path) -> None:
     assert raw.channels[0].time.tolist() == [0.0, 0.5, 1.0]
 
 
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+def test_durations_count_from_their_own_zero(tmp_path: Path, unit: Any) -> None:
+    ticks = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[unit]
+    stamps = pa.array([-2 * ticks, 0, ticks], pa.duration(unit))
+    raw = read(tmp_path, table(t=stamps, x=[1.0, 2.0, 3.0]))
+    assert raw.channels[0].time.tolist() == [-2.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("kind", [pa.time32("ms"), pa.time64("us")])
+def test_times_of_day(tmp_path: Path, kind: Any) -> None:
+    second = 10**3 if kind.unit == "ms" else 10**6
+    stamps = pa.array([3600 * second, 3601 * second], kind)
+    raw = read(tmp_path, table(t=stamps, x=[1.0, 2.0]))
+    assert raw.channels[0].time.tolist() == [3600.0, 3601.0]
+
+
+def test_numbers_below_zero_are_stamps(tmp_path: Path) -> None:
+    raw = read(tmp_path, table({"t": "s"}, t=[-2.0, -1.0, 0.5], x=[1.0, 2.0, 3.0]))
+    assert raw.channels[0].time.tolist() == [-2.0, -1.0, 0.5]
+
+
 def test_time_without_unit_must_be_asserted(tmp_path: Path) -> None:
     without = table(t=T, x=T)
     with pytest.raises(UnitError, match="no unit for its time column"):

@@ -9,6 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from drivetwin._util.atomic import write_text
+from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters.cdfx import convert_for_cdfx, format_cdfx, parse_cdfx
 from drivetwin.export.parameters.content import ParameterSet
@@ -65,7 +66,7 @@ def read_parameters(path: Path, kind: ParameterFormat | None = None) -> Paramete
     """Read a parameter file, by default in the format that its ending names.
 
     What is neither a number nor a curve is named in `skipped`. Raises FileFormatError where the
-    file is damaged, InputError for an unknown ending, and OSError.
+    file is damaged, InputError for an unknown ending and what is no regular file, OSError.
     """
     chosen = kind or _select_format(path)
     return CODECS[chosen].parse(_read_decoded(path), path.name)
@@ -84,6 +85,7 @@ def _select_format(path: Path) -> ParameterFormat:
 
 def _read_decoded(path: Path) -> str:
     """Text in UTF-8 or, as older tools write, Latin-1."""
+    measure_regular_file(path, InputError)
     data = path.read_bytes()
     if b"\0" in data:
         raise FileFormatError(

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
+from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.can.open import is_bus_text, open_blf, open_bus_text
@@ -19,7 +20,20 @@ from drivetwin.logs.formats.parquet import open_parquet
 from drivetwin.logs.raw import Opener, Recording
 
 SUFFIXES = frozenset(
-    (".csv", ".txt", ".tsv", ".dat", ".mf4", ".mdf", ".mat", ".parquet", ".asc", ".blf", ".log")
+    (
+        ".csv",
+        ".txt",
+        ".tsv",
+        ".dat",
+        ".mf4",
+        ".mdf",
+        ".mat",
+        ".parquet",
+        ".asc",
+        ".trc",
+        ".blf",
+        ".log",
+    )
 )
 """Endings by which a folder's logs are known; a file that is named by itself may have any."""
 
@@ -42,7 +56,6 @@ _REFUSED = {
     b"\x89HDF": "an HDF5 file without MATLAB header",
     b"PK\x03\x04": "a zip archive or Excel workbook",
     b"\x1f\x8b": "a gzip archive",
-    b";$FILEVERSION": "a PCAN trace",
 }
 """First bytes of unsupported formats that an error names instead of `binary`."""
 
@@ -56,6 +69,7 @@ def open_recording(
     where the file cannot be read, MissingExtraError where the library for its format is not
     installed, and the errors of its reader.
     """
+    measure_regular_file(path, FileFormatError)
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
@@ -76,7 +90,7 @@ def _select_opener(head: bytes, path: Path) -> Opener:
             raise FileFormatError(
                 f"this is {name}, for which there is no reader",
                 "export the channels as CSV with a row of units, MDF 4, MATLAB or Parquet, frames "
-                "of a bus as ASC, BLF or candump",
+                "of a bus as ASC, BLF, TRC or candump",
                 Where(file=str(path)),
             )
     if is_version4(head):

@@ -20,7 +20,7 @@ class Signal:
     `start` is the bit as a DBC counts it (least significant bit for Intel, most significant for
     Motorola order). `limits` are the least and greatest value that is one, None where the database
     states none. `selector` is the code of the multiplexer (start, length) that admits the signal.
-    `spn` is its SAE J1939 number.
+    `spn` is its SAE J1939 number. `texts` are the codes that the database names.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Signal:
     limits: tuple[float, float] | None = None
     selector: tuple[Signal, frozenset[int]] | None = None
     spn: int | None = None
+    texts: tuple[tuple[int, str], ...] = ()
 
     @property
     def end(self) -> int:
@@ -44,8 +45,22 @@ class Signal:
         return self.start // 8 + (7 - self.start % 8 + self.length + 7) // 8
 
 
+@dataclass(frozen=True)
+class Message:
+    """A message: `identifier` of 11 bits, or 29 if `extended`; `j1939`: only its group counts."""
+
+    name: str
+    identifier: int
+    extended: bool
+    j1939: bool
+    signals: tuple[Signal, ...]
+
+
 PAYLOAD, LONGEST = 8, 64
 """Most data bytes of a classical frame, and of one of CAN FD."""
+
+FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""Data bytes by the length code of CAN FD."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,9 @@ import numpy as np
 from drivetwin.channels.names import can_be_time, is_time_name
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.channels.units import get_time_factor
+from drivetwin.channels.units import get_time_factor, is_time_unit
 from drivetwin.errors import Where
+from drivetwin.logs.formats.mat_time import choose_time, is_raster_time, split_asammdf_name
 from drivetwin.logs.raw import RawChannel
 
 _TIME_SUFFIXES = ("_t", "_time", "_T", "_Time", "_zeit")
@@ -23,6 +24,9 @@ _DATA_FIELDS = ("data", "values", "value", "Data", "Values", "Value", "signals",
 _NAME_FIELDS = ("name", "Name", "label", "title")
 _ENOUGH = 10
 """Rows from which a matrix of two columns may be a signal with its time."""
+
+_REFERENCE = 0xDD000000
+"""First number of a reference to an object of version 7.3."""
 
 _DEPTH = 12
 """Structs nested deeper than this are no log."""
@@ -61,8 +65,20 @@ class _Search:
         clocks = {name for name in vectors if can_be_time(_get_unit(name, tree))}
         times = self._match_times(vectors, clocks)
         used = {name for name in vectors if self._is_time_vector(name, vectors, clocks)}
+        recorder = self._add_recorder_channels(tree, prefix)
         for name, values in vectors.items():
             if name in used:
+                continue
+            exported = split_asammdf_name(name, vectors)
+            if exported is not None:
+                own, group, time = exported
+                self._add_channel(
+                    prefix + own,
+                    _get_unit(name, tree),
+                    (vectors[time], values),
+                    self._get_seconds_factor(time, tree),
+                    group,
+                )
                 continue
             stamps_of = times.get(name)
             if stamps_of is None:
@@ -75,6 +91,8 @@ class _Search:
                     self._get_seconds_factor(stamps_of, tree),
                 )
         for name, value in tree.items():
+            if name in recorder:
+                continue
             if isinstance(value, Mapping):
                 self._search_struct_field(value, prefix + name, depth)
             elif isinstance(value, list):
@@ -85,6 +103,37 @@ class _Search:
                 )
             elif name not in vectors:
                 self._add_matrix(prefix + name, value, vectors, tree)
+
+    def _add_recorder_channels(self, tree: Mapping[str, Any], prefix: str) -> Set[str]:
+        """Add the channels of a dSPACE recorder; return the names of its fields.
+
+        Its time vectors are structs in `X`, its channels structs in `Y`; `XIndex` is the number of
+        a channel's time vector, from 1.
+        """
+        axes, channels = (_list_structs(tree.get(key)) for key in ("X", "Y"))
+        times = [_to_vector(one.get("Data")) for one in axes]
+        if not channels or not times or any(time is None for time in times):
+            return frozenset()
+        for place, one in enumerate(channels, start=1):
+            name = prefix + ((_to_text(one.get("Name")) or f"Y({place})").replace('"', ""))
+            index = _to_index(one.get("XIndex", 1))
+            values = _to_vector(one.get("Data"))
+            if values is None or not 0 < index <= len(times):
+                why = "no vector of numbers" if values is None else f"no time vector {index}"
+                self.found.unreadable[name] = why
+                continue
+            unit = _get_struct_unit(axes[index - 1])
+            if not can_be_time(unit):
+                self.found.unreadable[name] = f"recorded over {unit!r}, not over time"
+                continue
+            time = times[index - 1]
+            assert time is not None
+            told = unit if unit is not None and is_time_unit(unit) else "s"
+            factor = get_time_factor(
+                self._stated.unit or told, Where(file=self._file, channel=name)
+            )
+            self._add_channel(name, _get_struct_unit(one), (time, values), factor)
+        return frozenset(("X", "Y"))
 
     def _search_items(self, items: list[Any], path: str, depth: int) -> None:
         for place, item in enumerate(items):
@@ -134,9 +183,9 @@ class _Search:
     ) -> None:
         """A vector without a time of its own: the one common time vector of its length."""
         names = self._find_common_times(vectors, tree)
-        fitting = [name for name in names if vectors[name].size == values.size]
+        own = path.rsplit(".", 1)[-1]
+        fitting = choose_time(own, values.size, names, vectors)
         if len(fitting) == 1:
-            own = path.rsplit(".", 1)[-1]
             pair = (vectors[fitting[0]], values)
             self._add_channel(
                 path, _get_unit(own, tree), pair, self._get_seconds_factor(fitting[0], tree)
@@ -170,7 +219,12 @@ class _Search:
         stated = self._stated.source
         if stated is not None and stated in vectors:
             return [stated]
-        return [one for one in vectors if is_time_name(one) and can_be_time(_get_unit(one, tree))]
+        return [
+            name
+            for name, values in vectors.items()
+            if (is_time_name(name) or is_raster_time(name, values))
+            and can_be_time(_get_unit(name, tree))
+        ]
 
     def _match_times(self, vectors: Mapping[str, FloatArray], clocks: Set[str]) -> dict[str, str]:
         """The time vector of each name that has one of its own among `clocks`.
@@ -192,7 +246,8 @@ class _Search:
             name.endswith(suffix) and name.removesuffix(suffix) in vectors
             for suffix in _TIME_SUFFIXES
         )
-        return name == self._stated.source or (name in clocks and (owner or is_time_name(name)))
+        named = owner or is_time_name(name) or is_raster_time(name, vectors[name])
+        return name == self._stated.source or (name in clocks and named)
 
     def _get_seconds_factor(self, name: str, tree: Mapping[str, Any]) -> float:
         """Factor to seconds of a time vector; MATLAB's own unit is the second.
@@ -205,13 +260,18 @@ class _Search:
         return get_time_factor(unit, Where(file=self._file, channel=name))
 
     def _add_channel(
-        self, name: str, unit: str | None, pair: tuple[FloatArray, FloatArray], factor: float
+        self,
+        name: str,
+        unit: str | None,
+        pair: tuple[FloatArray, FloatArray],
+        factor: float,
+        group: str = "",
     ) -> None:
         time, values = pair
         if time.size != values.size:
             self.found.unreadable[name] = f"{values.size} values, but {time.size} time stamps"
         else:
-            self.found.channels.append(RawChannel(name, unit, time * factor, values))
+            self.found.channels.append(RawChannel(name, unit, time * factor, values, group))
 
     def _record_unreadable(self, name: str, value: Any) -> None:
         """Record why a variable is no signal, unless it is a text or a single number."""
@@ -220,13 +280,13 @@ class _Search:
         elif isinstance(value, np.ndarray) and value.ndim > 1:
             shape = "×".join(map(str, value.shape))
             self.found.unreadable[name] = f"a matrix {shape}: one vector for each signal is needed"
-        elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
-            self.found.unreadable[name] = "a closed MATLAB object"
+        elif type(value).__name__ in ("MatlabOpaque", "MatlabFunction") or _is_closed(value):
+            self.found.unreadable[name] = _describe_object(value)
 
 
 def _to_vector(value: Any) -> FloatArray | None:
     """A real numeric vector of two or more samples as (n,) float64, else None."""
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufb":
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufb" or _is_closed(value):
         return None
     squeezed = value.squeeze()
     return squeezed.astype(np.float64) if squeezed.ndim == 1 and squeezed.size > 1 else None
@@ -253,6 +313,35 @@ def _split_time_and_values(value: Any) -> tuple[FloatArray, FloatArray] | None:
         return None
     time, values = value.astype(np.float64).T
     return (time, values) if np.all(np.diff(time) > 0.0) else None
+
+
+def _list_structs(value: Any) -> list[Mapping[str, Any]]:
+    """Return the structs of a field that holds one or several; none if it holds other things."""
+    items = value if isinstance(value, list) else [value]
+    return items if all(isinstance(item, Mapping) for item in items) else []
+
+
+def _to_index(value: Any) -> int:
+    """Return a single whole number; 0 for anything else."""
+    numbers = np.asarray(value)
+    single = numbers.dtype.kind in "iuf" and numbers.size == 1
+    number = float(numbers.reshape(-1)[0]) if single else 0.0
+    return int(number) if number.is_integer() else 0
+
+
+def _is_closed(value: Any) -> bool:
+    """Return True for the reference that version 7.3 has in place of an object."""
+    is_array = isinstance(value, np.ndarray) and value.dtype == np.uint32 and value.size > 1
+    return is_array and int(value.reshape(-1)[0]) == _REFERENCE
+
+
+def _describe_object(value: Any) -> str:
+    """Words for a closed object, with its class and the remedy for a time."""
+    names = value.dtype.names or () if isinstance(value, np.ndarray) else ()
+    kind = bytes(value["s2"].reshape(-1)[0]).decode("utf-8", "replace") if "s2" in names else ""
+    remedy = {"duration": "seconds(x)", "datetime": "posixtime(x)"}.get(kind)
+    words = f"a closed MATLAB object{f' ({kind})' if kind else ''}"
+    return f"{words}: export {remedy}" if remedy else words
 
 
 def _to_text(value: Any) -> str | None:

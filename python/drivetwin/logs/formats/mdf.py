@@ -27,6 +27,7 @@ from drivetwin.logs.formats.can.mdf_frames import has_only_frames, read_bus_fram
 from drivetwin.logs.formats.can.open import decode_recording
 from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.formats.mdf_integrity import check_blocks
+from drivetwin.logs.formats.number_texts import parse_numbers, select_numbers
 from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.raw import Joined, RawChannel, Recording, Window
 
@@ -225,8 +226,8 @@ class MdfRecording:
     def _load_samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
         """Values with the conversion of the file, the recorder's marks for invalid ones, a note.
 
-        A text among numbers, such as `not available`, becomes NaN. If all values are texts, their
-        codes are returned, and the note lists the texts.
+        A text among numbers, such as `not available`, becomes NaN. Texts that are numbers are the
+        values. If no text is a number, the codes are returned, and the note lists the texts.
         """
         wanted = {
             "group": place.group,
@@ -242,12 +243,9 @@ class MdfRecording:
         samples, marks = self._mdf.get(raw=bool(formula), **wanted)
         if formula:
             samples = self._evaluate_formula(formula, samples, channel.name)
-        elif samples.dtype.kind in "SUO":
-            if _has_numeric_codes(channel.conversion):
-                samples = np.full(samples.shape, np.nan)
-            else:
-                samples, marks = self._mdf.get(raw=True, **wanted)
-                note = _describe_codes(channel.conversion)
+        elif samples.dtype.kind in "SUO" or _has_texts(channel.conversion):
+            codes, _ = self._mdf.get(raw=True, **wanted)
+            samples, note = _convert_texts(samples, codes, channel.conversion)
         if getattr(channel, "flags", 0) & _ALL_INVALID:
             marks = np.ones(len(samples), dtype=np.bool_)
         return samples, None if marks is None else np.asarray(marks, dtype=np.bool_), note
@@ -318,10 +316,70 @@ def _get_group_name(block: Any) -> str:
     return name or ("" if comment.startswith("<") else comment.partition("\n")[0])
 
 
+def _has_texts(conversion: Any) -> bool:
+    """Return True if a conversion gives a text for some codes."""
+    blocks = getattr(conversion, "referenced_blocks", None) or {}
+    return any(isinstance(text, bytes) and text for text in blocks.values())
+
+
 def _has_numeric_codes(conversion: Any) -> bool:
     """Return True if a value-to-text conversion also has numeric values."""
     blocks = getattr(conversion, "referenced_blocks", None) or {}
     return any(hasattr(block, "convert") for block in blocks.values())
+
+
+def _convert_texts(samples: Any, codes: Any, conversion: Any) -> tuple[Any, str]:
+    """Return the values (n,) that samples with texts stand for, and a note; see `_load_samples`.
+
+    Texts come from the table of the conversion: of an unsorted one of MDF 3 asammdf finds few.
+    """
+    if samples.ndim != 1 or codes.ndim != 1:
+        return samples, ""
+    is_coded = codes.dtype.kind in "iufb"
+    if is_coded:
+        known, place = np.unique(codes, return_inverse=True)
+        texts = _look_up_texts(conversion, known)
+    else:
+        listed, place = np.unique(samples, return_inverse=True)
+        known = np.full(listed.size, np.nan)
+        texts = [_decode_text(one) for one in listed.tolist()]
+    if samples.dtype.kind not in "SUO":
+        is_text = np.array([text is not None for text in texts])
+        numbers = parse_numbers(text or "" for text in texts)
+        return np.where(is_text[place], numbers[place], samples), ""
+    found = select_numbers([text or "" for text in texts], known.astype(np.float64))
+    if found is not None:
+        return found.values[place], found.note
+    if _has_numeric_codes(conversion):
+        return np.full(samples.shape, np.nan), ""
+    return codes, _describe_codes(conversion)
+
+
+def _look_up_texts(conversion: Any, codes: Any) -> list[str | None]:
+    """Return the text of each code (n,) by the table of a conversion; None for a number."""
+    blocks = getattr(conversion, "referenced_blocks", None) or {}
+    default = blocks.get("default_addr")
+    is_text = isinstance(default, bytes) and b"{X}" not in default  # MDF 3: a formula as text
+    rest = _decode_text(default) if is_text else None
+    found: list[str | None] = [rest for _ in codes]
+    free = np.ones(codes.size, np.bool_)
+    for number in range(max(len(blocks), getattr(conversion, "ref_param_nr", 0))):
+        text = blocks.get(f"text_{number}", getattr(conversion, f"text_{number}", None))
+        value = getattr(conversion, f"val_{number}", None)
+        value = getattr(conversion, f"param_val_{number}", value)
+        low, high = (getattr(conversion, f"{end}_{number}", value) for end in ("lower", "upper"))
+        if text is None or low is None or high is None:
+            continue
+        below = codes < high if codes.dtype.kind == "f" else codes <= high
+        inside = free & (codes >= low) & (below | (codes == low))
+        free &= ~inside
+        for index in np.flatnonzero(inside).tolist():
+            found[index] = _decode_text(text) if isinstance(text, bytes) else None
+    return found
+
+
+def _decode_text(text: Any) -> str:
+    return text.decode("utf-8", "replace").strip("\0") if isinstance(text, bytes) else str(text)
 
 
 def _describe_codes(conversion: Any) -> str:
@@ -332,5 +390,5 @@ def _describe_codes(conversion: Any) -> str:
         text = blocks.get(f"text_{index}")
         code = getattr(conversion, f"val_{index}", getattr(conversion, f"lower_{index}", None))
         if isinstance(text, bytes) and code is not None:
-            pairs.append(f"{code:g} = {text.decode('utf-8', 'replace').strip(chr(0))}")
+            pairs.append(f"{code:g} = {_decode_text(text)}")
     return f"codes of texts: {', '.join(pairs)}" if pairs else ""

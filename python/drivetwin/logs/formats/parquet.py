@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.names import find_time_index, is_time_name, split_name_and_unit
@@ -25,7 +26,8 @@ _UNIT_KEYS = ("unit", "units", "Unit")
 _PANDAS = "PANDAS_ATTRS"
 """Metadata key of the attributes of a pandas frame, which may include `units`."""
 
-_NANOSECONDS = 1e-9
+_TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Seconds of the units in which times are counted."""
 
 
 @contextmanager
@@ -72,7 +74,7 @@ class ParquetRecording:
         temporal = [
             index
             for index, kind in enumerate(kinds)
-            if pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
+            if pa.types.is_timestamp(kind) or pa.types.is_duration(kind) or pa.types.is_time(kind)
         ]
         named = options.time.source is not None or any(map(is_time_name, names))
         if not named and len(temporal) == 1:
@@ -116,26 +118,41 @@ class ParquetRecording:
         return read.column(alike[names[:field].count(names[field])])
 
     def _load_stamps(self, field: int, column: Column, asserted: str | None) -> FloatArray:
+        """Return the time [s]: instants from the first one on, others as the file counts them."""
         import pyarrow as pa
 
         where = Where(file=str(self._path), channel=column.name)
         kind = self._table.schema_arrow.field(field).type
-        if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            data = self._load_values(field)
-            stamps = np.asarray(data.to_numpy(zero_copy_only=False))
-            if np.isnat(stamps).any():
-                raise TimeError("a row has no time stamp", "remove the row", where)
-            passed = stamps - stamps[0] if stamps.size else stamps
-            return passed.astype("timedelta64[ns]").astype(np.float64) * _NANOSECONDS
-        factor = get_time_factor(asserted if asserted is not None else column.unit, where)
-        values, present = self._load_numbers(field, where)
-        if not present.all():
-            row = int(present.argmin())
-            raise TimeError(f"row {row} has no time stamp", "remove the row", where)
-        stamps = values * factor
+        if pa.types.is_timestamp(kind):
+            ticks = self._load_ticks(field, where)
+            return (ticks - ticks[:1]).astype(np.float64) * _TICKS[kind.unit]
+        if pa.types.is_duration(kind) or pa.types.is_time(kind):
+            stamps = self._load_ticks(field, where).astype(np.float64) * _TICKS[kind.unit]
+        else:
+            factor = get_time_factor(asserted if asserted is not None else column.unit, where)
+            values, present = self._load_numbers(field, where)
+            _refuse_missing_stamps(present, where)
+            stamps = values * factor
         origin = find_origin(stamps[:1])
         self.warnings = describe_origin(origin)
         return subtract_origin(stamps, origin)
+
+    def _load_ticks(self, field: int, where: Where) -> NDArray[np.int64]:
+        """Return a column of times as whole multiples (n,) of the unit of its type."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        with handle_parser_errors(_KIND, self._path):
+            data = self._load_values(field)
+            _refuse_missing_stamps(np.asarray(pc.is_valid(data).to_numpy()), where)
+            width = pa.int32() if pa.types.is_time32(data.type) else pa.int64()
+            return np.asarray(pc.cast(data, width).to_numpy(), np.int64)
+
+
+def _refuse_missing_stamps(present: NDArray[np.bool_], where: Where) -> None:
+    if not present.all():
+        row = int(present.argmin())
+        raise TimeError(f"row {row} has no time stamp", "remove the row", where)
 
 
 def _make_column(field: Any, units: Mapping[str, str]) -> Column:

@@ -16,6 +16,7 @@ from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
 from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.logs.quality.jumps import check_jumps, find_lost_messages
 from drivetwin.logs.quality.outliers import (
     BEYOND,
     Damage,
@@ -38,6 +39,9 @@ MIN_SOUND = 0.5
 MAX_WRAPS = 3
 """So few steps back suggest a counter that wrapped, more suggest disorder."""
 
+MAX_REPEATED = 1e-3
+"""Share of samples that may repeat the stamp before them; they are left out."""
+
 SHORTEST_STEP, LONGEST_STEP = 2.5e-5, 0.9
 """Plausible sample intervals [s]; stamps of 50 Hz in s that are read as ms (2e-5 s) are outside."""
 
@@ -59,11 +63,6 @@ times as long as: a pedal that is held still makes such a torque."""
 
 LEAST_SUCTION = BAR
 """A gauge pressure below -1 bar [Pa] does not exist."""
-
-MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
-"""Speed change [rad/s] and rate [rad/s2] that no wheel shows between samples."""
-OF_A_MOTOR = 1e4
-"""Rate [rad/s2] of the other shafts: 300 N m accelerate a motor of 0.04 kg m2 at 7500 rad/s2."""
 
 WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
 """An overflow jumps by this share of the range, and by so many usual steps."""
@@ -121,6 +120,8 @@ def check_channel(channel: Channel, file: str) -> Checked:
     """
     where = Where(file=file, channel=channel.source_name)
     findings: list[Finding] = []
+    repeated = _find_repeated_stamps(channel.time)
+    channel = _drop_damage(channel, repeated, findings, Where())
     check_order(channel.time, where)
     _check_count(channel, channel.time.size, where)
     _check_rate(channel, where)
@@ -138,12 +139,13 @@ def check_channel(channel: Channel, file: str) -> Checked:
         _check_glitches,
         _check_clipping,
         _check_stale,
+        find_lost_messages,
     ):
         channel = _drop_damage(channel, look(channel), findings)
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
     _check_sign(channel, where)
-    _check_jumps(channel, where)
+    check_jumps(channel, where)
     _check_wraps(channel, where)
     findings += _check_limit(channel)
     findings += _check_rest(channel)
@@ -272,13 +274,25 @@ def _has_sensor_noise(channel: Channel) -> bool:
     return channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
 
 
-def _drop_damage(channel: Channel, damage: Damage | None, findings: list[Finding]) -> Channel:
-    """Drop the damaged samples and add a finding."""
+def _drop_damage(
+    channel: Channel, damage: Damage | None, findings: list[Finding], place: Where | None = None
+) -> Channel:
+    """Drop the damaged samples and add a finding, by default on the channel.
+
+    A finding on the stamps has no channel: those of a table share them, and it stands once.
+    """
     if damage is None:
         return channel
-    findings.append(damage.report(channel.time, channel.place))
+    findings.append(damage.report(channel.time, channel.place if place is None else place))
     keep = ~damage.mask
     return replace(channel, time=channel.time[keep], values=channel.values[keep])
+
+
+def _find_repeated_stamps(time: FloatArray) -> Damage | None:
+    """Samples whose stamp repeats the one before, if they are few; more come of a wrong clock."""
+    repeated = np.diff(time, prepend=-np.inf) == 0.0
+    few = np.count_nonzero(repeated) <= MAX_REPEATED * time.size
+    return Damage(repeated, Code.STAMPS_REPEATED) if repeated.any() and few else None
 
 
 def check_order(time: FloatArray, where: Where) -> None:
@@ -364,28 +378,6 @@ def _check_rate(channel: Channel, where: Where) -> None:
         else 'check its unit of time; the channel mapping asserts one: time = { unit = "s" }'
     )
     raise TimeError(f"samples lie {step:.4g} s apart, no log of a shift does that", remedy, where)
-
-
-def _check_jumps(channel: Channel, where: Where) -> None:
-    """Refuse a speed that jumps from one sample to the next: its number has overflown."""
-    if channel.quantity is not Quantity.SPEED:
-        return
-    pause, change = np.diff(channel.time), np.abs(np.diff(channel.values))
-    close = pause <= 2.5 * channel.step
-    fastest = MAX_ACCELERATION if channel.role == "wheel_speed" else OF_A_MOTOR
-    jumps = np.flatnonzero(close & (change > MAX_JUMP) & (change > fastest * pause))
-    if jumps.size:
-        index = int(jumps[0]) + 1
-        before, after = (
-            format_with_unit(float(channel.values[index - 1]), channel.quantity.unit),
-            format_with_unit(float(channel.values[index]), channel.quantity.unit),
-        )
-        raise DamagedChannelError(
-            f"jumps from {before} to {after} between two samples ({jumps.size} such jumps)",
-            "the number may overflow or the sensor drop out: cut the log to a sound span, or map "
-            "another channel",
-            Where(where.file, where.channel, float(channel.time[index])),
-        )
 
 
 def _check_wraps(channel: Channel, where: Where) -> None:

@@ -103,10 +103,58 @@ def test_a_damaged_line_costs_its_frame_only(line: str) -> None:
     assert found.warnings == ("1 damaged lines left out of 3",)
 
 
-def test_stamps_from_event_to_event_are_refused() -> None:
+@pytest.mark.parametrize("line", ["-12.000001 1  123  Rx   d 2 01 02", "-0.5 1 7FF Tx d 0"])
+def test_stamps_before_the_trigger(line: str) -> None:
+    found = read(f"{line}\n   0.010000 1  123  Rx   d 2 01 02\n")
+    assert found.time.tolist() == [float(line.split()[0]), 0.01]
+    assert found.warnings == ()
+
+
+@given(st.data())
+def test_keywords_and_digits_have_either_case(data: st.DataObject) -> None:
+    body = (
+        "   0.010000 1  1F000ABx  Rx   d 2 aB 02\n"
+        "   0.011000 CANFD   1 Tx  12F  Engine  1 0 2 2 0c 02  130000  128 0 0 0\n"
+        "   0.012000 1  ErrorFrame\n"
+    )
+    cases = data.draw(st.lists(st.booleans(), min_size=len(body), max_size=len(body)))
+    text = "".join(c.upper() if up else c.lower() for c, up in zip(body, cases, strict=True))
+    found = read(text, data.draw(st.sampled_from(["hex", "HEX", "Hex"])))
+    assert found.identifier.tolist() == [0x1F000AB, 0x12F]
+    assert found.extended.tolist() == [True, False]
+    assert found.data[:, :2].tolist() == [[0xAB, 2], [12, 2]]
+    assert found.warnings == ("1 remote or error frames left out",)
+
+
+def test_a_symbolic_name_has_its_number_at_the_end() -> None:
+    found = read(
+        "   0.01 1  EngineData  Rx   d 2 01 02 Length = 0 BitCount = 0 ID = 291\n"
+        "   0.02 1  EEC1  Rx   d 2 01 02 Length = 0 BitCount = 0 ID = 217056256x\n"
+        "   0.03 1  Nameless  Rx   d 2 01 02\n"
+    )
+    assert found.identifier.tolist() == [291, 217056256]
+    assert found.extended.tolist() == [False, True]
+    assert found.warnings == ("1 damaged lines left out of 3",)
+
+
+def test_stamps_from_event_to_event_are_added_up() -> None:
+    body = (
+        "   0.000000 Start of measurement\n"
+        "   0.010000 1  123  Rx   d 2 01 02\n"
+        "   0.005000 1  Statistic: D 0 R 0 XD 5 XR 0 E 0 O 0 B 0.00%\n"
+        "   0.001000 CANFD   1 Rx  123  Engine  1 0 2 2 01 02  130000  128 0 0 0\n"
+        "   0.000500 1  ErrorFrame\n"
+        "   0.100000 1  123  Rx   d 2 01 02\n"
+    )
     text = HEAD.format("hex").replace("absolute", "relative")
-    with pytest.raises(FileFormatError, match="from event to event"):
-        read_asc((text + "   0.01 1  123  Rx   d 2 01 02\n").encode(), "bus.asc")
+    found = read_asc((text + body).encode(), "bus.asc")
+    assert found.time.tolist() == [0.01, 0.016, 0.1165]
+    assert "time stamps from event to event added up" in found.warnings
+    damaged = body.replace("0.001000", "0.001x00")
+    found = read_asc((text + damaged).encode(), "bus.asc")
+    assert "time stamps from event to event added up; after a damaged line they are early" in (
+        found.warnings
+    )
 
 
 def test_no_frame_is_told() -> None:

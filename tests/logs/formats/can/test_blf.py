@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 from pathlib import Path
 
@@ -51,6 +52,28 @@ def test_without_the_library_the_install_command_is_named(
     with pytest.raises(MissingExtraError) as caught:
         read_blf(path)
     assert caught.value.remedy == 'pip install "drivetwin[can]"'
+
+
+class SignedStamps:
+    """Header of an object whose stamp is 12 s earlier, before the start of the measurement."""
+
+    layout = struct.Struct("<LHHq")
+    size = layout.size
+
+    def pack(self, flags: int, index: int, version: int, stamp: int) -> bytes:
+        return self.layout.pack(flags, index, version, stamp - 12 * 10**9)
+
+
+def test_frames_before_the_trigger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "bus.blf"
+    monkeypatch.setattr("can.io.blf.OBJ_HEADER_V1_STRUCT", SignedStamps())
+    with can.BLFWriter(str(path)) as writer:
+        for stamp in (0.0, 11.5, 12.25):
+            writer.on_message_received(
+                can.Message(timestamp=1.7e9 + stamp, arbitration_id=0x123, data=b"\1", channel=0)
+            )
+    monkeypatch.undo()
+    assert read_blf(path).time == pytest.approx([-12.0, -0.5, 0.25], abs=5e-6)
 
 
 def test_frames_of_can_fd_are_longer(tmp_path: Path) -> None:

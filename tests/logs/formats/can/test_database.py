@@ -115,7 +115,7 @@ def test_what_does_not_fit_is_refused() -> None:
 
 
 def test_what_is_no_dbc(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match="no such DBC file"):
+    with pytest.raises(FileFormatError, match="cannot read the file: No such file"):
         read_database((tmp_path / "none.dbc",))
     wrong = tmp_path / "wrong.dbc"
     wrong.write_text("BO_ what is this")

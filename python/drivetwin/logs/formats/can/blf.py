@@ -3,13 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
+from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
+
+_RANGE = 2.0**64 * 1e-9
+"""Time [s] after which 64 bits of nanoseconds start again."""
 
 
 def read_blf(path: Path) -> Frames:
@@ -37,6 +43,7 @@ def _read_frames(reader: Any, kind: str, path: Path) -> Frames:
     if left_out:
         warnings.append(f"{left_out} remote or error frames left out")
     stamps, identifiers, extended, payloads, buses = zip(*frames, strict=True)
+    stamps = tuple(_count_from_start(stamps, reader.start_timestamp).tolist())
     return build_frames(stamps, identifiers, extended, payloads, buses, tuple(warnings))
 
 
@@ -55,3 +62,12 @@ def _collect_frames(
              f"channel {message.channel}")
         )  # fmt: skip
     return left_out
+
+
+def _count_from_start(stamps: Sequence[float], start: float) -> FloatArray:
+    """Return the time [s] from the start of the measurement, negative before its trigger.
+
+    The file counts in 64 bits without a sign: a negative time arrives as a very late one.
+    """
+    time = np.array(stamps, np.float64) - start
+    return np.where(time > 0.5 * _RANGE, time - _RANGE, time)

@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
 
-_STAMP = rb"^[ \t]*\((?P<time>(?:\d{4}-\d{2}-\d{2} \d{2}:\d{2}:)?\d{1,12}\.\d{1,9})\)[ \t]+"
+_STAMP = rb"^[ \t]*\((?P<time>(?:\d{4}-\d{2}-\d{2} \d{2}:\d{2}:)?-?\d{1,12}\.\d{1,9})\)[ \t]+"
 _LINE = re.compile(
     _STAMP + rb"(?P<bus>[\w.:-]+)[ \t]+"
     rb"(?:(?:RX|TX|[-BE]{2})[ \t]+(?:[-BE]{2}[ \t]+)?)?(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})"
@@ -86,7 +86,7 @@ def read_candump(data: bytes, file: str) -> Frames:
 
 def _parse_seconds(stamp: bytes) -> float | None:
     """A stamp [s], counted from 1970 where it is a date; None for a date that does not exist."""
-    if b"-" not in stamp:
+    if b":" not in stamp:
         return float(stamp)
     day, _, seconds = stamp.rpartition(b":")
     try:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,24 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
+from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import Signal
+from drivetwin.errors import FileFormatError
+from drivetwin.logs.formats.frames import Message, Signal
+from drivetwin.logs.formats.number_texts import select_numbers
 
 Bytes = NDArray[np.uint8]
 _MOST_BITS = 56
 """Longer integers do not fit float64 exactly and carry no physical quantity."""
-
-
-@dataclass(frozen=True)
-class Message:
-    """A message: `identifier` of 11 bits, or 29 if `extended`; `j1939`: only its group counts."""
-
-    name: str
-    identifier: int
-    extended: bool
-    j1939: bool
-    signals: tuple[Signal, ...]
 
 
 def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:
@@ -40,10 +30,7 @@ def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:
     messages: list[Message] = []
     for path in paths:
         cantools = import_extra("cantools.database", "can", "decoding a bus log", path)
-        if not path.is_file():
-            raise FileFormatError(
-                "there is no such DBC file", "correct dbc under [bus]", Where(file=str(path))
-            )
+        measure_regular_file(path, FileFormatError, "correct dbc under [bus]")
         with handle_parser_errors("a DBC file", path):
             text = path.read_text(encoding="cp1252", errors="replace")
             content = cantools.load_string(text, "dbc", strict=False)
@@ -82,6 +69,7 @@ def _convert_signal(source: Any, by_name: dict[str, Any]) -> Signal:
         limits=(float(low), float(high)) if stated else None,
         selector=selector,
         spn=source.spn,
+        texts=tuple((int(code), str(text)) for code, text in (source.choices or {}).items()),
     )
 
 
@@ -106,13 +94,29 @@ def decode_codes(data: Bytes, signal: Signal) -> NDArray[np.int64]:
 
 
 def decode_physical(data: Bytes, signal: Signal) -> FloatArray:
-    """Return the values (n,) of a signal in its unit; ValueError as in `codes`."""
+    """Return the values (n,) of a signal in its unit; ValueError as in `decode_codes`.
+
+    Texts of the database that are numbers are the values of their codes, NaN where others beside
+    them are none.
+    """
     if signal.is_float:
         return signal.scale * _decode_floats(data, signal) + signal.offset
     raw = decode_codes(data, signal)
     if signal.signed:
         raw = np.where(raw >> (signal.length - 1), raw - (1 << signal.length), raw)
-    return signal.scale * raw.astype(np.float64) + signal.offset
+    values = signal.scale * raw.astype(np.float64) + signal.offset
+    named = _find_number_texts(signal)
+    for code, number in zip((code for code, _ in signal.texts), named, strict=False):
+        values[raw == code] = number
+    return values
+
+
+def _find_number_texts(signal: Signal) -> FloatArray:
+    """Return the value of each named code, NaN without one; empty where names are no values."""
+    codes = np.array([code for code, _ in signal.texts], np.float64)
+    physical = signal.scale * codes + signal.offset
+    found = select_numbers([text for _, text in signal.texts], physical)
+    return np.empty(0) if found is None else found.values
 
 
 def _decode_floats(data: Bytes, signal: Signal) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.logs.formats.frames import PAYLOAD, Frames
+from drivetwin.logs.formats.frames import FD_LENGTHS, PAYLOAD, Frames
 from drivetwin.logs.origin import subtract_origin
 
 DATA_FRAME = "CAN_DataFrame"
@@ -16,8 +16,7 @@ DATA_FRAME = "CAN_DataFrame"
 
 _RECORDS = frozenset(f"CAN_{kind}Frame" for kind in ("Data", "Remote", "Error", "Overload"))
 _EXTENDED, _NUMBER = 0x80000000, 0x1FFFFFFF
-_LENGTHS = np.array([*range(9), 12, 16, 20, 24, 32, 48, 64], np.uint8)
-"""Data bytes by the code of CAN FD."""
+_LENGTHS = np.array(FD_LENGTHS, np.uint8)
 
 
 def has_only_frames(group: Any) -> bool:

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -13,24 +14,38 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.logs.formats.can.asc import is_asc, read_asc
 from drivetwin.logs.formats.can.blf import read_blf
 from drivetwin.logs.formats.can.candump import is_candump, read_candump
-from drivetwin.logs.formats.can.database import Message, read_database
+from drivetwin.logs.formats.can.database import read_database
 from drivetwin.logs.formats.can.recording import BusRecording
-from drivetwin.logs.formats.frames import Frames
+from drivetwin.logs.formats.can.trc import is_trc, read_trc
+from drivetwin.logs.formats.frames import Frames, Message
+from drivetwin.logs.formats.j1939.matching import match_groups
 from drivetwin.logs.raw import Recording
+
+_HEAD = 8192
+"""Number of bytes used to detect a format."""
+
+_TEXT_FORMATS: tuple[tuple[Callable[[bytes], bool], Callable[[bytes, str], Frames]], ...] = (
+    (is_trc, read_trc),
+    (is_candump, read_candump),
+    (is_asc, read_asc),
+)
+"""Test of the first bytes, and reader, of each bus log in text form."""
 
 
 def is_bus_text(head: bytes) -> bool:
     """Return True if the first bytes of a file are a bus log in text form."""
-    return is_candump(head) or is_asc(head)
+    return any(fits(head) for fits, _ in _TEXT_FORMATS)
 
 
 @contextmanager
 def open_bus_text(path: Path, options: ReadOptions) -> Iterator[Recording]:
-    """Open a candump or ASC log; raises FileFormatError, MissingExtraError, MissingChannelError."""
+    """Open a bus log in text form.
+
+    Raises FileFormatError, MissingExtraError, MissingChannelError.
+    """
     data = path.read_bytes()
-    read = read_candump if is_candump(data[:8192]) else read_asc
-    frames = read(data, str(path))
-    yield decode_recording(frames, options, path)
+    read = next(read for fits, read in _TEXT_FORMATS if fits(data[:_HEAD]))
+    yield decode_recording(read(data, str(path)), options, path)
 
 
 @contextmanager
@@ -41,7 +56,10 @@ def open_blf(path: Path, options: ReadOptions) -> Iterator[Recording]:
 
 def decode_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
     """Decode frames by the databases stated; raises MissingChannelError, MissingExtraError."""
-    return BusRecording(frames, _select_messages(options.bus.databases), options.bus, path)
+    stated = _select_messages(options.bus.databases)
+    messages, notes = match_groups(frames, stated, _load_j1939_messages)
+    frames = replace(frames, warnings=(*frames.warnings, *notes))
+    return BusRecording(frames, messages, options.bus, path)
 
 
 def _select_messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:

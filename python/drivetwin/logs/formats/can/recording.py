@@ -15,20 +15,19 @@ from drivetwin.channels.read_options import BusOptions, Column
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError, MissingChannelError, Where
 from drivetwin.logs.formats.can.database import (
-    Message,
     decode_codes,
     decode_physical,
     select_valid_payloads,
 )
-from drivetwin.logs.formats.frames import Frames, Signal
+from drivetwin.logs.formats.frames import Frames, Message, Signal
 from drivetwin.logs.formats.j1939 import torque
 from drivetwin.logs.formats.j1939.codes import check_codes
 from drivetwin.logs.formats.j1939.identifier import (
     ENGINE,
     TRANSMISSION,
-    decode_group,
     decode_sender,
 )
+from drivetwin.logs.formats.j1939.matching import GroupTable, get_group
 from drivetwin.logs.formats.j1939.transport import REPEATED, Assembled, assemble_messages
 from drivetwin.logs.raw import MIN_SAMPLES, RawChannel, Window
 
@@ -117,6 +116,10 @@ class BusRecording:
             if check.note:
                 notes.append(check.note)
             there[there] = check.valid
+        named = there & np.isnan(values) if signal.texts else np.zeros_like(there)
+        if named.any():
+            notes.append(f"{int(named.sum())} samples whose text is no number left out")
+            there &= ~named
         again = _find_repeats(track) & there
         if again.any():
             notes.append(f"{int(again.sum())} repeated frames, or with an earlier stamp, left out")
@@ -246,12 +249,12 @@ def _make_group_label(message: Message, sender: int | None, bus: str, many: bool
 
 def _collect_single_frames(frames: Frames, messages: Sequence[Message]) -> Iterator[Track]:
     """Messages that fit one frame."""
-    groups, senders = decode_group(frames.identifier), decode_sender(frames.identifier)
+    table = GroupTable(messages, frames)
+    senders = decode_sender(frames.identifier)
     many = len(frames.buses) > 1
     for message in messages:
         if message.j1939:
-            wanted = decode_group(np.array([message.identifier], np.uint32))[0]
-            mine = frames.extended & (groups == wanted)
+            mine = frames.extended & np.isin(frames.identifier, table.find_identifiers(message))
             tags = np.where(mine, senders, 0)
         else:
             mine = (frames.extended == message.extended) & (frames.identifier == message.identifier)
@@ -275,12 +278,17 @@ def _collect_multi_packet(
     assembled: Sequence[Assembled], messages: Sequence[Message], frames: Frames
 ) -> Iterator[Track]:
     """Messages that the transport protocol brought."""
+    table = GroupTable(messages, frames)
     many = len(frames.buses) > 1
     for message in messages:
         if not message.j1939:
             continue
-        wanted = int(decode_group(np.array([message.identifier], np.uint32))[0])
-        mine = [one for one in assembled if one.group == wanted]
+        wanted = get_group(message)
+        mine = [
+            one
+            for one in assembled
+            if one.group == wanted and table.holds(message, one.sender, one.receiver)
+        ]
         for bus, sender in sorted({(one.bus, one.sender) for one in mine}):
             own = [one for one in mine if (one.bus, one.sender) == (bus, sender)]
             width = max(max(len(one.payload) for one in own), _get_longest_payload(message))

@@ -31,3 +31,8 @@ def decode_receiver(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
     """Return the destination address (n,); 255 for all, as for groups that name no receiver."""
     pdu_format = (identifier >> 16) & 0xFF
     return np.where(pdu_format < _PDU1_BELOW, (identifier >> 8) & 0xFF, 0xFF).astype(np.uint32)
+
+
+def is_proprietary(group: int) -> bool:
+    """Return True for a group whose content each sender defines for itself."""
+    return group & 0xFFFF == 0xEF00 or group & 0xFF00 == 0xFF00

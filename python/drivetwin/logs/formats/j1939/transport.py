@@ -29,13 +29,14 @@ _BYTES, _LONGEST = 7, 1785
 
 @dataclass(frozen=True)
 class Assembled:
-    """A message put together: `time` [s] of its last packet."""
+    """A message put together: `time` [s] of its last packet; `receiver` 255 for all."""
 
     time: float
     group: int
     sender: int
     bus: int
     payload: bytes
+    receiver: int = 0xFF
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ class _Assembly:
                 self._faults["last packet too short"] += 1
                 return
             self._messages.append(
-                Assembled(time, transfer.group, key[1], key[0], data[: transfer.length])
+                Assembled(time, transfer.group, key[1], key[0], data[: transfer.length], key[2])
             )
 
     def close_transfers(self) -> Transport:

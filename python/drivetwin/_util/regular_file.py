@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""Border for files that users name: only regular files are opened."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from drivetwin.errors import DrivetwinError, Where
+
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def measure_regular_file(
+    path: Path, error: type[DrivetwinError], remedy: str = "check the path"
+) -> int:
+    """Return the size [bytes] of a regular file, without opening it.
+
+    A device, named pipe or socket could block or never end. Symbolic links are followed. Raises
+    `error`, with `remedy`, where the path is missing, and where it is no regular file.
+    """
+    where = Where(file=str(path))
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as fault:  # ValueError: the path contains a NUL
+        why = getattr(fault, "strerror", None) or fault
+        raise error(f"cannot read the file: {why}", remedy, where) from None
+    if not stat.S_ISREG(status.st_mode):
+        kind = next((name for is_kind, name in _KINDS if is_kind(status.st_mode)), "special")
+        what = f"cannot read the file: it is {kind}, not a regular file"
+        raise error(what, "name a regular file; copy the data into one first", where)
+    return status.st_size

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Only regular files are opened; devices, pipes and sockets end at once as typed errors."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from drivetwin._util.regular_file import measure_regular_file
+from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.drive import load_powertrain
+from drivetwin.errors import DrivetwinError, FileFormatError
+from drivetwin.files.result_file import load_result
+from drivetwin.files.twin_file import read_twin_file
+from drivetwin.fleet.rules import read_rules
+from drivetwin.gearbox import load_gearbox
+from drivetwin.logs.formats.can.database import read_database
+from drivetwin.logs.read import read_raw
+from drivetwin.vehicle.card import load_card
+
+READERS: tuple[Callable[[Path], object], ...] = (
+    read_raw,
+    load_card,
+    read_mapping,
+    load_gearbox,
+    load_powertrain,
+    read_rules,
+    read_twin_file,
+    load_result,
+    lambda path: read_database((path,)),
+)
+
+
+def make_socket(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as one:
+        one.bind(str(path))
+
+
+SPECIAL: dict[str, Callable[[Path], object]] = {
+    "a folder": Path.mkdir,
+    "a named pipe": os.mkfifo,
+    "a socket": make_socket,
+    "a device": lambda path: path.symlink_to("/dev/zero"),
+}
+
+
+def test_the_size_of_a_regular_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"1234")
+    link = tmp_path / "b.csv"
+    link.symlink_to(path)
+    assert measure_regular_file(path, FileFormatError) == 4
+    assert measure_regular_file(link, FileFormatError) == 4
+
+
+@pytest.mark.parametrize("kind", SPECIAL)
+@pytest.mark.parametrize("reader", READERS)
+def test_special_files_are_typed_errors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reader: Callable[[Path], object], kind: str
+) -> None:
+    monkeypatch.chdir(tmp_path)  # the path of a socket is short
+    path = Path("file.toml")
+    SPECIAL[kind](path)
+    with pytest.raises(DrivetwinError, match=f"it is {kind}, not a regular file"):
+        reader(path)
+
+
+@pytest.mark.parametrize("name", ["absent.toml", "with\0nul.toml", "x" * 300 + ".toml"])
+@pytest.mark.parametrize("reader", READERS)
+def test_paths_that_lead_nowhere(
+    tmp_path: Path, reader: Callable[[Path], object], name: str
+) -> None:
+    with pytest.raises(DrivetwinError, match="cannot read the file"):
+        reader(tmp_path / name)
+
+
+def test_a_loop_of_links(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.symlink_to(path)
+    with pytest.raises(FileFormatError, match="cannot read the file"):
+        read_raw(path)
