@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
+from drivetwin._util.low_pass import filter_zero_phase
 from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.shift import Shift
@@ -61,9 +61,15 @@ class _Torque:
 
 
 def compute_shift_quality(
-    log: ShiftLog, card: VehicleCard, shift: Shift, J_vehicle: float | None = None
+    log: ShiftLog,
+    card: VehicleCard,
+    shift: Shift,
+    J_vehicle: float | None = None,
+    speeds: GearboxSpeeds | None = None,
 ) -> dict[str, float]:
     """Figures of one shift by name, units in QUALITY_UNITS.
+
+    `speeds` are those of the log by `resample_speeds`, which spares computing them for each shift.
 
     `slip_at_lockup`: mean slip of the on-coming element (eq. 15) over 0.1 s from lock-up;
     `flare_speed`: input speed above the higher of the two synchronous speeds; `undershoot_speed`:
@@ -89,7 +95,7 @@ def compute_shift_quality(
         "torque_phase_time": shift.torque_phase[1] - start,
         "inertia_phase_time": end - shift.inertia_phase[0],
     }
-    speeds = resample_speeds(log, card)
+    speeds = speeds or resample_speeds(log, card)
     figures |= _compute_speed_excess(speeds, compute_gear_ratios(card), shift)
     figures |= _compute_residual_slip(speeds, card.get_clutch_ratios(shift.oncoming), shift)
     torque = _select_output_torque(log, shift)
@@ -107,7 +113,7 @@ def _filter_low_pass(values: FloatArray, step: float, cutoff: float) -> FloatArr
     """Zero-phase Butterworth of order 2 run twice; unchanged where sampling is too slow for it."""
     if cutoff * step >= 0.4 or len(values) < 16:
         return values
-    return np.asarray(sosfiltfilt(butter(2, cutoff, fs=1.0 / step, output="sos"), values))
+    return filter_zero_phase(values, step, cutoff)
 
 
 def _sample_uniformly(channel: Channel, span: tuple[float, float]) -> tuple[FloatArray, FloatArray]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
-from importlib.resources import as_file, files
 from pathlib import Path
 
 from drivetwin.channels.read_options import ReadOptions
@@ -16,6 +14,7 @@ from drivetwin.logs.formats.can.candump import is_candump, read_candump
 from drivetwin.logs.formats.can.database import Message, read_database
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.frames import Frames
+from drivetwin.logs.formats.j1939.driveline import load_driveline_messages
 from drivetwin.logs.raw import Recording
 
 
@@ -46,10 +45,4 @@ def decode_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRec
 
 def _select_messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:
     """Messages of the stated databases, else the built-in ones of J1939."""
-    return read_database(databases) if databases else _load_j1939_messages()
-
-
-@cache
-def _load_j1939_messages() -> tuple[Message, ...]:
-    with as_file(files("drivetwin.logs.formats.j1939") / "driveline.dbc") as path:
-        return read_database((path,))
+    return read_database(databases) if databases else load_driveline_messages()
