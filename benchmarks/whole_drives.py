@@ -89,7 +89,8 @@ def _build_columns(drive: WholeDrive, motion: DriveRun) -> dict[tuple[str, str],
         repeated = np.tile(np.concatenate([sampled, return_to_start]), drive.repeats)
         columns[name, unit] = repeated + _NOISE[name] * rng.normal(size=repeated.size)
     size = next(iter(columns.values())).size
-    return {("time", "s"): drive.step * np.arange(size), **columns}
+    time = np.asarray(drive.step * np.arange(size), dtype=np.float64)
+    return {("time", "s"): time, **columns}
 
 
 def _write_log(path: Path, columns: dict[tuple[str, str], FloatArray]) -> None:
@@ -146,7 +147,7 @@ def main() -> int:
                 f"{drive.name}: {seconds:.1f} s CPU, limit {drive.limit:g} s; "
                 f"{found} of {drive.shifts} shifts"
             )
-            failed |= seconds > drive.limit or found < drive.shifts
+            failed |= seconds > drive.limit or found < 0.9 * drive.shifts
     return int(failed)
 
 

@@ -26,8 +26,8 @@ def test_equals_scipy(size: int, share: float, seed: int, level: float) -> None:
 
 
 def test_keeps_a_ramp_away_from_the_ends() -> None:
-    ramp = 3.0 + 0.5 * np.arange(600)
-    found = filter_zero_phase(ramp, 1e-3, 30.0)
+    ramp = 3.0 + 0.5 * np.arange(600.0)
+    found = filter_zero_phase(np.asarray(ramp, dtype=np.float64), 1e-3, 30.0)
     assert found[200:400] == pytest.approx(ramp[200:400], rel=1e-9)
 
 

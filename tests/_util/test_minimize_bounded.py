@@ -23,7 +23,7 @@ from drivetwin._util.minimize_bounded import minimize_bounded
 )
 def test_takes_the_steps_of_scipy(centre: float, power: float, ripple: float, width: float) -> None:
     def function(x: float) -> float:
-        return abs(x - centre) ** power + ripple * math.sin(5.0 * x)
+        return math.pow(abs(x - centre), power) + ripple * math.sin(5.0 * x)
 
     bounds = (centre - width, centre + 0.7 * width)
     found = minimize_bounded(function, bounds, 1e-5)

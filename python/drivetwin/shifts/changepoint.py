@@ -156,9 +156,11 @@ def _solve_reduced(
     Singular values below the rounding error of `samples` rows count as zero, as in
     `numpy.linalg.lstsq`; the coefficients are then those of least norm.
     """
-    chosen = np.linalg.qr(factors[:, :, [0, *powers, -1]], mode="r")
+    columns = factors[:, :, [0, *powers, -1]]
+    chosen = np.asarray(np.linalg.qr(columns, mode="r"), dtype=np.float64)
     count = len(powers) + 1
-    left, size, right = np.linalg.svd(chosen[:, :count, :count])
+    square = np.ascontiguousarray(chosen[:, :count, :count])
+    left, size, right = np.linalg.svd(square)
     projected = (left.transpose(0, 2, 1) @ chosen[:, :count, count:])[..., 0]
     kept = size > np.finfo(float).eps * samples * size[:, :1]
     solved = np.divide(projected, size, out=np.zeros_like(size), where=kept)

@@ -50,7 +50,7 @@ def check_flags(
     log: ShiftLog, shifts: Sequence[Shift], rejected: Sequence[RejectedShift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
     """The shifts with a finding where flag or gear contradict them, and flags without a shift."""
-    flag = log["shift_in_process"] if "shift_in_process" in log else None
+    flag = log.channels.get("shift_in_process")
     spans = None if flag is None else find_flag_spans(flag)
     told = tuple(
         replace(s, findings=(*s.findings, *_find_contradictions(log, s, spans))) for s in shifts

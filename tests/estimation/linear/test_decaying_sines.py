@@ -16,10 +16,10 @@ from drivetwin.estimation.linear.decaying_sines import Windows, compute_misfits,
 def _make(
     size: int, rate: float, omega: float, noise: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    time = 0.02 * np.arange(size)
+    time = np.asarray(0.02 * np.arange(size), dtype=np.float64)
     swing = 3.0 * np.exp(-rate * time) * np.cos(omega * time + 0.4)
     jitter = noise * np.random.default_rng(size).normal(size=size)
-    return time, 150.0 + 4.0 * time - time**2 + swing + jitter
+    return time, np.asarray(150.0 + 4.0 * time - time**2 + swing + jitter)
 
 
 @settings(max_examples=40, derandomize=True, deadline=None)

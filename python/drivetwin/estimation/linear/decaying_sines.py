@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 
@@ -57,8 +58,8 @@ class Windows:
         trend = np.linalg.qr(powers)[0]
         return cls(time, inside, _remove(trend, padded[..., None])[..., 0], trend)
 
-    def select(self, kept: FloatArray) -> Windows:
-        """Return the windows of an index or mask."""
+    def select(self, kept: NDArray[np.intp]) -> Windows:
+        """Return the windows at the indices `kept` (k,)."""
         return Windows(self.time[kept], self.inside[kept], self.rest[kept], self.trend[kept])
 
 
@@ -150,4 +151,5 @@ def _solve(columns: FloatArray, targets: FloatArray) -> FloatArray:
 def _tiny(diagonal: FloatArray) -> FloatArray:
     """Matrices (w, 2, 2) that keep a system with this `diagonal` (w, 2) solvable."""
     smallest = np.finfo(float).tiny
-    return (_SINGULAR * diagonal.sum(axis=1) + smallest)[:, None, None] * np.eye(2)
+    size = _SINGULAR * diagonal.sum(axis=1) + smallest
+    return np.asarray(size[:, None, None] * np.eye(2))
