@@ -72,7 +72,7 @@ def _build_columns(drive: WholeDrive, motion: DriveRun) -> dict[tuple[str, str],
     """Columns (n,) by name and unit: the motion at the drive's step, repeated, with noise."""
     every, rest = round(drive.step / STEP), round(drive.pause / drive.step)
     one = {
-        ("EngTrq", "Nm"): motion.turbine_torque,
+        ("EngTrq", "Nm"): motion.engine_torque,
         ("TrqOut", "Nm"): motion.shaft_torque,
         ("EngSpd", "rpm"): motion.engine_speed / RPM,
         ("InpSpd", "rpm"): motion.input_speed / RPM,

@@ -123,9 +123,22 @@ def _print_details(found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedR
     for gear in seen.gears:
         if gear.reason:
             print_paragraph(f"gear {gear.gear}: {gear.reason}")
-    for shift, swing in seen.swings:
-        print_paragraph(f"{_format_name(shift)}: {_describe_resonance(swing)}")
+    _print_resonances(seen)
     _print_remarks(found)
+
+
+def _print_resonances(seen: _SpeedResults) -> None:
+    """Print the resonances found, and each reason for which there is none once."""
+    refused: dict[str, list[str]] = {}
+    for shift, swing in seen.swings:
+        if isinstance(swing, str):
+            refused.setdefault(swing, []).append(_format_name(shift))
+        else:
+            print_paragraph(f"{_format_name(shift)}: {_describe_resonance(swing)}")
+    for reason, labels in refused.items():
+        names = ", ".join(dict.fromkeys(labels))
+        count = f" ({len(labels)} shifts)" if len(labels) > 1 else ""
+        print_paragraph(f"{names}{count}: {reason}")
 
 
 def _print_remarks(found: FoundShifts) -> None:
@@ -146,9 +159,7 @@ def _format_name(shift: Shift) -> str:
     return f"{shift.start_gear}→{shift.end_gear}"
 
 
-def _describe_resonance(swing: Resonance | str) -> str:
-    if isinstance(swing, str):
-        return swing
+def _describe_resonance(swing: Resonance) -> str:
     frequency, damping = (
         _format_spread(swing.f_d, swing.f_d_std),
         _format_spread(swing.zeta, swing.zeta_std),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.findings import Finding
+from drivetwin.findings import Code, Finding
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 
@@ -75,14 +75,18 @@ def _summarize_group(kind: ShiftKind, gears: str | None, shifts: Sequence[Shift]
 
 
 def collect_findings(shifts: Iterable[Shift]) -> tuple[tuple[Finding, tuple[str, ...]], ...]:
-    """Return the first finding of each code with the labels of all shifts that have the code."""
-    first: dict[str, Finding] = {}
-    labels: dict[str, list[str]] = {}
+    """Return the first finding of each kind with the labels of all shifts that have it.
+
+    Findings on different gears are of different kinds.
+    """
+    first: dict[tuple[Code, str], Finding] = {}
+    labels: dict[tuple[Code, str], list[str]] = {}
     for shift in shifts:
-        for one in shift.findings:
-            first.setdefault(one.code, one)
-            labels.setdefault(one.code, []).append(f"{shift.start_gear}→{shift.end_gear}")
-    return tuple((first[code], tuple(labels[code])) for code in first)
+        own = {(one.code, one.names.get("gear", "")): one for one in shift.findings}
+        for key, one in own.items():
+            first.setdefault(key, one)
+            labels.setdefault(key, []).append(f"{shift.start_gear}→{shift.end_gear}")
+    return tuple((first[key], tuple(labels[key])) for key in first)
 
 
 def collect_rejected(
