@@ -24,7 +24,7 @@ _EXTENDED = 1 << 31
 @cache
 def load_driveline_messages() -> tuple[Message, ...]:
     """Load the messages of `driveline.dbc`: J1939, Intel order, unsigned, not multiplexed."""
-    text = (files(__package__) / "driveline.dbc").read_text(encoding="utf-8")
+    text = (files("drivetwin.logs.formats.j1939") / "driveline.dbc").read_text(encoding="utf-8")
     numbers: dict[tuple[str, str], int] = {}
     found: dict[str, list[re.Match[str]]] = {}
     names: dict[str, str] = {}

@@ -8,7 +8,7 @@ from importlib.resources import as_file, files
 import pytest
 
 from drivetwin.logs.formats.can.database import read_database
-from drivetwin.logs.formats.j1939.driveline import load_driveline_messages
+from drivetwin.logs.formats.can.driveline import load_driveline_messages
 
 
 def test_equal_to_what_cantools_reads() -> None:
