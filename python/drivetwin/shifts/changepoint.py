@@ -17,8 +17,8 @@ _GRID = 80
 """Hinges compared before the best one is refined."""
 _HIGHEST = 3
 """Highest power of the time from the hinge."""
-_RESOLUTION = 1e-5
-"""Accuracy of the refined hinge [s]."""
+_RESOLUTION = 0.01
+"""Accuracy of the refined hinge [ms]."""
 
 
 class Moving(Enum):
@@ -188,7 +188,7 @@ def _fit_curve(
     if not np.isfinite(costs[best]):
         return None
     bracket = (search.grid[max(best - 1, 0)], search.grid[min(best + 1, _GRID - 1)])
-    hinge = minimize_bounded(lambda h: solve(h)[1], bracket, _RESOLUTION)
+    hinge = minimize_bounded(lambda h: solve(h)[1], bracket, 1e-3 * _RESOLUTION)
     coefficients, misfit = solve(hinge)
     if misfit > costs[best] or coefficients[1] * search.direction <= 0.0:
         hinge = float(search.grid[best])

@@ -23,7 +23,7 @@ _CONVERGED = 1e-10
 """Relative decrease of the misfit at which a search has converged."""
 _STUCK = 1e8
 """Damping from which on a search cannot descend further."""
-_DIFFERENCE = 1e-5
+_DIFFERENCE = 3e-6
 """Relative step of the differences that give a Jacobian."""
 _STEEPEST = 50.0
 """Largest exponent of the decay."""

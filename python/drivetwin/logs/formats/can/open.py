@@ -12,9 +12,9 @@ from drivetwin.logs.formats.can.asc import is_asc, read_asc
 from drivetwin.logs.formats.can.blf import read_blf
 from drivetwin.logs.formats.can.candump import is_candump, read_candump
 from drivetwin.logs.formats.can.database import Message, read_database
+from drivetwin.logs.formats.can.driveline import load_driveline_messages
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.frames import Frames
-from drivetwin.logs.formats.can.driveline import load_driveline_messages
 from drivetwin.logs.raw import Recording
 
 
