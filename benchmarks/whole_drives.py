@@ -58,7 +58,8 @@ DRIVES = (
 
 
 def write_drive(drive: WholeDrive, folder: Path) -> tuple[Path, Path]:
-    """Write log (CSV) and vehicle card of a drive; return their paths."""
+    """Write log (CSV) and vehicle card of a drive into a folder; return their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
     box = load_gearbox(drive.card)
     powertrain = load_powertrain(select_powertrain(box))
     motion = run(box, powertrain, plan_all_shift_kinds(box, powertrain.control))
