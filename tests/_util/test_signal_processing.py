@@ -11,6 +11,7 @@ from drivetwin._util.signal_processing import (
     estimate_resolution,
     estimate_rounding_step,
     find_true_runs,
+    integrate_trapezoids,
 )
 
 
@@ -63,3 +64,8 @@ def test_true_runs_are_half_open() -> None:
     mask = np.array([True, True, False, True, False, False, True])
     assert find_true_runs(mask) == [(0, 2), (3, 4), (6, 7)]
     assert find_true_runs(np.zeros(3, np.bool_)) == []
+
+
+def test_trapezoids_of_a_line_are_its_integral() -> None:
+    time = np.array([0.0, 0.1, 0.5, 2.0])
+    assert integrate_trapezoids(3.0 * time + 1.0, time) == pytest.approx(1.5 * time**2 + time)

@@ -50,7 +50,7 @@ def card(folder: Path, text: str) -> Gearbox:
 
 
 def test_every_built_in_card_is_sound_and_names_its_source() -> None:
-    assert len(list_builtin_gearboxes()) == 10
+    assert len(list_builtin_gearboxes()) == 11
     for name in list_builtin_gearboxes():
         box = load_gearbox(name)
         assert box.source
@@ -128,7 +128,7 @@ def test_faults_are_told_by_key(tmp_path: Path, old: str, new: str, key: str, te
 
 def test_an_unknown_name_lists_the_built_in_cards() -> None:
     with pytest.raises(CardError, match="did you mean 'zf-8hp70'"):
-        load_gearbox("zf-8hp7")
+        load_gearbox("zf-8hp-70")
 
 
 def test_what_a_card_leaves_out_is_asked_for_when_needed(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def test_powers_and_torques_balance(name: str, gear: str) -> None:
     assert into_output == pytest.approx(solved.ratio, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["three-set-3000", "zf-8hp70", "ravigneaux-4"])
+@pytest.mark.parametrize("name", ["three-set-3000", "zf-8hp70", "zf-8hp75", "ravigneaux-4"])
 def test_a_planetary_set_shares_torque_as_its_teeth_do(name: str) -> None:
     box = load_gearbox(name)
     for gear in box.gears:
@@ -65,6 +65,13 @@ def test_a_ratio_that_is_not_the_published_one_is_told() -> None:
     assert not describe_ratio_differences(box, {each.name: each.published for each in box.gears})
     (remark,) = describe_ratio_differences(box, {"6": 1.0, "R": -box.get_gear("R").published})
     assert remark.startswith("gear R: the computed ratio 3.2968 is not the published -3.2968 ")
+
+
+def test_the_second_8hp_generation_has_the_published_ratios() -> None:
+    published = (5.000, 3.200, 2.143, 1.720, 1.313, 1.000, 0.823, 0.640)
+    box = load_gearbox("zf-8hp75")
+    for gear, ratio in zip("12345678", published, strict=True):
+        assert solve_gear(box, gear).ratio == pytest.approx(ratio, abs=5.1e-4)
 
 
 def test_an_idle_shaft_has_no_speed() -> None:

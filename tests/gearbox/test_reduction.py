@@ -34,6 +34,7 @@ def test_a_brake_has_the_ratios_of_its_gear() -> None:
     [
         ("three-set-4000cr", "4", "5"),
         ("zf-8hp70", "2", "3"),
+        ("zf-8hp75", "2", "3"),
         ("gm-8l90", "7", "8"),
         ("ravigneaux-4", "3", "4"),
         ("simpson-3", "2", "3"),

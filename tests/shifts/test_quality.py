@@ -54,6 +54,7 @@ def test_without_torque_only_times_and_speeds() -> None:
         "flare_speed",
         "undershoot_speed",
         "slip_at_lockup",
+        "wheel_jerk_of_speed_max",
     }
     assert figures["shift_time"] == pytest.approx(0.6)
     assert figures["torque_phase_time"] == pytest.approx(0.2)
@@ -127,8 +128,23 @@ def test_friction_work_of_the_reference(name: str) -> None:
 def test_every_figure_has_a_unit_and_is_reached() -> None:
     truth = load_reference("upshift")
     (shift,), _ = detect_shifts(truth.log, make_card({"2": 1.91, "3": 1.43}, PriorValue(0.8e5)))
-    assert set(shift.quality) == set(QUALITY_UNITS)
+    elsewhere = {"response_time", "wheel_jerk_of_speed_max"}
+    assert set(shift.quality) == set(QUALITY_UNITS) - elsewhere
     assert all(np.isfinite(value) for value in shift.quality.values())
+
+
+def test_without_torque_the_jerk_is_that_of_the_output_speed() -> None:
+    log = _log()
+    omega = 2.0 * np.pi * 1.0
+    swing = log["output_speed"].values + 3.0 * np.sin(omega * _TIME)
+    shaken = make_log(
+        {
+            "input_speed": (_TIME, log["input_speed"].values),
+            "output_speed": (_TIME, swing),
+        }
+    )
+    jerk = compute_shift_quality(shaken, _CARD, _SHIFT)["wheel_jerk_of_speed_max"]
+    assert jerk == pytest.approx(3.0 * omega**2 / _CARD.final_drive, rel=0.05)
 
 
 def test_cut_or_damaged_torque_gives_no_torque_figures() -> None:

@@ -36,6 +36,12 @@ def compute_moving_mean(values: FloatArray, width: int) -> FloatArray:
     return mean
 
 
+def integrate_trapezoids(values: FloatArray, time: FloatArray) -> FloatArray:
+    """Return the integral (n,) of `values` (n,) over `time` (n,) from the first sample on."""
+    areas = np.diff(time) * (values[1:] + values[:-1]) / 2.0
+    return np.concatenate([np.zeros(1), np.cumsum(areas)])
+
+
 def find_true_runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first index and end (one past the last) of each run of True in `mask` (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))

@@ -80,6 +80,8 @@ _NAMES: dict[str, str] = {
     "wheel_speed": f"({_make_either_order(_WHEEL, _SPEED)}|ww)({_SIDE})?",
     "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung|wert)?" + _STATE,
     "gear": "(trans)?(current|act|actual|ist|n)?(gear|gang)(engaged)?" + _STATE,
+    "requested_gear": "(trans|getr|tcu)?(((selected|requested|request|req|desired|target|ziel|soll)"
+    "(gear|gang))|((gear|gang)(selected|requested|request|req|desired|target|ziel|soll)))",
     "shift_in_process": "(trans|getr)?(shift|schaltung)(inprocess|active|flag|aktiv)" + _STATE,
     "lockup_engaged": "(trans)?(torqueconverter|tc|wandler)?(lockup|luc|wk)(engaged|closed|zu)?"
     + _STATE,

@@ -32,6 +32,7 @@ class ByRole(StrictModel, Generic[Entry]):
     wheel_speed: Entry | None = None
     throttle: Entry | None = None
     gear: Entry | None = None
+    requested_gear: Entry | None = None
     shift_in_process: Entry | None = None
     lockup_engaged: Entry | None = None
     pressure: dict[str, Entry] = Field(default_factory=dict)

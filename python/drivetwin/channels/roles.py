@@ -15,6 +15,7 @@ ROLES: dict[str, Quantity] = {
     "wheel_speed": Quantity.SPEED,
     "throttle": Quantity.FRACTION,
     "gear": Quantity.STATE,
+    "requested_gear": Quantity.STATE,
     "shift_in_process": Quantity.STATE,
     "lockup_engaged": Quantity.STATE,
 }

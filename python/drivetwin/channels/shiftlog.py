@@ -98,10 +98,15 @@ class Channel:
     late: float = 0.0
     filling: Filling | None = None
 
-    @property
+    @cached_property
     def step(self) -> float:
         """Median sample interval [s]."""
         return float(np.median(np.diff(self.time)))
+
+    @cached_property
+    def gap_limit(self) -> float:
+        """Longest pause [s] between samples that is not a gap."""
+        return compute_gap_limit(self.time)
 
     @property
     def place(self) -> Where:
@@ -137,7 +142,7 @@ class Channel:
             values = np.interp(time, self.time, self.values)
             after = np.clip(before + 1, None, self.time.size - 1)
             pause = self.time[after] - self.time[before]
-            unknown |= (pause > compute_gap_limit(self.time)) & (time > self.time[before])
+            unknown |= (pause > self.gap_limit) & (time > self.time[before])
         return np.where(unknown, np.nan, values)
 
     @property

@@ -91,9 +91,11 @@ def _to_document(
     found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults
 ) -> dict[str, Any]:
     from drivetwin.files.result_file import RejectedRecord, ShiftRecord
+    from drivetwin.shifts.summary import summarize_shifts
 
     return {
         "shifts": [ShiftRecord.from_result(one).model_dump(by_alias=True) for one in found.shifts],
+        "summary": [asdict(one) for one in summarize_shifts(found.shifts)],
         "rejected": [RejectedRecord.from_result(one).model_dump() for one in found.rejected],
         "lock_ups": [asdict(one) for one in closings],
         "resonances": [_convert_resonance(*pair) for pair in seen.swings],
@@ -103,10 +105,14 @@ def _to_document(
 
 def _print_details(found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults) -> None:
     """Print the details below the table of the shifts: text and further tables."""
-    from drivetwin.cli.tables import build_quality_tables
+    from drivetwin.cli.tables import build_quality_tables, build_summary_tables
+    from drivetwin.shifts.summary import summarize_shifts
 
     for table in build_quality_tables(found.shifts):
         print_table(table)
+    if len(found.shifts) > 1:
+        for table in build_summary_tables(summarize_shifts(found.shifts)):
+            print_table(table)
     for closing in closings:
         text = f"; {closing.warning}" if closing.warning else ""
         print_paragraph(
@@ -117,22 +123,43 @@ def _print_details(found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedR
     for gear in seen.gears:
         if gear.reason:
             print_paragraph(f"gear {gear.gear}: {gear.reason}")
+    _print_resonances(seen)
+    _print_remarks(found)
+
+
+def _print_resonances(seen: _SpeedResults) -> None:
+    """Print the resonances found, and each reason for which there is none once."""
+    refused: dict[str, list[str]] = {}
     for shift, swing in seen.swings:
-        print_paragraph(f"{_format_name(shift)}: {_describe_resonance(swing)}")
-    for shift in found.shifts:
-        print_findings(one.set_subject(_format_name(shift)) for one in shift.findings)
-    for candidate in found.rejected:
+        if isinstance(swing, str):
+            refused.setdefault(swing, []).append(_format_name(shift))
+        else:
+            print_paragraph(f"{_format_name(shift)}: {_describe_resonance(swing)}")
+    for reason, labels in refused.items():
+        names = ", ".join(dict.fromkeys(labels))
+        count = f" ({len(labels)} shifts)" if len(labels) > 1 else ""
+        print_paragraph(f"{names}{count}: {reason}")
+
+
+def _print_remarks(found: FoundShifts) -> None:
+    """Print each kind of finding and each reason of rejection once, with their number."""
+    from drivetwin.shifts.summary import collect_findings, collect_rejected
+
+    for finding, labels in collect_findings(found.shifts):
+        names = ", ".join(dict.fromkeys(labels))
+        more = f" ({len(labels)} shifts: {names})" if len(labels) > 1 else ""
+        print_paragraph(f"{finding.severity}: {finding.set_subject(labels[0]).text}{more}")
+    for candidate, count in collect_rejected(found.rejected):
         start, end = candidate.time
-        print_paragraph(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}")
+        more = f" (first of {count} for this reason)" if count > 1 else ""
+        print_paragraph(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}{more}")
 
 
 def _format_name(shift: Shift) -> str:
     return f"{shift.start_gear}→{shift.end_gear}"
 
 
-def _describe_resonance(swing: Resonance | str) -> str:
-    if isinstance(swing, str):
-        return swing
+def _describe_resonance(swing: Resonance) -> str:
     frequency, damping = (
         _format_spread(swing.f_d, swing.f_d_std),
         _format_spread(swing.zeta, swing.zeta_std),

@@ -16,6 +16,7 @@ from drivetwin.cli.output import make_table
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.report.labels import get_channel_unit
 from drivetwin.shifts.quality import QUALITY_UNITS
+from drivetwin.shifts.summary import SUMMARIZED
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, SignalFit
     from drivetwin.estimation.result.suggestion import ExperimentRanking
     from drivetwin.shifts.shift import Shift
+    from drivetwin.shifts.summary import ShiftGroup
 
 _BESIDE = 3
 """So many shifts beside each other in a table."""
@@ -53,6 +55,29 @@ def build_shift_table(shifts: Sequence[Shift], source: str) -> Table:
                 f"{end:.3f}",
             )
     return table
+
+
+def build_summary_tables(groups: Sequence[ShiftGroup]) -> Iterator[Table]:
+    """Build one table for each figure: count, mean, spread and worst by kind and gears."""
+    numbers = ("shifts", "mean", "spread", "worst", "at s")
+    for figure in SUMMARIZED:
+        rows = [(one, one.figures[figure]) for one in groups if figure in one.figures]
+        if not rows:
+            continue
+        unit = QUALITY_UNITS[figure]
+        title = f"{figure.replace('_', ' ').capitalize()} by kind of shift"
+        table = make_table(title, "kind", "gears", *numbers, right=numbers)
+        for group, one in rows:
+            table.add_row(
+                group.kind.value,
+                group.gears or "all",
+                str(one.count),
+                format_quantity(one.mean, unit),
+                "" if one.spread is None else format_quantity(one.spread, unit),
+                format_quantity(one.worst, unit),
+                f"{one.worst_time:.2f}",
+            )
+        yield table
 
 
 def build_quality_tables(shifts: Sequence[Shift]) -> Iterator[Table]:

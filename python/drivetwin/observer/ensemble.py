@@ -14,7 +14,8 @@ import numpy as np
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, SimulationError
-from drivetwin.estimation.data.prepare import collect_pressures, prepare_signal
+from drivetwin.estimation.data.prepare import collect_pressures
+from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.propagate import sample_friction, select_uncertain

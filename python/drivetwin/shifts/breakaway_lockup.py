@@ -52,11 +52,12 @@ def locate_break_away(
 
     `stop` is the first sample at which the next gear is engaged.
     """
-    first, last = held
+    begin, part = _select_samples(speeds, held[0], stop)
+    first, last, stop = held[0] - begin, held[1] - begin, stop - begin
     rest = slice(max(first, last + 1 - speeds.count_samples(_REST, 8)), last + 1)
-    slip = _compute_slip(speeds, ratio, rest)
-    part = slice(first, stop + 1)
-    seen = locate_slip_start(slip.time[part], slip.error[part] - slip.level, slip.noise)
+    slip = _compute_slip(part, ratio, rest, speeds.count_samples(_SMOOTH, 3))
+    span = slice(first, stop + 1)
+    seen = locate_slip_start(slip.time[span], slip.error[span] - slip.level, slip.noise)
     if slip.stairs or _is_sparse(speeds, settings):
         return _to_boundary(seen)
     run = speeds.count_samples(_QUIET, 3)
@@ -80,13 +81,14 @@ def locate_lock_up(
 
     `start` is the last sample at which the previous gear is engaged.
     """
-    first, last = held
+    begin, part = _select_samples(speeds, start, held[1])
+    first, last, start = held[0] - begin, held[1] - begin, start - begin
     rest = slice(first, min(last + 1, first + speeds.count_samples(_REST, 8)))
-    slip = _compute_slip(speeds, ratio, rest)
+    slip = _compute_slip(part, ratio, rest, speeds.count_samples(_SMOOTH, 3))
     if slip.stairs or _is_sparse(speeds, settings):
-        part = slice(start, last + 1)
+        span = slice(start, last + 1)
         return _to_boundary(
-            locate_slip_end(slip.time[part], slip.error[part] - slip.level, slip.noise)
+            locate_slip_end(slip.time[span], slip.error[span] - slip.level, slip.noise)
         )
     run = speeds.count_samples(_QUIET, 3)
     still = _find_true_runs(slip.departure[first : last + 1] < _LIMIT, run)
@@ -95,6 +97,13 @@ def locate_lock_up(
         slip, anchor, Moving.BEFORE, speeds.count_samples(settings.hinge_window, _LEAST)
     )
     return _locate_hinge(slip, (anchor, window), Moving.BEFORE, (start, last))
+
+
+def _select_samples(speeds: GearboxSpeeds, first: int, last: int) -> tuple[int, GearboxSpeeds]:
+    """Speeds of samples `first` to `last` with a margin for the smoothing, and where they begin."""
+    margin = speeds.count_samples(_SMOOTH, 3) + 1
+    begin = max(first - margin, 0)
+    return begin, speeds.select(begin, last + 1 + margin)
 
 
 def _is_sparse(speeds: GearboxSpeeds, settings: ShiftSettings) -> bool:
@@ -126,10 +135,9 @@ class _Slip:
     stairs: bool
 
 
-def _compute_slip(speeds: GearboxSpeeds, ratio: float, rest: slice) -> _Slip:
-    """Slip of a gear that is held in the samples `rest`."""
+def _compute_slip(speeds: GearboxSpeeds, ratio: float, rest: slice, width: int) -> _Slip:
+    """Slip of a gear that is held in the samples `rest`, smoothed over `width` samples."""
     error = speeds.compute_sync_error(ratio)
-    width = speeds.count_samples(_SMOOTH, 3)
     level = float(np.median(error[rest]))
     noise = 1.4826 * float(np.median(np.abs(error[rest] - level)))
     floor = _ROUNDING * float(np.median(np.abs(speeds.input[rest])))

@@ -186,7 +186,7 @@ def _locate_torque_start(
         if dip is not None:
             return dip, (report(Code.TORQUE_PHASE_FROM_TORQUE, element=oncoming),)
     flag = find_flag_start(search.log, begin.time, begin.time - earliest)
-    if flag is not None and kind is ShiftKind.POWER_ON_UP:
+    if flag is not None and kind in (ShiftKind.POWER_ON_UP, ShiftKind.POWER_UNKNOWN_UP):
         half = 0.5 * (begin.time - flag)
         boundary = Boundary(flag + half, half / float(np.sqrt(3.0)))
         finding = report(Code.TORQUE_PHASE_FROM_FLAG, element=oncoming, flag=Number(flag, "s"))

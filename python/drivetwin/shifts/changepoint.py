@@ -8,11 +8,17 @@ from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+
+from drivetwin._util.minimize_bounded import minimize_bounded
 
 FloatArray = NDArray[np.float64]
 
 _GRID = 80
+"""Hinges compared before the best one is refined."""
+_HIGHEST = 3
+"""Highest power of the time from the hinge."""
+_RESOLUTION = 0.01
+"""Accuracy of the refined hinge [ms]."""
 
 
 class Moving(Enum):
@@ -56,6 +62,15 @@ class _Fit:
     """Bayesian information criterion of the fit."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Grid (m,) [s] of hinges with their `factors` (see `_Curves.reduce`), sign of movement."""
+
+    grid: FloatArray
+    factors: FloatArray
+    direction: float
+
+
 def fit_hinge(
     time: FloatArray,
     values: FloatArray,
@@ -71,11 +86,14 @@ def fit_hinge(
     noise and the unknown form of the onset. `noise_floor` (signal unit) is a lower bound of the
     noise. Returns None if nothing moves.
     """
+    curves = _Curves(time, values, moving.value)
+    grid = np.linspace(*search, _GRID)
     direction = _detect_direction(time, values, moving, search)
+    looked = _Search(grid, curves.reduce(grid), direction)
     fits = [
         fit
         for powers in moving.orders
-        if (fit := _fit_curve(time, values, moving, (search, powers, direction, noise_floor)))
+        if (fit := _fit_curve(curves, looked, powers, noise_floor)) is not None
     ]
     if not fits:
         return None
@@ -102,53 +120,91 @@ def _detect_direction(
     return float(np.sign(np.mean(far) - np.median(near)))
 
 
-def _build_basis(time: FloatArray, hinge: float, side: int, powers: tuple[int, ...]) -> FloatArray:
-    x = np.clip(side * (time - hinge), 0.0, None)
-    return np.column_stack([np.ones_like(x), *(x**power for power in powers)])
+@dataclass(frozen=True, eq=False)
+class _Curves:
+    """Signal (n,) whose moving side is a polynomial in the time from the hinge."""
+
+    time: FloatArray
+    values: FloatArray
+    side: int
+
+    def build_basis(self, hinge: float, powers: tuple[int, ...]) -> FloatArray:
+        """Columns (n, 1 + powers) of one hinge: the level and the powers."""
+        x = np.clip(self.side * (self.time - hinge), 0.0, None)
+        return np.column_stack([np.ones_like(x), *(x**power for power in powers)])
+
+    def reduce(self, hinges: FloatArray) -> FloatArray:
+        """Triangular factors (m, 5, 5) of level, powers 1 to 3 and values at `hinges` (m,) [s].
+
+        Least-squares problems in any of these columns have the same solution and misfit as with
+        all samples, because an orthogonal transform changes neither.
+        """
+        x = np.clip(self.side * (self.time - hinges[:, None]), 0.0, None)
+        columns = np.empty((*x.shape, _HIGHEST + 2))
+        columns[..., 0] = 1.0
+        for power in range(1, _HIGHEST + 1):
+            columns[..., power] = columns[..., power - 1] * x
+        columns[..., -1] = self.values
+        return np.asarray(np.linalg.qr(columns, mode="r"), dtype=np.float64)
+
+
+def _solve_reduced(
+    factors: FloatArray, powers: tuple[int, ...], samples: int
+) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (m, 1 + powers) and sums of squares (m,) of the fits of `_Curves.reduce`.
+
+    Singular values below the rounding error of `samples` rows count as zero, as in
+    `numpy.linalg.lstsq`; the coefficients are then those of least norm.
+    """
+    columns = factors[:, :, [0, *powers, -1]]
+    chosen = np.asarray(np.linalg.qr(columns, mode="r"), dtype=np.float64)
+    count = len(powers) + 1
+    square = np.ascontiguousarray(chosen[:, :count, :count])
+    left, size, right = np.linalg.svd(square)
+    projected = (left.transpose(0, 2, 1) @ chosen[:, :count, count:])[..., 0]
+    kept = size > np.finfo(float).eps * samples * size[:, :1]
+    solved = np.divide(projected, size, out=np.zeros_like(size), where=kept)
+    coefficients = (right.transpose(0, 2, 1) @ solved[..., None])[..., 0]
+    left_over = np.sum(np.where(kept, 0.0, projected) ** 2, axis=1)
+    return coefficients, np.sum(chosen[:, count:, count] ** 2, axis=1) + left_over
 
 
 def _fit_curve(
-    time: FloatArray,
-    values: FloatArray,
-    moving: Moving,
-    form: tuple[tuple[float, float], tuple[int, ...], float, float],
+    curves: _Curves, search: _Search, powers: tuple[int, ...], floor: float
 ) -> _Fit | None:
-    search, powers, direction, floor = form
-    side = moving.value
-    unknowns = len(powers) + 2
-    if len(time) <= unknowns:
+    """Fit the hinge of one set of powers: best of a grid, then refined between its neighbours."""
+    time, side = curves.time, curves.side
+    samples, unknowns = len(time), len(powers) + 2
+    if samples <= unknowns:
         return None
 
     def solve(hinge: float) -> tuple[FloatArray, float]:
-        basis = _build_basis(time, hinge, side, powers)
-        coefficients = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
-        misfit = float(np.sum((values - basis @ coefficients) ** 2))
-        return coefficients, misfit
+        coefficients, misfit = _solve_reduced(curves.reduce(np.array([hinge])), powers, samples)
+        return coefficients[0], float(misfit[0])
 
-    def cost(hinge: float) -> float:
-        coefficients, misfit = solve(hinge)
-        return misfit if coefficients[1] * direction > 0.0 else np.inf
-
-    grid = np.linspace(*search, _GRID)
-    costs = np.array([cost(hinge) for hinge in grid])
-    if not np.isfinite(costs).any():
-        return None
+    slopes, misfits = _solve_reduced(search.factors, powers, samples)
+    costs = np.where(slopes[:, 1] * search.direction > 0.0, misfits, np.inf)
     best = int(np.argmin(costs))
-    bracket = (grid[max(best - 1, 0)], grid[min(best + 1, _GRID - 1)])
-    refined = float(minimize_scalar(lambda h: solve(h)[1], bounds=bracket, method="bounded").x)
-    hinge = refined if cost(refined) <= costs[best] else float(grid[best])
+    if not np.isfinite(costs[best]):
+        return None
+    bracket = (search.grid[max(best - 1, 0)], search.grid[min(best + 1, _GRID - 1)])
+    hinge = minimize_bounded(lambda h: solve(h)[1], bracket, 1e-3 * _RESOLUTION)
     coefficients, misfit = solve(hinge)
-    variance = max(misfit / (len(time) - unknowns), floor**2)
-    sigma = _compute_sigma(time, hinge, side, (powers, coefficients)) * np.sqrt(variance)
-    likelihood = len(time) * np.log(max(misfit / len(time), floor**2))
-    limit = 0.5 * (search[1] - search[0])
-    residual = values - _build_basis(time, hinge, side, powers) @ coefficients
+    if misfit > costs[best] or coefficients[1] * search.direction <= 0.0:
+        hinge = float(search.grid[best])
+        coefficients, misfit = solve(hinge)
+    variance = max(misfit / (samples - unknowns), floor**2)
+    basis = curves.build_basis(hinge, powers)
+    sigma = _compute_sigma(curves, hinge, basis, (powers, coefficients)) * np.sqrt(variance)
+    likelihood = samples * np.log(max(misfit / samples, floor**2))
+    limit = 0.5 * (search.grid[-1] - search.grid[0])
+    residual = curves.values - basis @ coefficients
     ahead = side * (time - hinge) > 0.0
     return _Fit(
         hinge,
-        min(float(sigma), limit),
+        min(float(sigma), float(limit)),
         _compute_rms(residual[ahead], floor),
-        float(likelihood + unknowns * np.log(len(time))),
+        float(likelihood + unknowns * np.log(samples)),
     )
 
 
@@ -157,12 +213,12 @@ def _compute_rms(residual: FloatArray, floor: float) -> float:
 
 
 def _compute_sigma(
-    time: FloatArray, hinge: float, side: int, curve: tuple[tuple[int, ...], FloatArray]
+    curves: _Curves, hinge: float, basis: FloatArray, curve: tuple[tuple[int, ...], FloatArray]
 ) -> float:
     """Standard deviation of the hinge for unit noise (Gauss-Newton); inf where undetermined."""
     powers, coefficients = curve
-    basis = _build_basis(time, hinge, side, powers)
-    x = np.clip(side * (time - hinge), 0.0, None)
+    side = curves.side
+    x = np.clip(side * (curves.time - hinge), 0.0, None)
     slope = sum(
         (a * p * x ** (p - 1) for p, a in zip(powers, coefficients[1:], strict=True)),
         start=np.zeros_like(x),

@@ -73,7 +73,10 @@ def detect_shifts(
             span = (float(speeds.time[before.last]), float(speeds.time[after.first]))
             rejected.append(RejectedShift(span, str(no_shift)))
     chained = _limit_phases(shifts, search.settings)
-    rated = tuple(replace(s, quality=compute_shift_quality(log, card, s)) for s in chained)
+    rated = tuple(
+        replace(one, quality=compute_shift_quality(log, card, one, speeds=speeds))
+        for one in chained
+    )
     finished, refused = check_flags(log, rated, rejected)
     return FoundShifts(finished, tuple(sorted(refused, key=lambda item: item.time)))
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +35,15 @@ class GearboxSpeeds:
     findings: tuple[Finding, ...] = ()
     stairs: tuple[float, float] = (0.0, 0.0)
 
-    @property
+    @cached_property
     def step(self) -> float:
         """Median sample interval [s]."""
         return float(np.median(np.diff(self.time)))
+
+    def select(self, first: int, stop: int) -> GearboxSpeeds:
+        """Return samples `first` to `stop`, the latter excluded."""
+        part = slice(first, stop)
+        return replace(self, time=self.time[part], input=self.input[part], output=self.output[part])
 
     def compute_sync_error(self, ratio: float) -> FloatArray:
         """ω_in - i·ω_out [rad/s], (n,): zero where the gear of `ratio` i = ic·iout is held.

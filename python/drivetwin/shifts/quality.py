@@ -7,10 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
+from drivetwin._util.low_pass import filter_zero_phase
 from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
+from drivetwin.shifts.metrics import (
+    compute_duration,
+    compute_largest_rate,
+    compute_response_time,
+    compute_vibration_dose,
+)
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import compute_middle
@@ -20,6 +26,7 @@ FloatArray = NDArray[np.float64]
 
 QUALITY_UNITS: dict[str, str] = {
     "shift_time": "s",
+    "response_time": "s",
     "torque_phase_time": "s",
     "inertia_phase_time": "s",
     "flare_speed": "rad/s",
@@ -31,6 +38,7 @@ QUALITY_UNITS: dict[str, str] = {
     "lockup_oscillation": "N*m",
     "torque_rate_max": "N*m/s",
     "wheel_jerk_max": "rad/s^3",
+    "wheel_jerk_of_speed_max": "rad/s^3",
     "vibration_dose": "rad/s^1.75",
     "friction_work": "J",
     "friction_power_max": "W",
@@ -44,6 +52,12 @@ _RING = 0.5
 _BAND = 32.0
 """Cut-off of the low-pass on torque [Hz]: upper end of felt longitudinal vibration."""
 _SPEED_BAND = 25.0
+_JERK_BAND = 8.0
+"""Cut-off of the low-pass on a speed that is differentiated twice [Hz]."""
+_SLOWEST = 0.2
+"""Cut-off over sampling rate from which on there is no jerk of a speed."""
+_FEWEST = 16
+"""Fewest samples of a jerk."""
 _AGAINST = 0.05
 """Share of friction work of the wrong sign up to which the on-coming element alone carries T_o."""
 
@@ -61,13 +75,22 @@ class _Torque:
 
 
 def compute_shift_quality(
-    log: ShiftLog, card: VehicleCard, shift: Shift, J_vehicle: float | None = None
+    log: ShiftLog,
+    card: VehicleCard,
+    shift: Shift,
+    J_vehicle: float | None = None,
+    speeds: GearboxSpeeds | None = None,
 ) -> dict[str, float]:
     """Figures of one shift by name, units in QUALITY_UNITS.
+
+    `speeds` are those of the log by `resample_speeds`, which spares computing them for each shift.
 
     `slip_at_lockup`: mean slip of the on-coming element (eq. 15) over 0.1 s from lock-up;
     `flare_speed`: input speed above the higher of the two synchronous speeds; `undershoot_speed`:
     below the lower one (both from smoothed speeds, 0 in a clean shift).
+    `response_time`: see `compute_response_time`, with a channel `requested_gear`.
+    Without an output torque `wheel_jerk_of_speed_max`: largest second derivative of the output
+    speed over i_f (low-pass 8 Hz, zero phase), from torque phase to 0.5 s after lock-up.
     With an output torque T_o (low-pass 32 Hz, zero phase):
     `torque_hole_depth`, `torque_hole_area`: fall below (in the direction of power) its mean over
     0.1 s before the torque phase, from there to its return or the lock-up;
@@ -85,11 +108,14 @@ def compute_shift_quality(
     """
     start, end = shift.torque_phase[0], shift.lockup_time
     figures = {
-        "shift_time": end - start,
+        "shift_time": compute_duration(shift),
         "torque_phase_time": shift.torque_phase[1] - start,
         "inertia_phase_time": end - shift.inertia_phase[0],
     }
-    speeds = resample_speeds(log, card)
+    if "requested_gear" in log:
+        response = compute_response_time(log["requested_gear"], shift)
+        figures |= {} if response is None else {"response_time": response}
+    speeds = speeds or resample_speeds(log, card)
     figures |= _compute_speed_excess(speeds, compute_gear_ratios(card), shift)
     figures |= _compute_residual_slip(speeds, card.get_clutch_ratios(shift.oncoming), shift)
     torque = _select_output_torque(log, shift)
@@ -100,14 +126,38 @@ def compute_shift_quality(
         figures |= _compute_friction_work(
             torque, speeds, card.get_clutch_ratios(shift.oncoming), shift
         )
+    else:
+        figures |= _compute_speed_jerk(speeds, shift, card.final_drive)
     return figures
+
+
+def _compute_speed_jerk(
+    speeds: GearboxSpeeds, shift: Shift, final_drive: float
+) -> dict[str, float]:
+    """Peak jerk of the wheel by the output speed; none where sampling is too slow for it."""
+    if _JERK_BAND * speeds.step >= _SLOWEST:
+        return {}
+    wide = (speeds.time >= shift.torque_phase[0] - _RING) & (
+        speeds.time <= shift.lockup_time + 2.0 * _RING
+    )
+    time = speeds.time[wide]
+    if np.count_nonzero(wide) < _FEWEST or np.diff(time).max() > compute_gap_limit(time):
+        return {}
+    grid = np.arange(time[0], time[-1], speeds.step)
+    wheel = np.interp(grid, time, speeds.output[wide]) / final_drive
+    smooth = filter_zero_phase(wheel, speeds.step, _JERK_BAND)
+    acceleration = np.gradient(smooth, grid)
+    inside = (grid >= shift.torque_phase[0]) & (grid <= shift.lockup_time + _RING)
+    if np.count_nonzero(inside) < _FEWEST:
+        return {}
+    return {"wheel_jerk_of_speed_max": compute_largest_rate(grid[inside], acceleration[inside])}
 
 
 def _filter_low_pass(values: FloatArray, step: float, cutoff: float) -> FloatArray:
     """Zero-phase Butterworth of order 2 run twice; unchanged where sampling is too slow for it."""
     if cutoff * step >= 0.4 or len(values) < 16:
         return values
-    return np.asarray(sosfiltfilt(butter(2, cutoff, fs=1.0 / step, output="sos"), values))
+    return filter_zero_phase(values, step, cutoff)
 
 
 def _sample_uniformly(channel: Channel, span: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
@@ -200,9 +250,9 @@ def _compute_vibration(torque: _Torque, shift: Shift, gain: float) -> dict[str, 
     ring = torque.select_span(shift.lockup_time, shift.lockup_time + _RING)[1]
     if len(values) < 3 or len(ring) < 3:
         return {}
-    rate = float(np.abs(np.gradient(values, time)).max())
+    rate = compute_largest_rate(time, values)
     line = np.interp(time, time[[0, -1]], values[[0, -1]])
-    dose = float(np.trapezoid((gain * (values - line)) ** 4, time) ** 0.25)
+    dose = compute_vibration_dose(time, gain * (values - line))
     return {
         "lockup_oscillation": float(np.ptp(ring)),
         "torque_rate_max": rate,

@@ -56,11 +56,12 @@ _PEDAL = 0.05
 def classify_shift(
     log: ShiftLog, up: bool, break_away: float
 ) -> tuple[ShiftKind, tuple[Finding, ...]]:
-    """Kind of the shift, and a finding if no channel indicates the power state.
+    """Kind of the shift; of unknown power, with a finding, if no channel indicates it.
 
     Power is on where the mean engine torque in the last 0.3 s before break-away [s] is positive;
     in its absence the output torque's sign or the accelerator (above 5 %) decides.
     """
+    power_on: bool | None = None
     limits = {"engine_torque": 0.0, "output_torque": 0.0, "throttle": _PEDAL}
     findings: tuple[Finding, ...] = ()
     for role, limit in limits.items():
@@ -70,7 +71,6 @@ def classify_shift(
                 power_on = mean > limit
                 break
     else:
-        power_on = True
         findings = (report(Code.POWER_STATE_UNKNOWN),)
     return ShiftKind.from_direction(up=up, power_on=power_on), findings
 

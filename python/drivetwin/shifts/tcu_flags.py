@@ -50,14 +50,17 @@ def check_flags(
     log: ShiftLog, shifts: Sequence[Shift], rejected: Sequence[RejectedShift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
     """The shifts with a finding where flag or gear contradict them, and flags without a shift."""
-    told = tuple(replace(s, findings=(*s.findings, *_find_contradictions(log, s))) for s in shifts)
-    if "shift_in_process" not in log:
+    flag = log.channels.get("shift_in_process")
+    spans = None if flag is None else find_flag_spans(flag)
+    told = tuple(
+        replace(s, findings=(*s.findings, *_find_contradictions(log, s, spans))) for s in shifts
+    )
+    if flag is None or spans is None:
         return told, tuple(rejected)
     seen = [(s.torque_phase[0], s.lockup_time) for s in shifts] + [r.time for r in rejected]
-    flag = log["shift_in_process"]
     empty = [
         RejectedShift(span, _explain_missing_shift(log, flag, span))
-        for span in find_flag_spans(flag)
+        for span in spans
         if not any(low <= span[1] and high >= span[0] for low, high in seen)
     ]
     return told, (*rejected, *empty)
@@ -78,12 +81,14 @@ def _explain_missing_shift(log: ShiftLog, flag: Channel, span: Span) -> str:
     return "the shift flag is set, but the speeds show no change of gear"
 
 
-def _find_contradictions(log: ShiftLog, shift: Shift) -> list[Finding]:
+def _find_contradictions(
+    log: ShiftLog, shift: Shift, flags: Sequence[Span] | None
+) -> list[Finding]:
+    """Findings where the flag, set over `flags` (None: not in the log), or the gear differ."""
     findings = []
-    if "shift_in_process" in log:
-        spans = find_flag_spans(log["shift_in_process"])
+    if flags is not None:
         start, end = shift.inertia_phase
-        if not any(low <= start + _LATE and high >= end - _LATE for low, high in spans):
+        if not any(low <= start + _LATE and high >= end - _LATE for low, high in flags):
             findings.append(report(Code.SHIFT_FLAG_NOT_SET))
     if "gear" in log:
         gear = log["gear"]

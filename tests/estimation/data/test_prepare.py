@@ -15,8 +15,8 @@ from drivetwin.estimation.data.prepare import (
     collect_tolerances,
     prepare,
     prepare_shift,
-    prepare_signal,
 )
+from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog, ShiftSignals
 from drivetwin.estimation.linear.multi_shift import apply_sensor_error

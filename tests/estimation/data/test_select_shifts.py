@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.estimation.data.load_stationarity import fit_constant_load
-from drivetwin.estimation.data.prepare import prepare_signal
+from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.shifts.shift import RejectedShift, Shift

@@ -17,7 +17,7 @@ from drivetwin._util.progress import scale_progress
 from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError, NoShiftError, Where
-from drivetwin.estimation.data.noise import estimate_white_noise
+from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
 from drivetwin.estimation.data.shift_data import (
     DesignData,
@@ -183,17 +183,6 @@ class _Sampler:
         if key not in self.known:
             self.known[key] = prepare_signal(channel, factor)
         return self.known[key]
-
-
-def prepare_signal(channel: Channel, factor: float = 1.0) -> MeasuredSignal:
-    """Return the finite updates of a channel times `factor`, with their noise."""
-    updates = channel.updates
-    finite = np.isfinite(updates.values)
-    values = factor * updates.values[finite]
-    floor = estimate_rounding_step(values) / np.sqrt(12.0)
-    return MeasuredSignal(
-        updates.time[finite], values, max(estimate_white_noise(values), float(floor))
-    )
 
 
 def collect_pressures(log: ShiftLog, shift: Shift) -> dict[str, MeasuredSignal]:

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from drivetwin._util.arrays import Span
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.data.prepare import prepare_signal
+from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import GearData, MeasuredSignal
 from drivetwin.shifts.detect import find_gear_spans
-from drivetwin.shifts.lockup_clutch import CLOSED, compute_mean_slip, detect_lock_ups
+from drivetwin.shifts.lockup_clutch import CLOSED, LockUp, compute_mean_slip, detect_lock_ups
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -33,8 +33,15 @@ def prepare_gears(
         spans += [(s.end_gear, (s.lockup_time + SETTLED, s.after[1])) for s in shifts]
     else:
         spans = find_gear_spans(log, card)
+    closings = detect_lock_ups(log, card)
     return tuple(
-        GearData(gear, card.compute_ratio(gear), _trim_to_closed(log, card, span), torque, speed)
+        GearData(
+            gear,
+            card.compute_ratio(gear),
+            _trim_to_closed(log, card, closings, span),
+            torque,
+            speed,
+        )
         for gear, span in spans
     )
 
@@ -44,12 +51,13 @@ def prepare_input_speed(log: ShiftLog) -> MeasuredSignal:
     return prepare_signal(log["input_speed" if "input_speed" in log else "engine_speed"])
 
 
-def _trim_to_closed(log: ShiftLog, card: VehicleCard, span: Span) -> Span:
+def _trim_to_closed(
+    log: ShiftLog, card: VehicleCard, closings: Sequence[LockUp], span: Span
+) -> Span:
     """Return the last part of `span` with the lock-up clutch closed, empty if there is none.
 
     A gearbox without a signal of the clutch is taken to have no converter.
     """
-    closings = detect_lock_ups(log, card)
     for closing in reversed(closings):
         start, end = max(span[0], closing.time + SETTLED), min(span[1], closing.end)
         if end > start:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.display_units import format_with_unit
@@ -107,7 +107,7 @@ def estimate_gear_inertia(
     plain = np.linalg.lstsq(columns[:, :2], drive, rcond=None)[0]
     value = float(grown[0])
     spread = float(np.hypot(_estimate_jackknife_std(columns, drive), 0.5 * (plain[0] - value)))
-    half = float(student.ppf(0.975, GEAR_INERTIA.blocks - 1)) * spread
+    half = float(stdtrit(GEAR_INERTIA.blocks - 1, 0.975)) * spread
     if value <= 0.0 or half > GEAR_INERTIA.weak * value:
         return _refuse_gear(
             gear,

@@ -22,12 +22,12 @@ from drivetwin.estimation.linear.load_balance import (
 )
 from drivetwin.estimation.linear.momentum_balance import MomentumFit, estimate_momentum_inertia
 from drivetwin.estimation.linear.ringdown import (
-    RING_DOWN,
     Drive,
     RingDown,
     compute_shaft_parameters,
     fit_ringdown,
 )
+from drivetwin.estimation.linear.ringdown_settings import RING_DOWN
 from drivetwin.estimation.result.verdict import build_block_covariance, propagate
 from drivetwin.vehicle.spec import PriorValue
 

@@ -8,15 +8,21 @@ anything else is refused.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.linear.ringdown import RING_DOWN
+from drivetwin.estimation.linear.decaying_sines import (
+    Windows,
+    compute_misfits,
+    differentiate_residuals,
+    fit_decaying_sines,
+)
+from drivetwin.estimation.linear.ringdown_settings import RING_DOWN
 from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.shift import Shift
 
@@ -50,6 +56,13 @@ class ResonanceSettings:
 
 
 RESONANCE = ResonanceSettings()
+
+_MIN_SAMPLES = 12
+"""Fewest samples of a window."""
+_UNKNOWNS = 7
+"""Rate, frequency, two amplitudes and three coefficients of the trend."""
+_FIRST_RATE = 2.0
+"""Initial value of the decay rate [1/s]."""
 
 
 @dataclass(frozen=True)
@@ -111,16 +124,12 @@ def fit_resonance(speed: MeasuredSignal, lockup: float, end: float) -> Resonance
     The standard deviations hold the spread between the windows. Raises IdentificationError where
     there is no clean decay.
     """
-    found = []
-    for start in np.arange(
-        lockup + RESONANCE.first_start, lockup + RESONANCE.last_start, RESONANCE.step
-    ):
-        for length in RESONANCE.lengths:
-            span = (float(start), float(start + length))
-            if span[1] <= end and split_at_gaps(span, speed.gaps) == (span,):
-                decay = _fit_window(speed.select_span(span))
-                if decay is not None and decay.clean:
-                    found.append(decay)
+    parts = [
+        speed.select_span(span)
+        for span in _list_spans(lockup, end)
+        if split_at_gaps(span, speed.gaps) == (span,)
+    ]
+    found = [decay for decay in _fit_windows(parts) if decay.clean]
     if len({decay.span[0] for decay in found}) < RESONANCE.min_agreeing:
         raise IdentificationError(
             "no clean decay after lock-up: what oscillates there is driven by engine or road",
@@ -140,45 +149,59 @@ def fit_resonance(speed: MeasuredSignal, lockup: float, end: float) -> Resonance
     )
 
 
-def _fit_window(part: MeasuredSignal) -> _Decay | None:
-    """Best decaying sine on a quadratic in one window; None with too few samples."""
-    time, values = _reduce_samples(part)
-    if time.size < 12:
-        return None
-    trend = np.vander(time / time[-1], 3)
-    rest = values - trend @ np.linalg.lstsq(trend, values, rcond=None)[0]
-    power = float(rest @ rest)
-    if power == 0.0:
-        return None
-
-    def projected(p: FloatArray) -> FloatArray:
-        fall = np.exp(-np.clip(p[0] * time, -50.0, 50.0))
-        swing = [fall * np.cos(p[1] * time), fall * np.sin(p[1] * time)]
-        q, _ = np.linalg.qr(np.column_stack([*swing, trend]))
-        return np.asarray(values - q @ (q.T @ values), dtype=float)
-
-    fastest = RING_DOWN.max_nyquist_share * np.pi / float(np.median(np.diff(time)))
-    omega = np.linspace(
-        2.0 * np.pi * RING_DOWN.band[0],
-        min(2.0 * np.pi * RING_DOWN.band[1], fastest),
-        RESONANCE.frequencies,
+def _list_spans(lockup: float, end: float) -> list[Span]:
+    """Windows [s] after `lockup` that end before `end`."""
+    starts = np.arange(
+        lockup + RESONANCE.first_start, lockup + RESONANCE.last_start, RESONANCE.step
     )
-    strongest = omega[np.abs(np.exp(1j * np.outer(omega, time)) @ rest).argmax()]
-    best = least_squares(projected, (2.0, strongest), x_scale=(2.0, 5.0), method="lm")
-    if abs(best.x[1]) > fastest:
-        return None
-    left = 2.0 * float(best.cost)
-    slopes = np.asarray(best.jac, dtype=float)
-    covariance = np.linalg.pinv(slopes.T @ slopes) * left / (time.size - 7)
-    std = np.sqrt(np.diag(covariance))
-    return _Decay(
-        (float(part.time[0]), float(part.time[-1])),
-        float(best.x[0]),
-        abs(float(best.x[1])),
-        float(std[0]),
-        float(std[1]),
-        1.0 - left / power,
-    )
+    spans = [(float(start), float(start + one)) for start in starts for one in RESONANCE.lengths]
+    return [span for span in spans if span[1] <= end]
+
+
+def _fit_windows(parts: Sequence[MeasuredSignal]) -> list[_Decay]:
+    """Best decaying sine on a quadratic in each window; none in windows of too few samples."""
+    sampled = [(part, *_reduce_samples(part)) for part in parts]
+    sampled = [one for one in sampled if one[1].size >= _MIN_SAMPLES]
+    if not sampled:
+        return []
+    kept, times, values = zip(*sampled, strict=True)
+    windows = Windows.stack(times, values)
+    fastest = np.array([_compute_fastest(time) for time in times])
+    starts = [
+        _find_strongest(time, rest[: time.size], limit)
+        for time, rest, limit in zip(times, windows.rest, fastest, strict=True)
+    ]
+    best = fit_decaying_sines(windows, np.array(starts), _FIRST_RATE)
+    left = compute_misfits(windows, best)
+    slopes = differentiate_residuals(windows, best)
+    scale = left / np.array([time.size - _UNKNOWNS for time in times])
+    covariance = np.linalg.pinv(slopes.transpose(0, 2, 1) @ slopes) * scale[:, None, None]
+    std = np.sqrt(np.einsum("wii->wi", covariance))
+    power = np.sum(windows.rest**2, axis=1)
+    return [
+        _Decay(
+            (float(part.time[0]), float(part.time[-1])),
+            float(best[i, 0]),
+            abs(float(best[i, 1])),
+            float(std[i, 0]),
+            float(std[i, 1]),
+            1.0 - float(left[i] / power[i]),
+        )
+        for i, part in enumerate(kept)
+        if power[i] > 0.0 and abs(best[i, 1]) <= fastest[i]
+    ]
+
+
+def _compute_fastest(time: FloatArray) -> float:
+    """Angular frequency [rad/s] above which samples at `time` (n,) [s] are too far apart."""
+    return RING_DOWN.max_nyquist_share * np.pi / float(np.median(np.diff(time)))
+
+
+def _find_strongest(time: FloatArray, rest: FloatArray, fastest: float) -> float:
+    """Angular frequency [rad/s] of most power in `rest` (n,), up to `fastest`."""
+    low, high = (2.0 * np.pi * f for f in RING_DOWN.band)
+    omega = np.linspace(low, min(high, fastest), RESONANCE.frequencies)
+    return float(omega[np.abs(np.exp(1j * np.outer(omega, time)) @ rest).argmax()])
 
 
 def _reduce_samples(part: MeasuredSignal) -> tuple[FloatArray, FloatArray]:

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.linear.ringdown import RING_DOWN, RingDown, _refuse, _select_ring_samples
+from drivetwin.estimation.linear.ringdown import RingDown, _refuse, _select_ring_samples
+from drivetwin.estimation.linear.ringdown_settings import RING_DOWN
 from drivetwin.estimation.paper.wlse import compute_window_edges, compute_window_means
 
 

@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
+from drivetwin._util.signal_processing import integrate_trapezoids
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -119,7 +119,7 @@ def sample_means(channel: Channel, time: FloatArray) -> FloatArray:
     """
     start, end = channel.time[0], channel.time[-1]
     edges = np.append(time - 0.5 * GRID, time[-1] + 0.5 * GRID).clip(start, end)
-    total = cumulative_trapezoid(channel.values, channel.time, initial=0)
+    total = integrate_trapezoids(channel.values, channel.time)
     sums = np.interp(edges, channel.time, total)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.diff(sums) / np.diff(edges)

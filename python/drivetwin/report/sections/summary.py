@@ -32,6 +32,8 @@ _TORQUE_PHASE = {
     ShiftKind.POWER_OFF_DOWN: "the on-coming element takes over torque",
     ShiftKind.POWER_OFF_UP: "empty where the on-coming element takes hold only later",
     ShiftKind.POWER_ON_DOWN: "empty where the on-coming element takes hold only later",
+    ShiftKind.POWER_UNKNOWN_UP: "the on-coming element takes over torque where the power is on",
+    ShiftKind.POWER_UNKNOWN_DOWN: "the on-coming element takes over torque where the power is off",
 }
 
 OF_TORQUE = (

@@ -6,8 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
-from importlib.resources import as_file, files
 from pathlib import Path
 
 from drivetwin.channels.read_options import ReadOptions
@@ -15,6 +13,7 @@ from drivetwin.logs.formats.can.asc import is_asc, read_asc
 from drivetwin.logs.formats.can.blf import read_blf
 from drivetwin.logs.formats.can.candump import is_candump, read_candump
 from drivetwin.logs.formats.can.database import read_database
+from drivetwin.logs.formats.can.driveline import load_driveline_messages
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.trc import is_trc, read_trc
 from drivetwin.logs.formats.frames import Frames, Message
@@ -57,17 +56,11 @@ def open_blf(path: Path, options: ReadOptions) -> Iterator[Recording]:
 def decode_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
     """Decode frames by the databases stated; raises MissingChannelError, MissingExtraError."""
     stated = _select_messages(options.bus.databases)
-    messages, notes = match_groups(frames, stated, _load_j1939_messages)
+    messages, notes = match_groups(frames, stated, load_driveline_messages)
     frames = replace(frames, warnings=(*frames.warnings, *notes))
     return BusRecording(frames, messages, options.bus, path)
 
 
 def _select_messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:
     """Messages of the stated databases, else the built-in ones of J1939."""
-    return read_database(databases) if databases else _load_j1939_messages()
-
-
-@cache
-def _load_j1939_messages() -> tuple[Message, ...]:
-    with as_file(files("drivetwin.logs.formats.j1939") / "driveline.dbc") as path:
-        return read_database((path,))
+    return read_database(databases) if databases else load_driveline_messages()

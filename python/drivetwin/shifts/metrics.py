@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""Metrics of shift quality, each as one function of signals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.channels.shiftlog import Channel
+from drivetwin.shifts.shift import Shift
+
+_LATEST_REQUEST = 3.0
+"""Longest time [s] from a request to the begin of the inertia phase."""
+
+
+def compute_duration(shift: Shift) -> float:
+    """Duration of a shift [s]: from the begin of the torque phase to lock-up.
+
+    Source: definition of this program; without a torque phase from break-away.
+    """
+    return shift.lockup_time - shift.torque_phase[0]
+
+
+def compute_response_time(request: Channel, shift: Shift) -> float | None:
+    """Time [s] from the request of the new gear to the begin of the inertia phase.
+
+    `request` is the channel of role `requested_gear`. The request is the last change to the end
+    gear, at most 3 s before the inertia phase; None without one. Source: definition of this
+    program: delay after which the driver perceives a change of engine speed.
+    """
+    if not shift.end_gear.isdecimal():
+        return None
+    wanted = request.values == float(shift.end_gear)
+    starts = request.time[1:][wanted[1:] & ~wanted[:-1]]
+    begin = shift.inertia_phase[0]
+    starts = starts[(starts <= begin) & (starts >= begin - _LATEST_REQUEST)]
+    return begin - float(starts[-1]) if starts.size else None
+
+
+def compute_largest_rate(time: FloatArray, values: FloatArray) -> float:
+    """Largest magnitude of the time derivative of `values` (n,), in their unit per s.
+
+    Central differences. With the angular acceleration of the wheel [rad/s^2] as `values` this is
+    its peak jerk [rad/s^3]. Source: definition of jerk.
+    """
+    return float(np.abs(np.gradient(values, time)).max())
+
+
+def compute_vibration_dose(time: FloatArray, acceleration: FloatArray) -> float:
+    """Vibration dose value (∫ a^4 dt)^¼ of `acceleration` (n,), in its unit times s^¼.
+
+    For a in m/s^2 the unit is m/s^1.75, for rad/s^2 rad/s^1.75. The frequency weighting of the
+    standard is not applied. Source: ISO 2631-1:1997, section 6.3.2.
+    """
+    return float(np.trapezoid(acceleration**4, time) ** 0.25)
