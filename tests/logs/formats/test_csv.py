@@ -17,7 +17,7 @@ from drivetwin.errors import (
     TimeError,
     UnitError,
 )
-from drivetwin.logs.formats.csv import read_csv
+from tests.logs.formats.text_logs import read_csv
 from drivetwin.logs.raw import RawLog
 
 
