@@ -21,6 +21,7 @@ from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.units import find_unit, is_unit
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.cell_text import Meaning, classify_text, is_number
+from drivetwin.logs.formats.text_file import EXPORT
 from drivetwin.logs.formats.time_text import is_time_text
 
 COMMENT_MARKS = ("#", "%", "//")
@@ -35,8 +36,6 @@ _LOOKED_AT = 200
 
 _SURE_RUN = 3
 """So many rows of numbers, one after the other, are the table."""
-
-EXPORT = "export the log as text: one row of names, one of units, then one row for each sample"
 
 _DATE = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}", re.ASCII)
 

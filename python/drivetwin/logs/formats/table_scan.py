@@ -20,8 +20,8 @@ from drivetwin.logs.formats.cell_text import (
     describe_text,
     is_number,
 )
-from drivetwin.logs.formats.table_head import BLANKS, EXPORT, TableHead, split_line
-from drivetwin.logs.formats.text_file import TextFile
+from drivetwin.logs.formats.table_head import BLANKS, TableHead, split_line
+from drivetwin.logs.formats.text_file import EXPORT, TextFile, make_binary_error
 
 _BLANK, _FIRST_TEXT, _OTHER_TEXT = 1, 2, 255
 """Kinds of cells that hold no number: nothing, the first of the texts, one beyond those kept."""
@@ -87,8 +87,7 @@ class TableReader:
         """
         file = self.text.file
         if table.binary is not None:
-            what = f"the file is binary or damaged: byte {table.binary} is no text"
-            raise FileFormatError(what, EXPORT, Where(file=file))
+            raise make_binary_error(table.binary, file)
         if table.quote is not None:
             line, fault = table.quote
             what = f"line {line}: a quoted field does not end where it should ({fault})"

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
@@ -15,6 +16,9 @@ _BLOCK = 1 << 22
 
 _HEAD_LINES, _LONGEST_HEAD = 300, 1 << 25
 """Lines of the head, and bytes in which they must lie."""
+
+EXPORT = "export the log as text: one row of names, one of units, then one row for each sample"
+_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 
 _WIDE = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 _LEAST_ZEROS = 0.8
@@ -51,11 +55,19 @@ class TextFile:
             if head.count(b"\n") + head.count(b"\r") >= _HEAD_LINES or len(head) > _LONGEST_HEAD:
                 head = head[: max(head.rfind(b"\n"), head.rfind(b"\r")) + 1] or head
                 break
+        if match := _NO_TEXT.search(head):
+            raise make_binary_error(match.start(), self.file)
         lines = head.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n", _HEAD_LINES)
         if not any(map(bytes.strip, lines)):
             where = Where(file=self.file)
             raise FileFormatError("the file is empty", "record or export the log again", where)
         return self.decode(b"\n".join(lines[:_HEAD_LINES])).split("\n")
+
+
+def make_binary_error(place: int, file: str) -> FileFormatError:
+    """Return the error for a byte that is no text."""
+    what = f"the file is binary or damaged: byte {place} is no text"
+    return FileFormatError(what, EXPORT, Where(file=file))
 
 
 def open_text(source: BinaryIO, file: str) -> TextFile:
