@@ -10,7 +10,7 @@ pub const NUMBER: Kind = 0;
 pub const BLANK: Kind = 1;
 /// The first of the texts.
 pub const FIRST_TEXT: Kind = 2;
-/// A text beyond those that are kept.
+/// Any text of a column with more texts than are kept.
 pub const OTHER_TEXT: Kind = u8::MAX;
 
 /// A text that is no number, and the line of the file where it stands first.
@@ -64,14 +64,12 @@ impl Column {
     }
 
     fn find_kind(&mut self, cell: &[u8], line: usize) -> Kind {
-        let most = usize::from(OTHER_TEXT - FIRST_TEXT);
+        if self.texts.len() == usize::from(OTHER_TEXT - FIRST_TEXT) {
+            return OTHER_TEXT;
+        }
         let index = self.texts.iter().position(|one| one.text == cell).unwrap_or_else(|| {
-            if self.texts.len() < most {
-                self.texts.push(Text { text: cell.to_vec(), line });
-                self.texts.len() - 1
-            } else {
-                most
-            }
+            self.texts.push(Text { text: cell.to_vec(), line });
+            self.texts.len() - 1
         });
         FIRST_TEXT + Kind::try_from(index).unwrap_or(OTHER_TEXT - FIRST_TEXT)
     }

@@ -12,42 +12,40 @@ pub enum Separator {
     Blanks,
 }
 
-/// Fields of a line as ranges of `text`, without the quotes.
+/// Fields of a line, without the quotes and the blanks around them.
 #[derive(Default)]
 pub struct Fields {
-    text: Vec<u8>,
+    /// Text of a line with quotes, without them.
+    unquoted: Vec<u8>,
+    is_quoted: bool,
     ranges: Vec<Range<usize>>,
 }
 
 impl Fields {
     /// Split a line; an error describes a quoted field that does not end where it should.
     pub fn split(&mut self, line: &[u8], separator: Separator) -> Result<(), &'static str> {
-        self.text.clear();
         self.ranges.clear();
+        self.is_quoted = false;
         match separator {
-            Separator::Blanks => {
-                self.text.extend_from_slice(line);
-                self.split_at_blanks();
-            }
+            Separator::Blanks => self.split_at_blanks(line),
             Separator::Byte(byte) if line.contains(&b'"') => self.split_quoted(line, byte)?,
             Separator::Byte(byte) => {
-                self.text.extend_from_slice(line);
                 let mut start = 0;
                 for (at, &one) in line.iter().enumerate() {
                     if one == byte {
-                        self.ranges.push(start..at);
+                        self.ranges.push(trim_range(line, start, at));
                         start = at + 1;
                     }
                 }
-                self.ranges.push(start..line.len());
+                self.ranges.push(trim_range(line, start, line.len()));
             }
         }
         Ok(())
     }
 
-    fn split_at_blanks(&mut self) {
+    fn split_at_blanks(&mut self, line: &[u8]) {
         let mut start = None;
-        for (at, byte) in self.text.iter().enumerate() {
+        for (at, byte) in line.iter().enumerate() {
             match (start, is_blank(*byte)) {
                 (None, false) => start = Some(at),
                 (Some(first), true) => {
@@ -57,15 +55,17 @@ impl Fields {
                 _ => {}
             }
         }
-        self.ranges.extend(start.map(|first| first..self.text.len()));
+        self.ranges.extend(start.map(|first| first..line.len()));
     }
 
     fn split_quoted(&mut self, line: &[u8], separator: u8) -> Result<(), &'static str> {
+        self.unquoted.clear();
+        self.is_quoted = true;
         let mut rest = line;
         loop {
             let blanks = rest.iter().take_while(|byte| **byte == b' ').count();
             rest = &rest[blanks..];
-            let start = self.text.len();
+            let start = self.unquoted.len();
             if rest.first() == Some(&b'"') {
                 rest = self.copy_quoted(&rest[1..])?;
                 if !rest.is_empty() && rest[0] != separator {
@@ -73,10 +73,10 @@ impl Fields {
                 }
             } else {
                 let end = rest.iter().position(|byte| *byte == separator).unwrap_or(rest.len());
-                self.text.extend_from_slice(&rest[..end]);
+                self.unquoted.extend_from_slice(&rest[..end]);
                 rest = &rest[end..];
             }
-            self.ranges.push(start..self.text.len());
+            self.ranges.push(trim_range(&self.unquoted, start, self.unquoted.len()));
             if rest.is_empty() {
                 return Ok(());
             }
@@ -88,12 +88,12 @@ impl Fields {
     fn copy_quoted<'a>(&mut self, mut rest: &'a [u8]) -> Result<&'a [u8], &'static str> {
         loop {
             let end = rest.iter().position(|byte| *byte == b'"').ok_or("no closing quote")?;
-            self.text.extend_from_slice(&rest[..end]);
+            self.unquoted.extend_from_slice(&rest[..end]);
             rest = &rest[end + 1..];
             if rest.first() != Some(&b'"') {
                 return Ok(rest);
             }
-            self.text.push(b'"');
+            self.unquoted.push(b'"');
             rest = &rest[1..];
         }
     }
@@ -103,15 +103,27 @@ impl Fields {
         self.ranges.len()
     }
 
-    /// The field at `index` without blanks around it; empty beyond the last.
-    pub fn get(&self, index: usize) -> &[u8] {
-        self.ranges.get(index).map_or(&[], |range| trim(&self.text[range.clone()]))
+    /// The field at `index` of the `line` that was split; empty beyond the last.
+    pub fn get<'a>(&'a self, line: &'a [u8], index: usize) -> &'a [u8] {
+        let text = if self.is_quoted { &self.unquoted } else { line };
+        self.ranges.get(index).map_or(&[], |range| &text[range.clone()])
     }
 
-    /// All fields without blanks around them.
-    pub fn iter(&self) -> impl Iterator<Item = &[u8]> {
-        (0..self.len()).map(|index| self.get(index))
+    /// All fields of the `line` that was split.
+    pub fn iter<'a>(&'a self, line: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+        (0..self.len()).map(move |index| self.get(line, index))
     }
+}
+
+fn trim_range(text: &[u8], start: usize, end: usize) -> Range<usize> {
+    let field = &text[start..end];
+    let is_plain = |byte: Option<&u8>| byte.is_some_and(|byte| byte.is_ascii_graphic());
+    if is_plain(field.first()) && is_plain(field.last()) {
+        return start..end;
+    }
+    let trimmed = trim(field);
+    let first = start + trimmed.as_ptr().addr() - field.as_ptr().addr();
+    first..first + trimmed.len()
 }
 
 fn is_blank(byte: u8) -> bool {
@@ -137,7 +149,10 @@ mod tests {
     fn split(line: &str, separator: Separator) -> Result<Vec<String>, &'static str> {
         let mut fields = Fields::default();
         fields.split(line.as_bytes(), separator)?;
-        Ok(fields.iter().map(|field| String::from_utf8_lossy(field).into_owned()).collect())
+        Ok(fields
+            .iter(line.as_bytes())
+            .map(|field| String::from_utf8_lossy(field).into_owned())
+            .collect())
     }
 
     #[test]

@@ -108,8 +108,7 @@ impl Scanner {
     /// Read the next bytes of the file.
     pub fn feed(&mut self, block: &[u8]) {
         if self.table.binary.is_none() {
-            let binary = block.iter().position(|byte| matches!(byte, 0..=8 | 0x0e..=0x1f));
-            self.table.binary = binary.map(|at| self.position + at);
+            self.table.binary = find_binary(block).map(|at| self.position + at);
         }
         self.position += block.len();
         let mut text = std::mem::take(&mut self.pending);
@@ -151,18 +150,18 @@ impl Scanner {
             return;
         }
         self.parsed.clear();
-        self.parsed.extend(self.fields.iter().take(self.layout.width).map(parse_number));
+        self.parsed.extend(self.fields.iter(line).take(self.layout.width).map(parse_number));
         let has_numbers = self.parsed.iter().any(Option::is_some);
         let mut surplus = self.layout.width..self.fields.len();
         let fits = self.fields.len() >= self.layout.least
-            && surplus.all(|index| self.fields.get(index).is_empty());
-        if !has_numbers && self.fields.iter().all(<[u8]>::is_empty) {
+            && surplus.all(|index| self.fields.get(line, index).is_empty());
+        if !has_numbers && self.fields.iter(line).all(<[u8]>::is_empty) {
             return;
         }
-        if self.is_remark(fits, has_numbers) {
+        if self.is_remark(line, fits, has_numbers) {
             self.add_remark(line);
         } else if fits {
-            self.push_row();
+            self.push_row(line);
         } else {
             self.table.ragged.get_or_insert((self.line, self.fields.len()));
             self.table.ragged_count += 1;
@@ -170,12 +169,12 @@ impl Scanner {
     }
 
     /// Return true for a line of words, or of the head, between the rows.
-    fn is_remark(&self, fits: bool, has_numbers: bool) -> bool {
-        if self.layout.labels.iter().any(|one| one == self.fields.get(0)) {
+    fn is_remark(&self, line: &[u8], fits: bool, has_numbers: bool) -> bool {
+        if self.layout.labels.iter().any(|one| one == self.fields.get(line, 0)) {
             return true;
         }
         let has_time = self.fields.len() > self.layout.time;
-        let stamp = self.fields.get(if has_time { self.layout.time } else { 0 });
+        let stamp = self.fields.get(line, if has_time { self.layout.time } else { 0 });
         if fits {
             let is_stamp = self.layout.time_is_text && stamp.iter().any(u8::is_ascii_digit);
             !has_numbers && !is_stamp
@@ -191,7 +190,7 @@ impl Scanner {
         }
     }
 
-    fn push_row(&mut self) {
+    fn push_row(&mut self, line: &[u8]) {
         let table = &mut self.table;
         let follows = table.lines.last().map(|(row, line)| line + table.rows - row);
         if follows != Some(self.line) {
@@ -202,13 +201,13 @@ impl Scanner {
             match self.parsed.get(index).copied().flatten() {
                 Some(number) => {
                     column.push_number(number.value);
-                    table.decimals[index].add(number.sign, self.fields.get(index));
+                    table.decimals[index].add(number.sign, self.fields.get(line, index));
                 }
-                None => column.push_text(self.fields.get(index), self.line),
+                None => column.push_text(self.fields.get(line, index), self.line),
             }
         }
         for ((text, ends), &index) in table.texts.iter_mut().zip(&self.texts) {
-            text.extend_from_slice(self.fields.get(index));
+            text.extend_from_slice(self.fields.get(line, index));
             ends.push(text.len() as u64);
         }
     }
@@ -228,6 +227,16 @@ impl Decimals {
             *first = Some(cell.to_vec());
         }
     }
+}
+
+/// Place of the first byte that is no text.
+fn find_binary(block: &[u8]) -> Option<usize> {
+    let is_binary = |byte: &u8| matches!(byte, 0..=8 | 0x0e..=0x1f);
+    let size = 4096; // without an early end the inner loop runs in vectors
+    let has_any = |part: &[u8]| part.iter().fold(false, |any, byte| any | is_binary(byte));
+    let number = block.chunks(size).position(has_any)?;
+    let start = number * size;
+    block[start..].iter().position(is_binary).map(|at| start + at)
 }
 
 /// Return true for `1,234`, which may be a whole number from a thousand to a million.

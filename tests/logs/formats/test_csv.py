@@ -147,7 +147,9 @@ def test_the_time_column_can_be_stated() -> None:
         ("time,x\ns,Nm\n0,1\n1,2,9\n2,3\n", FileFormatError, "line 4 has 3 fields"),
         ("time;x\ns;Nm\n0.5;1.000,5\n1.5;2,5\n", FileFormatError, "with point ('0.5')"),
         ('time,x\ns,Nm\n0,"1\n1,2\n', FileFormatError, "line 3: a quoted field does not end"),
-        ("clock,x\ns,Nm\n0,1\n", MissingChannelError, "no time column among clock, x"),
+        ("clock,x\n,Nm\n0,1\n", MissingChannelError, "no time column among clock, x"),
+        ("x,lag\nNm,s\n0,1\n", MissingChannelError, "no time column among x, lag"),
+        ("lag,lead\ns,s\n0,1\n", MissingChannelError, "no time column among lag, lead"),
         (
             "time,x\nNm,Nm\n0,1\n",
             MissingChannelError,

@@ -42,8 +42,8 @@ from drivetwin.logs.formats.time_text import is_time_text, parse_time_texts
 from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.raw import RawChannel, Recording, Window
 
-_MOST_CELLS = 3 * 10**7
-"""Cells that are kept at a time: all of most logs, eight columns of one hour at 1 kHz."""
+_MOST_CELLS = 4 * 10**7
+"""Cells that are kept at a time: all of most logs, eleven columns of one hour at 1 kHz."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +78,10 @@ class CsvRecording:
         self._reader = TableReader(text, head, len(self._header.names), first, is_text)
         clocks = self._header.clocks
         dates = [] if self._header.date is None else [self._header.date]
-        table = (
-            self._reader.scan([], [first, *dates]) if is_text else self._reader.scan(clocks, [])
-        )
+        rows, width = text.estimate_lines([row.text for row in head.rows]), len(self._header.names)
+        at_once = rows * width <= _MOST_CELLS
+        numbers = range(width) if at_once else () if is_text else clocks
+        table = self._reader.scan(numbers, [first, *dates] if is_text else (), rows)
         notes = self._reader.check(table)
         self._rows = table.rows
         self._lines = table.lines
@@ -90,15 +91,15 @@ class CsvRecording:
         if is_text:
             self._stamps, told = stamps.parse_texts(table, text, bool(dates)), ()
         else:
-            numbers = {clock: make_numbers(*table.take_numbers(clock), self._contents[clock])
-                       for clock in clocks}  # fmt: skip
-            self._stamps, told = self._count_stamps(stamps, numbers)
+            self._stamps, told = self._count_stamps(stamps, self._take_numbers(table, clocks))
         self.warnings: tuple[str, ...] = (*notes, *told)
         others = [index for index in range(len(self._header.names)) if self._is_channel(index)]
         sound = [index for index in others if self._contents[index].fault is None]
         faulty = [index for index in others if self._contents[index].fault is not None]
         self._places = (*sound, *faulty)
         names, units = self._header.names, self._header.units
+        if at_once:
+            self._kept = self._take_numbers(table, sound)
         self.columns = (
             *(Column(names[index], units[index]) for index in sound),
             *(Column(names[index], empty=True) for index in faulty),
@@ -133,11 +134,13 @@ class CsvRecording:
             start = sound.index(place)
             many = max(1, _MOST_CELLS // max(1, self._rows))
             wanted = sound if len(sound) <= many else sound[start : start + many]
-            table = self._reader.scan(wanted, [], self._rows)
-            self._kept = {
-                one: make_numbers(*table.take_numbers(one), self._contents[one]) for one in wanted
-            }
+            self._kept = self._take_numbers(self._reader.scan(wanted, (), self._rows), wanted)
         return self._kept[place]
+
+    def _take_numbers(self, table: ScannedTable, wanted: Sequence[int]) -> dict[int, Numbers]:
+        return {
+            one: make_numbers(*table.take_numbers(one), self._contents[one]) for one in wanted
+        }
 
     def _count_stamps(
         self, time: _TimeColumns, numbers: dict[int, Numbers]
@@ -151,13 +154,9 @@ class CsvRecording:
         for index in channels:
             known = stamps[self._header.times[index]].known
             if not known.all() and self._contents[index].count:
-                column = self._load_numbers_of_any(index)
-                time.require_stamps(index, ~known & np.isfinite(column.values))
+                column = self._take_numbers(self._reader.scan([index], (), self._rows), [index])
+                time.require_stamps(index, ~known & np.isfinite(column[index].values))
         return stamps, told
-
-    def _load_numbers_of_any(self, index: int) -> Numbers:
-        table = self._reader.scan([index], [], self._rows)
-        return make_numbers(*table.take_numbers(index), self._contents[index])
 
 
 class _TimeColumns:

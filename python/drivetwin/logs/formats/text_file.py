@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import codecs
+import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -39,6 +40,12 @@ class TextFile:
         decoder = codecs.getincrementaldecoder(self.wide)(errors="replace") if self.wide else None
         while block := self.source.read(_BLOCK):
             yield decoder.decode(block).encode("utf-8", "replace") if decoder else block
+
+    def estimate_lines(self, some: Sequence[str]) -> int:
+        """Estimate how many lines like `some` the file has, not less than it has if they are even."""
+        size = self.source.seek(0, os.SEEK_END) // (2 if self.wide else 1)
+        length = sum(len(line) + 1 for line in some) / max(1, len(some))
+        return int(1.02 * size / max(2.0, length)) + 1
 
     def decode(self, text: bytes) -> str:
         """Text of bytes; cp1252 where they are no UTF-8, as older tools write ° and µ."""
