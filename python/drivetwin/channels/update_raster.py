@@ -297,13 +297,15 @@ def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None
     step = float(np.median(np.diff(time)))
     apart = np.maximum(np.diff(changed), np.diff(time[changed]) / step)
     usual = round(float(np.median(apart)))
+    if usual <= 1:
+        return None
     near, close, least = _NEAR, _CLOSE, 0.0
     if np.abs(np.diff(time) / step - 1.0).max() < _EVEN:
         near, close = max(near, _NEAR_PART * usual), max(close, _CLOSE_PART * usual)
         least = _LARGER
     at_usual = np.abs(apart - usual) < near
     often = np.mean(at_usual) > _MOST and np.mean(apart < close) < _SELDOM
-    if usual <= 1 or not often:
+    if not often:
         return None
     size = np.abs(np.diff(values))[changed - 1]
     larger = np.mean(size[1:][at_usual] > _STAIRS * size.min())

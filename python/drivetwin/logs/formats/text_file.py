@@ -15,6 +15,9 @@ from drivetwin.errors import FileFormatError, Where
 _BLOCK = 1 << 22
 """Bytes that are read at a time."""
 
+_HEAD = 1 << 16
+"""Bytes of the head that are read at a time."""
+
 _HEAD_LINES, _LONGEST_HEAD = 300, 1 << 25
 """Lines of the head, and bytes in which they must lie."""
 
@@ -34,11 +37,11 @@ class TextFile:
     wide: str | None
     file: str
 
-    def iterate_blocks(self) -> Iterator[bytes]:
+    def iterate_blocks(self, size: int = _BLOCK) -> Iterator[bytes]:
         """Yield the whole file, in UTF-8 or with one byte for each sign."""
         self.source.seek(0)
         decoder = codecs.getincrementaldecoder(self.wide)(errors="replace") if self.wide else None
-        while block := self.source.read(_BLOCK):
+        while block := self.source.read(size):
             yield decoder.decode(block).encode("utf-8", "replace") if decoder else block
 
     def estimate_lines(self, some: Sequence[str]) -> int:
@@ -57,7 +60,7 @@ class TextFile:
     def read_head(self) -> list[str]:
         """Return the first lines."""
         head = b""
-        for block in self.iterate_blocks():
+        for block in self.iterate_blocks(_HEAD):
             head += block
             if head.count(b"\n") + head.count(b"\r") >= _HEAD_LINES or len(head) > _LONGEST_HEAD:
                 head = head[: max(head.rfind(b"\n"), head.rfind(b"\r")) + 1] or head
