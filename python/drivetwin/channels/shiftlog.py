@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.rich_display import DisplayMixin
+from drivetwin._util.time_steps import compute_median_step
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.update_raster import UpdateRaster, find_raster, find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
@@ -29,7 +30,7 @@ def compute_gap_limit(time: FloatArray) -> float:
     """Return the longest pause [s] between samples at `time` (n,) that is not a gap."""
     if time.size < 2:
         return np.inf
-    return GAP_STEPS * float(np.median(np.diff(time)))
+    return GAP_STEPS * compute_median_step(time)
 
 
 def find_uncovered_ends(
@@ -95,7 +96,7 @@ class Channel:
     @property
     def step(self) -> float:
         """Median sample interval [s]."""
-        return float(np.median(np.diff(self.time)))
+        return compute_median_step(self.time)
 
     @property
     def place(self) -> Where:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.time_steps import compute_median_step
 
 MIN_CHANGES = 10
 """Fewer changes of value cannot prove a raster."""
@@ -120,13 +121,13 @@ def _find_stamp_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | N
 def _mean_step(time: FloatArray) -> float:
     """Compute the mean sample interval [s] without pauses: jitter of stamps moves a median."""
     steps = np.diff(time)
-    return float(np.mean(steps[steps < _LOST * np.median(steps)]))
+    return float(np.mean(steps[steps < _LOST * compute_median_step(time)]))
 
 
 def _find_changes(time: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
     """Mark samples with a new value (n-1,), without the first one and those after a pause."""
     steps = np.diff(time)
-    return np.asarray((np.diff(values) != 0.0) & (steps <= _PAUSE * np.median(steps)))
+    return np.asarray((np.diff(values) != 0.0) & (steps <= _PAUSE * compute_median_step(time)))
 
 
 def _fit_raster(changes: FloatArray, period: float, step: float) -> UpdateRaster | None:
@@ -202,13 +203,14 @@ def _match_updates(
     That is the change near an instant, else the sample at it. An instant without a sample has no
     update.
     """
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     margin = 0.5 * step
     first = np.ceil((time[0] - margin - raster.start) / raster.period)
     last = np.floor((time[-1] + margin - raster.start) / raster.period)
     own = np.round((time - raster.start) / raster.period)
     # Of a long pause no instant needs to be looked at.
-    count = np.unique(np.concatenate((own - 1.0, own, own + 1.0)))
+    each = own[np.append(True, np.diff(own) > 0.0)]
+    count = np.unique(np.concatenate((each - 1.0, each, each + 1.0)))
     count = count[(count >= first) & (count <= last)]
     instants = raster.start + raster.period * count
     nearest = np.minimum(np.searchsorted(time, instants - margin), time.size - 1)
@@ -294,7 +296,7 @@ def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None
     changed = np.flatnonzero(np.diff(values) != 0.0) + 1
     if changed.size < _LEAST:
         return None
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     apart = np.maximum(np.diff(changed), np.diff(time[changed]) / step)
     usual = round(float(np.median(apart)))
     if usual <= 1:
@@ -314,7 +316,7 @@ def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None
 
 def count_updates(time: FloatArray, values: FloatArray, period: float) -> NDArray[np.intp]:
     """Find the updated samples: the changes, and between them one for each period."""
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     changed = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1))
     last = time.size - 1
     ends = time[np.append(changed, last)]

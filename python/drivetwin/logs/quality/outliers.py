@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
+from drivetwin._util.time_steps import compute_median_step
 from drivetwin.channels.shiftlog import FloatArray, Quantity
 from drivetwin.errors import Where
 from drivetwin.findings import Code, Finding, report
@@ -158,7 +159,7 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
         _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
         _SPIKE_CONTRAST * float(np.median(steps[steps > 0.0])) if steps.any() else np.inf,
     )
-    interval = float(np.median(np.diff(time)))
+    interval = compute_median_step(time)
     for width in range(1, _SPIKE_WIDTH + 1):
         if quantity is not Quantity.SPEED and width * interval > _SPIKE_TIME:
             break
@@ -346,7 +347,7 @@ def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -
     start of a log that of one that was not received yet. What is positive and not above `possible`
     may have been commanded: at the ends of the log, and where it is a fill pulse, it stays.
     """
-    if float(np.median(np.diff(time))) > _BEYOND_STEP:
+    if compute_median_step(time) > _BEYOND_STEP:
         return None
     size = np.abs(values)
     if size.max() <= BEYOND * np.median(size):
