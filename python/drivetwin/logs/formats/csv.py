@@ -28,6 +28,7 @@ from drivetwin.channels.read_options import Column, ReadOptions, TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, TimeError, Where
+from drivetwin.logs.formats.logger_heads import unpack_clock
 from drivetwin.logs.formats.table_columns import TableColumns, parse_table_columns
 from drivetwin.logs.formats.table_head import find_table_head, is_remark_name
 from drivetwin.logs.formats.table_scan import (
@@ -111,7 +112,9 @@ class CsvRecording:
         name, unit = self._header.names[place], self._header.units[place]
         if (fault := self._contents[place].fault) is not None:
             where = Where(file=self._reader.text.file, channel=name)
-            raise DamagedChannelError(fault, "repair or empty the cell, or map another column", where)
+            raise DamagedChannelError(
+                fault, "repair or empty the cell, or map another column", where
+            )
         column, stamps = self._load_numbers(place), self._stamps[self._header.times[place]]
         present = column.present & stamps.known
         if present.all():
@@ -121,11 +124,13 @@ class CsvRecording:
         return channel.select_window(window)
 
     def _is_channel(self, index: int) -> bool:
+        """Return False for time, date, and blank columns of labels or remarks."""
         if index in self._header.clocks or index == self._header.date:
             return False
         name, contents = self._header.names[index], self._contents[index]
         is_empty = not contents.count and not contents.texts
-        return not (is_empty and (not name or is_remark_name(name)))
+        is_aside = not name or is_remark_name(name) or index < self._header.clocks[0]
+        return not (is_empty and is_aside)
 
     def _load_numbers(self, place: int) -> Numbers:
         """Return a column; the sound ones after it are read in the same pass."""
@@ -138,9 +143,7 @@ class CsvRecording:
         return self._kept[place]
 
     def _take_numbers(self, table: ScannedTable, wanted: Sequence[int]) -> dict[int, Numbers]:
-        return {
-            one: make_numbers(*table.take_numbers(one), self._contents[one]) for one in wanted
-        }
+        return {one: make_numbers(*table.take_numbers(one), self._contents[one]) for one in wanted}
 
     def _count_stamps(
         self, time: _TimeColumns, numbers: dict[int, Numbers]
@@ -187,7 +190,10 @@ class _TimeColumns:
         """Stamps from the one time column, and warnings. Raises TimeError for a row without one."""
         ((clock, column),) = numbers.items()
         self.require_stamps(clock, ~column.present)
-        counted = column.values * self._get_factor(clock)
+        if self._header.is_packed_clock and self._time.unit is None:
+            counted = unpack_clock(column.values, self._place(clock))
+        else:
+            counted = column.values * self._get_factor(clock)
         origin = find_origin(counted[:1])
         seconds = subtract_origin(counted, origin)
         return {clock: _Stamps(seconds, column.present)}, describe_origin(origin)

@@ -8,23 +8,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from drivetwin.channels.names import find_time_index, find_time_indices, split_name_and_unit
+from drivetwin.channels.names import (
+    find_time_index,
+    find_time_indices,
+    is_time_name,
+    split_name_and_unit,
+)
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.units import is_unit
-from drivetwin.logs.formats.table_head import TableHead, is_physical_unit
+from drivetwin.logs.formats.logger_heads import Columns, apply_conventions
+from drivetwin.logs.formats.table_head import TableHead, is_physical_unit, is_remark_name
 
 _DATE_NAMES = frozenset(("date", "datum"))
-_LABVIEW = "LabVIEW Measurement"
-"""First words of a file whose time `X_Value` counts in seconds."""
 
 
 @dataclass(frozen=True)
 class TableColumns:
-    """Names and units of the columns, and of each the index of its time column."""
+    """Names and units of the columns, and of each the index of its time column.
+
+    `is_packed_clock`: time is a clock without colons, as 101112.05.
+    """
 
     names: Sequence[str]
     units: Sequence[str | None]
     times: Sequence[int]
+    is_packed_clock: bool = False
 
     @property
     def clocks(self) -> list[int]:
@@ -53,12 +61,12 @@ def parse_table_columns(head: TableHead, time: TimeColumn, file: str) -> TableCo
     stated = max(below, key=_count_units, default=[])
     if any(map(is_unit, stated)) or (stated and not any(units)):
         units = [_select_unit(beside, under) for beside, under in zip(units, stated, strict=True)]
-    if not any(units):
-        units = _find_units_above(head, len(names))
-    if head.above and head.above[0].text.startswith(_LABVIEW):
-        is_time = find_time_indices(names, units, time)
-        units = [units[i] or ("s" if i in is_time else None) for i in range(len(names))]
-    return TableColumns(names, units, _assign_time_columns(names, units, time, file))
+    if all(unit is None or is_time_name(name) for name, unit in zip(names, units, strict=True)):
+        above = _find_units_above(head, len(names))
+        units = [beside or over for beside, over in zip(units, above, strict=True)]
+    meant = apply_conventions(head, Columns(names, units))
+    times = _assign_time_columns(meant.names, meant.units, time, file)
+    return TableColumns(meant.names, meant.units, times, meant.is_packed_clock)
 
 
 def _fit(cells: Sequence[str], width: int) -> list[str]:
@@ -90,8 +98,12 @@ def _assign_time_columns(
     found = find_time_indices(names, units, time)
     stems = {re.sub(r"[^a-z]", "", names[index].casefold()) for index in found}
     before_others = all(after - one > 1 for one, after in pairwise([*found, len(names)]))
-    if len(found) > 1 and found[0] == 0 and len(stems) == 1 and before_others:
-        return [max(one for one in found if one <= index) for index in range(len(names))]
+    before = all(not name or is_remark_name(name) for name in names[: found[0]]) if found else False
+    if len(found) > 1 and before and len(stems) == 1 and before_others:
+        return [
+            max((one for one in found if one <= index), default=found[0])
+            for index in range(len(names))
+        ]
     return [find_time_index(names, units, time, file)] * len(names)
 
 

@@ -31,16 +31,23 @@ BLANKS = " "
 _SEPARATORS = ("\t", ";", ",", "|", BLANKS)
 """In the order tried."""
 
+_HANDICAP = 0.2
+"""Share of sound cells by which blanks must be the better separator: they stand in texts, too."""
+
 _LOOKED_AT = 200
 """Number of lines used to detect separator and width of the table."""
 
 _SURE_RUN = 3
 """So many rows of numbers, one after the other, are the table."""
 
+_MOST_BELOW = 3
+"""Rows of units, comments and types at most."""
+
 _DATE = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}", re.ASCII)
 
 _REMARK_NAME = re.compile(
-    r"(comment|remark|note|annotation|marker|event|kommentar|bemerkung)s?|ap info\b.*", re.IGNORECASE
+    r"(comment|remark|note|annotation|marker|event|kommentar|bemerkung)s?|ap info\b.*",
+    re.IGNORECASE,
 )
 """Name of a last column that rows may leave out."""
 
@@ -56,7 +63,9 @@ class Line:
 
 @dataclass(frozen=True)
 class TableHead:
-    """Lines up to the first row: those `above` the names, the names, and those below.
+    """Lines up to the first row: those `above` the names, the names, and those `below`.
+
+    Below stand units, comments or types; lines of another form are those `between`.
 
     `first` is the number of the line of the first row that has numbers or would have; `rows` are
     the first rows.
@@ -66,6 +75,7 @@ class TableHead:
     above: Sequence[Line]
     names: Line
     below: Sequence[Line]
+    between: Sequence[Line]
     rows: Sequence[Line]
     first: int
 
@@ -100,8 +110,9 @@ def find_table_head(lines: Sequence[str], time: TimeColumn, file: str) -> TableH
         _TableLines([Line(number, line, split_line(line, sign)) for number, line in kept], sign)
         for sign in separators
     ]
-    with_rows = [table for table in tables if table.has_rows]
-    found = max(with_rows, key=lambda table: table.share, default=None) or next(
+    found = max(
+        (table for table in tables if table.has_rows), key=lambda table: table.fitness, default=None
+    ) or next(
         (one for one in tables if one.separator != BLANKS and max(map(len, one.cells)) > 1), None
     )
     if found is None:
@@ -168,7 +179,7 @@ class _TableLines:
         values = [cell for cells, is_row in zip(self.cells, rows, strict=True) if is_row
                   for cell in cells]  # fmt: skip
         sound = sum(classify_text(cell) is not Meaning.TEXT or is_value(cell) for cell in values)
-        self.share = sound / max(1, len(values))
+        self.fitness = sound / max(1, len(values)) - _HANDICAP * (separator == BLANKS)
         """Share of the cells of rows that are no text."""
 
     def _find_first_row(self, rows: Sequence[bool]) -> int:
@@ -196,9 +207,7 @@ class _TableLines:
                     Where(file=file),
                 )
             first, *below = named
-            return TableHead(
-                self.separator, (), first, below, self.lines, self.lines[0].number
-            )
+            return TableHead(self.separator, (), first, below, (), self.lines, self.lines[0].number)
         self._refuse_table_above(start, file)
         below, end = self._find_lines_below(start, time)
         last = self.lines[-1].number + 1
@@ -208,6 +217,7 @@ class _TableLines:
             self.lines[:start],
             self.lines[start],
             below,
+            [line for line in self.lines[start + 1 : end] if line not in below],
             self.lines[end:],
             first_row,
         )
@@ -260,22 +270,23 @@ class _TableLines:
         """
         times = [index for index, cell in enumerate(self.cells[start])
                  if _has_time_name([cell], time)]  # fmt: skip
+        labelled = all(not cells[0] for cells in self.cells[self.first :] if cells)
         below: list[Line] = []
-        end = start + 1
-        while end < len(self.lines) and len(below) < 3:
+        for end in range(start + 1, len(self.lines)):
             cells = self.cells[end]
-            if self._can_be_names(cells):
-                stamps = [cells[index] for index in times if index < len(cells)]
-                looked_at = cells if below else [*stamps, *(c for c in cells if not is_unit(c))]
-                if any(map(is_value, looked_at)):
-                    break
+            if end >= self.first and not self._can_be_names(cells):
+                return below, end
+            is_label = labelled and bool(cells[0]) and end < self.first
+            stamps = [cells[index] for index in times if index < len(cells)]
+            looked_at = cells if below else [*stamps, *(c for c in cells if not is_unit(c))]
+            if any(map(is_value, looked_at)):
+                if not is_label and self._can_be_names(cells):
+                    return below, end
+            elif len(below) == _MOST_BELOW:
+                return below, end
+            elif self._can_be_names(cells):
                 below.append(self.lines[end])
-            elif end >= self.first:
-                break
-            end += 1
-        while end < min(self.first, len(self.lines)) and not self._can_be_names(self.cells[end]):
-            end += 1
-        return below, end
+        return below, len(self.lines)
 
     def _find_commented_names(self, lines: Sequence[str]) -> list[Line]:
         """Comment lines with names, and units if present, above a table without a header.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -23,8 +24,8 @@ from drivetwin.logs.formats.cell_text import (
 from drivetwin.logs.formats.table_head import BLANKS, TableHead, split_line
 from drivetwin.logs.formats.text_file import EXPORT, TextFile, make_binary_error
 
-_BLANK, _FIRST_TEXT, _OTHER_TEXT = 1, 2, 255
-"""Kinds of cells that hold no number: nothing, the first of the texts, one beyond those kept."""
+_NUMBER, _BLANK, _FIRST_TEXT, _OTHER_TEXT = 0, 1, 2, 255
+"""Kinds of cells: a number, nothing, the first of the texts, a text beyond those kept."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class TableReader:
     def scan(self, numbers: Sequence[int], texts: Sequence[int], rows: int = 0) -> ScannedTable:
         """Read the columns `numbers` as numbers and `texts` as texts; about `rows` are expected."""
         separator = self.head.separator
-        lines = (*self.head.above, self.head.names, *self.head.below)
-        first_cells = {line.cells[0] for line in lines if line.cells}
+        lines = (*self.head.above, self.head.names, *self.head.below, *self.head.between)
+        labels = {line.cells[0] for line in lines if re.match(r"[^\W\d]|[[*]", line.cells[0])}
         scanner = TableScanner(
             separator=None if separator == BLANKS else ord(separator),
             width=self.width,
@@ -70,7 +71,7 @@ class TableReader:
             time=self.time,
             time_is_text=self.time_is_text,
             skip=self.head.first - 1,
-            labels=[cell.encode() for cell in first_cells if cell[:1].isalpha() or cell[:1] in "[*"],
+            labels=[label.encode() for label in labels],
             numbers=numbers,
             texts=texts,
             rows=rows,
@@ -100,11 +101,14 @@ class TableReader:
         return notes
 
     def _describe_head(self) -> list[str]:
-        above = self.head.above
-        if not above:
-            return []
-        first = above[0].text.strip()[:40]
-        return [f"{len(above)} lines above the names left out, the first {first!r}"]
+        notes = []
+        if above := self.head.above:
+            shown = _show_lines(len(above), above[0].text)
+            notes.append(f"{shown[0]} above the names left out{shown[1]}")
+        if between := self.head.between:
+            shown = _show_lines(len(between), between[0].text)
+            notes.append(f"{shown[0]} between the names and the rows left out{shown[1]}")
+        return notes
 
     def _describe_remarks(self, table: ScannedTable) -> list[str]:
         """Describe the lines between the rows; refuse those that begin another table."""
@@ -112,7 +116,9 @@ class TableReader:
             return []
         names = [cell for cell in self.head.names.cells if cell]
         for text, line in table.remarks:
-            cells = [cell for cell in split_line(self.text.decode(text), self.head.separator) if cell]
+            cells = [
+                cell for cell in split_line(self.text.decode(text), self.head.separator) if cell
+            ]
             timed = any(is_time_name(split_name_and_unit(cell)[0]) for cell in cells)
             others = len(cells) > 1 and not any(map(is_number, cells))
             if timed and others and cells != names and len(cells) == len(names):
@@ -122,12 +128,8 @@ class TableReader:
                     Where(file=self.text.file),
                 )
         text, line = table.remarks[0]
-        shown = self.text.decode(text).strip()[:60]
-        many = table.remark_count > 1
-        start = f"{table.remark_count} lines" if many else "1 line"
-        return [
-            f"{start} between the rows left out, {'the first ' if many else ''}line {line}: {shown!r}"
-        ]
+        shown = _show_lines(table.remark_count, self.text.decode(text))
+        return [f"{shown[0]} between the rows left out{shown[1]} in line {line}"]
 
     def _check_widths(self, table: ScannedTable) -> list[str]:
         """Describe a cut last line; refuse other lines of another width."""
@@ -143,6 +145,12 @@ class TableReader:
             )
         text = f"line {line}, the last, has {count} of {self.width} fields and is left out"
         return [f"the file is cut: {text}"]
+
+
+def _show_lines(count: int, first: str) -> tuple[str, str]:
+    """Words for a number of lines, and for the first of them."""
+    shown = repr(first.strip()[:60])
+    return ("1 line", f": {shown}") if count == 1 else (f"{count} lines", f", the first {shown}")
 
 
 def list_contents(table: ScannedTable, text: TextFile) -> list[Contents]:
@@ -173,8 +181,8 @@ def make_numbers(values: FloatArray, kinds: NDArray[np.uint8], contents: Content
              if classify_text(text) is Meaning.NO_NUMBER]  # fmt: skip
     for index, text in enumerate(contents.texts):
         is_absent[_FIRST_TEXT + index] = classify_text(text) is Meaning.ABSENT
-    if words and contents.count > 1:
-        apart = np.diff(np.flatnonzero(kinds == 0))
+    if words and contents.count > 1 and np.isin(kinds, words).sum() > contents.count:
+        apart = np.diff(np.flatnonzero(kinds == _NUMBER))
         is_absent[words] = float(np.median(apart)) > 1.0
     return Numbers(values, ~is_absent[kinds])
 
