@@ -17,8 +17,8 @@ from drivetwin.errors import (
     TimeError,
     UnitError,
 )
-from tests.logs.formats.text_logs import read_csv
 from drivetwin.logs.raw import RawLog
+from tests.logs.formats.text_logs import read_csv
 
 
 def read(text: str | bytes, time: TimeColumn | None = None) -> RawLog:

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO
 
@@ -89,8 +90,9 @@ class CsvRecording:
         self._contents = list_contents(table, text)
         self._kept: dict[int, Numbers] = {}
         stamps = _TimeColumns(self._header, self._lines, time, file)
+        told: tuple[str, ...] = ()
         if is_text:
-            self._stamps, told = stamps.parse_texts(table, text, bool(dates)), ()
+            self._stamps = stamps.parse_texts(table, text, bool(dates))
         else:
             self._stamps, told = self._count_stamps(stamps, self._take_numbers(table, clocks))
         self.warnings: tuple[str, ...] = (*notes, *told)
@@ -249,4 +251,4 @@ def _list_texts(table: ScannedTable, index: int, text: TextFile) -> list[str]:
     """Cells of a column of texts."""
     joined, ends = table.take_texts(index)
     bounds = [0, *ends.tolist()]
-    return [text.decode(joined[a:b]) for a, b in zip(bounds, bounds[1:], strict=False)]
+    return [text.decode(joined[a:b]) for a, b in pairwise(bounds)]

@@ -55,7 +55,7 @@ def _set_time_unit(columns: Columns, where: Sequence[int]) -> Columns:
 
 def _apply_vcds(head: TableHead, columns: Columns, below: Sequence[str]) -> Columns:
     stamped = [index for index, cell in enumerate(below) if cell == _STAMP]
-    upper = head.above[-1].cells if head.above else ()
+    upper = head.above[-1].cells if head.above and not head.above[-1].cells[0] else ()
     names = [
         name if is_time_name(name) or index >= len(upper) else f"{upper[index]} {name}".strip()
         for index, name in enumerate(columns.names)

@@ -63,7 +63,7 @@ class TableReader:
         """Read the columns `numbers` as numbers and `texts` as texts; about `rows` are expected."""
         separator = self.head.separator
         lines = (*self.head.above, self.head.names, *self.head.below, *self.head.between)
-        labels = {line.cells[0] for line in lines if re.match(r"[^\W\d]|[[*]", line.cells[0])}
+        labels = {line.cells[0] for line in lines if re.match(r"[^\W\d]|[\[*]", line.cells[0])}
         scanner = TableScanner(
             separator=None if separator == BLANKS else ord(separator),
             width=self.width,

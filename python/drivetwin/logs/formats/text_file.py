@@ -45,7 +45,7 @@ class TextFile:
             yield decoder.decode(block).encode("utf-8", "replace") if decoder else block
 
     def estimate_lines(self, some: Sequence[str]) -> int:
-        """Estimate how many lines like `some` the file has, not less than it has if they are even."""
+        """Estimate from `some` lines how many the file has, with a margin."""
         size = self.source.seek(0, os.SEEK_END) // (2 if self.wide else 1)
         length = sum(len(line) + 1 for line in some) / max(1, len(some))
         return int(1.02 * size / max(2.0, length)) + 1

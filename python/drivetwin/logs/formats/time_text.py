@@ -17,7 +17,7 @@ _DECIMAL = r"\d+(?:[.,]\d*)?|[.,]\d+"
 _WITH_UNIT = re.compile(rf"([+-]?(?:{_DECIMAL})(?:[eE][+-]?\d+)?)\s*([^\W\d_]+)", re.ASCII)
 """`0.001 sec` of MATLAB, `1.5ms`."""
 
-_CLOCK = rf"(?P<h>\d+):(?P<m>\d\d):(?P<s>\d\d(?:[.,]\d*)?)"
+_CLOCK = r"(?P<h>\d+):(?P<m>\d\d):(?P<s>\d\d(?:[.,]\d*)?)"
 _DAYS = re.compile(rf"(?:(?P<d>[+-]?\d+) days?,? )?(?P<sign>[+-]?){_CLOCK}", re.ASCII)
 """`0 days 00:00:00.001` of pandas, `1 day, 0:00:00.5` of Python, `-00:00:00.5`."""
 
@@ -60,7 +60,7 @@ def is_time_text(cell: str) -> bool:
 def parse_time_texts(
     cells: Sequence[str], dates: Sequence[str] | None, lines: Sequence[int], where: Where
 ) -> FloatArray:
-    """Convert a column of texts to seconds (n,): durations as they are, clock times since the first.
+    """Convert a column of texts to seconds (n,), clock times from the first.
 
     Raises TimeError for the first cell of another form.
     """

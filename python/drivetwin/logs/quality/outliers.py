@@ -189,7 +189,8 @@ def _find_spike_starts(
     # Largest step in the windows that end before and start after the spike.
     left, right = windows[before].max(axis=1), windows[after + _SURROUNDINGS].max(axis=1)
     around = np.maximum(np.maximum(left, right), apart)
-    return before[(height > least) & (height > _SPIKE_CONTRAST * around)] + 1
+    found = (height > least) & (height > _SPIKE_CONTRAST * around)
+    return np.asarray(before[found] + 1)
 
 
 def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
