@@ -282,6 +282,10 @@ _STAIRS = 1.5
 """Times the least of all changes above which one is no stair of a rounded signal ..."""
 
 
+_NEXT = 1.5
+"""Steps below which a change follows the one before; if most do, each sample may be an update."""
+
+
 _LARGER = 0.2
 """... and the least share of such among changes at the usual distance: a signal that is not held
 goes stair by stair where it does not change with each sample."""
@@ -298,16 +302,16 @@ def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None
         return None
     step = compute_median_step(time)
     apart = np.maximum(np.diff(changed), np.diff(time[changed]) / step)
-    usual = round(float(np.median(apart)))
-    if usual <= 1:
+    if 2 * np.count_nonzero(apart < _NEXT) > apart.size:
         return None
+    usual = round(float(np.median(apart)))
     near, close, least = _NEAR, _CLOSE, 0.0
     if np.abs(np.diff(time) / step - 1.0).max() < _EVEN:
         near, close = max(near, _NEAR_PART * usual), max(close, _CLOSE_PART * usual)
         least = _LARGER
     at_usual = np.abs(apart - usual) < near
     often = np.mean(at_usual) > _MOST and np.mean(apart < close) < _SELDOM
-    if not often:
+    if usual <= 1 or not often:
         return None
     size = np.abs(np.diff(values))[changed - 1]
     larger = np.mean(size[1:][at_usual] > _STAIRS * size.min())
