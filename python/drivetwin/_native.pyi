@@ -2,6 +2,7 @@
 """The compiled core. Private: use `drivetwin.simulation` and `drivetwin.gearbox`."""
 
 from collections.abc import Sequence
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +95,7 @@ def reduce_shift(
 
 _Text = tuple[bytes, int]
 
+@final
 class TableScanner:
     def __new__(
         cls,
@@ -112,6 +114,7 @@ class TableScanner:
     def feed(self, block: bytes) -> None: ...
     def finish(self) -> ScannedTable: ...
 
+@final
 class ScannedTable:
     @property
     def rows(self) -> int: ...

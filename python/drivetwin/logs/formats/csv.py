@@ -119,10 +119,10 @@ class CsvRecording:
             )
         column, stamps = self._load_numbers(place), self._stamps[self._header.times[place]]
         present = column.present & stamps.known
-        if present.all():
-            channel = RawChannel(name, unit, stamps.seconds, column.values)
-        else:
-            channel = RawChannel(name, unit, stamps.seconds[present], column.values[present])
+        time, values = stamps.seconds, column.values
+        if not present.all():
+            time, values = time[present], values[present]
+        channel = RawChannel(name, unit, time, values, notes=column.notes)
         return channel.select_window(window)
 
     def _is_channel(self, index: int) -> bool:

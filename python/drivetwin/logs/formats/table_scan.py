@@ -43,10 +43,14 @@ class Contents:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """A column as numbers: `values` (n,) where `present` (n,); NaN where the file contains one."""
+    """A column as numbers: `values` (n,) where `present` (n,); NaN where the file contains one.
+
+    `notes` describe the cells that are no samples although they are not blank.
+    """
 
     values: FloatArray
     present: NDArray[np.bool_]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -176,15 +180,21 @@ def make_numbers(values: FloatArray, kinds: NDArray[np.uint8], contents: Content
     if not kinds.size:
         return Numbers(values, np.ones(values.size, np.bool_))
     is_absent = np.zeros(_OTHER_TEXT + 1, np.bool_)
-    is_absent[_BLANK] = True
-    words = [_FIRST_TEXT + index for index, text in enumerate(contents.texts)
-             if classify_text(text) is Meaning.NO_NUMBER]  # fmt: skip
-    for index, text in enumerate(contents.texts):
-        is_absent[_FIRST_TEXT + index] = classify_text(text) is Meaning.ABSENT
+    meanings = {
+        _FIRST_TEXT + index: classify_text(text) for index, text in enumerate(contents.texts)
+    }
+    is_absent[[kind for kind, meaning in meanings.items() if meaning is Meaning.ABSENT]] = True
+    words = [kind for kind, meaning in meanings.items() if meaning is Meaning.NO_NUMBER]
     if words and contents.count > 1 and np.isin(kinds, words).sum() > contents.count:
         apart = np.diff(np.flatnonzero(kinds == _NUMBER))
         is_absent[words] = float(np.median(apart)) > 1.0
-    return Numbers(values, ~is_absent[kinds])
+    notes: tuple[str, ...] = ()
+    if left := int(is_absent[kinds].sum()):
+        signs = ", ".join(repr(text) for index, text in enumerate(contents.texts)
+                          if is_absent[_FIRST_TEXT + index])  # fmt: skip
+        notes = (f"{left} cells hold {signs} for no sample",)
+    is_absent[_BLANK] = True
+    return Numbers(values, ~is_absent[kinds], notes)
 
 
 def number_lines(lines: Sequence[tuple[int, int]], rows: NDArray[np.intp]) -> NDArray[np.intp]:
