@@ -147,6 +147,7 @@ HEADS: dict[str, str] = {
     "units above": UNITS + NAMES + rows(),
     "units above with a label": "Units,Nm,rpm\nTime (s),EngTrq,nAb\n" + rows(),
     "rates above": "100,100,100\n" + NAMES + UNITS + rows(),
+    "long head": "".join(f"setting {k},{k}\n" for k in range(700)) + PLAIN,
     "footer": PLAIN + "\nEnd of data\n",
     "footer with commas": PLAIN + "End,of,data\n",
     "footer of blanks": PLAIN + ",,\n,,\n",

@@ -251,4 +251,7 @@ def _list_texts(table: ScannedTable, index: int, text: TextFile) -> list[str]:
     """Cells of a column of texts."""
     joined, ends = table.take_texts(index)
     bounds = [0, *ends.tolist()]
+    if joined.isascii():
+        cells = joined.decode("ascii")
+        return [cells[a:b] for a, b in pairwise(bounds)]
     return [text.decode(joined[a:b]) for a, b in pairwise(bounds)]

@@ -35,7 +35,7 @@ _HANDICAP = 0.2
 """Share of sound cells by which blanks must be the better separator: they stand in texts, too."""
 
 _LOOKED_AT = 200
-"""Number of lines used to detect separator and width of the table."""
+"""Number of lines used to detect separator and width of the table, unless none is a row."""
 
 _SURE_RUN = 3
 """So many rows of numbers, one after the other, are the table."""
@@ -103,13 +103,14 @@ def find_table_head(lines: Sequence[str], time: TimeColumn, file: str) -> TableH
         (number, line)
         for number, line in enumerate(lines, start=1)
         if line.strip() and not line.lstrip().startswith(COMMENT_MARKS)
-    ][:_LOOKED_AT]
+    ]
     if not kept:
         raise FileFormatError("the file holds only comments", EXPORT, Where(file=file))
-    tables = [
-        _TableLines([Line(number, line, split_line(line, sign)) for number, line in kept], sign)
-        for sign in separators
-    ]
+    first = kept[:_LOOKED_AT]
+    for lines_of, lenient in ((first, False), (kept, False), (first, True)):
+        tables = _split_lines(lines_of, separators, lenient)
+        if any(table.has_rows for table in tables):
+            break
     found = max(
         (table for table in tables if table.has_rows), key=lambda table: table.fitness, default=None
     ) or next(
@@ -123,6 +124,14 @@ def find_table_head(lines: Sequence[str], time: TimeColumn, file: str) -> TableH
             Where(file=file),
         )
     return found.make_head(lines, time, file)
+
+
+def _split_lines(kept: Sequence[tuple[int, str]], separators: Sequence[str]) -> list[_TableLines]:
+    """Split the lines by each of the separators."""
+    return [
+        _TableLines([Line(number, text, split_line(text, sign)) for number, text in kept], sign)
+        for sign in separators
+    ]
 
 
 def split_strictly(line: str, separator: str) -> list[str]:
@@ -157,14 +166,18 @@ def _is_row(cells: Sequence[str]) -> bool:
 
 
 class _TableLines:
-    """The first lines of a file, split by one separator."""
+    """The first lines of a file, split by one separator.
 
-    def __init__(self, lines: Sequence[Line], separator: str) -> None:
+    `lenient`: a line is a row if half of its fields hold values, as where a column of texts comes
+    first.
+    """
+
+    def __init__(self, lines: Sequence[Line], separator: str, lenient: bool) -> None:
         self.lines = lines
         self.separator = separator
         self.cells = [line.cells for line in lines]
         rows = list(map(_is_row, self.cells))
-        if not any(rows) and separator != BLANKS:  # as where a column of texts comes first
+        if lenient and separator != BLANKS:
             rows = [
                 len(cells) > 1 and 2 * sum(map(is_value, cells)) >= len(cells)
                 for cells in self.cells

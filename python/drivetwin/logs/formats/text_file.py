@@ -18,7 +18,7 @@ _BLOCK = 1 << 22
 _HEAD = 1 << 16
 """Bytes of the head that are read at a time."""
 
-_HEAD_LINES, _LONGEST_HEAD = 300, 1 << 25
+_HEAD_LINES, _LONGEST_HEAD = 1000, 1 << 23
 """Lines of the head, and bytes in which they must lie."""
 
 EXPORT = "export the log as text: one row of names, one of units, then one row for each sample"
@@ -59,12 +59,14 @@ class TextFile:
 
     def read_head(self) -> list[str]:
         """Return the first lines."""
-        head = b""
+        read, ends = bytearray(), 0
         for block in self.iterate_blocks(_HEAD):
-            head += block
-            if head.count(b"\n") + head.count(b"\r") >= _HEAD_LINES or len(head) > _LONGEST_HEAD:
-                head = head[: max(head.rfind(b"\n"), head.rfind(b"\r")) + 1] or head
+            read += block
+            ends += max(block.count(b"\n"), block.count(b"\r"))
+            if ends >= _HEAD_LINES or len(read) > _LONGEST_HEAD:
+                del read[max(read.rfind(b"\n"), read.rfind(b"\r")) + 1 or len(read) :]
                 break
+        head = bytes(read)
         if match := _NO_TEXT.search(head):
             raise make_binary_error(match.start(), self.file)
         lines = head.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n", _HEAD_LINES)
