@@ -126,10 +126,14 @@ def find_table_head(lines: Sequence[str], time: TimeColumn, file: str) -> TableH
     return found.make_head(lines, time, file)
 
 
-def _split_lines(kept: Sequence[tuple[int, str]], separators: Sequence[str]) -> list[_TableLines]:
+def _split_lines(
+    kept: Sequence[tuple[int, str]], separators: Sequence[str], lenient: bool
+) -> list[_TableLines]:
     """Split the lines by each of the separators."""
     return [
-        _TableLines([Line(number, text, split_line(text, sign)) for number, text in kept], sign)
+        _TableLines(
+            [Line(number, text, split_line(text, sign)) for number, text in kept], sign, lenient
+        )
         for sign in separators
     ]
 
