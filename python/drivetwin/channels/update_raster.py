@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.time_steps import compute_median_step
+from drivetwin._util.time_steps import compute_median_step, remember_for_stamps
 
 MIN_CHANGES = 10
 """Fewer changes of value cannot prove a raster."""
@@ -118,6 +118,7 @@ def _find_stamp_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | N
     return best
 
 
+@remember_for_stamps
 def _mean_step(time: FloatArray) -> float:
     """Compute the mean sample interval [s] without pauses: jitter of stamps moves a median."""
     steps = np.diff(time)
@@ -126,8 +127,13 @@ def _mean_step(time: FloatArray) -> float:
 
 def _find_changes(time: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
     """Mark samples with a new value (n-1,), without the first one and those after a pause."""
-    steps = np.diff(time)
-    return np.asarray((np.diff(values) != 0.0) & (steps <= _PAUSE * compute_median_step(time)))
+    return np.asarray((values[1:] != values[:-1]) & _follow_at_once(time))
+
+
+@remember_for_stamps
+def _follow_at_once(time: FloatArray) -> NDArray[np.bool_]:
+    """Mark samples (n-1,), without the first one, that do not come after a pause."""
+    return np.asarray(np.diff(time) <= _PAUSE * compute_median_step(time))
 
 
 def _fit_raster(changes: FloatArray, period: float, step: float) -> UpdateRaster | None:
@@ -297,7 +303,7 @@ def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None
     None where each sample may be an update. On even stamps, where changes do jitter, those of a
     rounded signal may seem to be updates: there some must be larger than a step of the rounding.
     """
-    changed = np.flatnonzero(np.diff(values) != 0.0) + 1
+    changed = np.flatnonzero(values[1:] != values[:-1]) + 1
     if changed.size < _LEAST:
         return None
     step = compute_median_step(time)

@@ -292,3 +292,20 @@ def test_a_second_segment_that_starts_anew_is_left_to_the_check_of_time() -> Non
     log = read(LVM_HEAD + LVM_SEGMENT + "".join(TAB) + LVM_SEGMENT + "".join(TAB))
     assert log.channels[0].time.size == 2 * COUNT
     assert (np.diff(log.channels[0].time) < 0.0).sum() == 1
+
+
+@pytest.mark.parametrize("cells", [1, 30, 40])
+def test_columns_that_do_not_fit_at_once_are_read_in_passes(
+    cells: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pairs = "t1;EngTrq;t2;nAb\ns;Nm;s;rpm\n" + "".join(
+        f"{STEP * k:.2f};{1000 + k}.5;{STEP * k:.2f};{700 - k}.25\n" for k in range(COUNT)
+    )
+    monkeypatch.setattr("drivetwin.logs.formats.csv._MOST_CELLS", cells)
+    for text in (PLAIN, HEADS["labview segments"], pairs):
+        check(read(text))
+
+
+def test_cells_that_hold_no_sample_are_told_of() -> None:
+    a, _ = read("Time [s],a [Nm],b [bar]\n0,1,1\n1,-,2\n2,3,3\n").channels
+    assert a.notes == ("1 cells hold '-' for no sample",)

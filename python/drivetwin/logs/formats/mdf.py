@@ -246,7 +246,8 @@ class MdfRecording:
         }
         group = self._mdf.groups[place.group]
         self._loaded[place.group] += 1
-        if _KEPT_FROM * self._loaded[place.group] >= len(group.channels):
+        whole = count == int(group.channel_group.cycles_nr)
+        if whole and _KEPT_FROM * self._loaded[place.group] >= len(group.channels):
             self._records.keep(group)
         channel = group.channels[place.index]
         formula = getattr(channel.conversion, "formula", "")
