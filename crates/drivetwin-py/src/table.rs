@@ -10,6 +10,8 @@ use std::mem::take;
 
 /// Values and kinds: 0 number, 1 blank, from 2 on the texts.
 type Column<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u8>>);
+/// Text and the line where it stands first.
+type Place = (Cow<'static, [u8]>, usize);
 /// Examples of a number with point, with comma, without; and whether a comma is a decimal one.
 type Written =
     (Option<Cow<'static, [u8]>>, Option<Cow<'static, [u8]>>, Option<Cow<'static, [u8]>>, bool);
@@ -83,7 +85,7 @@ impl ScannedTable {
     }
 
     #[getter]
-    fn remarks(&self) -> Vec<(Cow<'static, [u8]>, usize)> {
+    fn remarks(&self) -> Vec<Place> {
         self.table.remarks.iter().map(place).collect()
     }
 
@@ -119,7 +121,7 @@ impl ScannedTable {
 
     /// Number of numbers, and the different texts with their first lines, of each column.
     #[getter]
-    fn contents(&self) -> Vec<(usize, Vec<(Cow<'static, [u8]>, usize)>)> {
+    fn contents(&self) -> Vec<(usize, Vec<Place>)> {
         let columns = self.table.columns.iter();
         columns.map(|one| (one.count, one.texts.iter().map(place).collect())).collect()
     }
@@ -147,7 +149,7 @@ fn ended() -> PyErr {
     PyValueError::new_err("the table is complete")
 }
 
-fn place(text: &Text) -> (Cow<'static, [u8]>, usize) {
+fn place(text: &Text) -> Place {
     (Cow::Owned(text.text.clone()), text.line)
 }
 

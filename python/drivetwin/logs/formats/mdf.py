@@ -303,8 +303,8 @@ class _GroupRecords:
     """Records of one group of an MDF 4 file, which asammdf reads anew for each channel."""
 
     def __init__(self, mdf: Any) -> None:
-        self._reader = getattr(mdf, "_mdf", None)
-        self._read = getattr(self._reader, "_load_data", None)
+        self._reader: Any = getattr(mdf, "_mdf", None)
+        self._read: Any = getattr(self._reader, "_load_data", None)
         self._kept: tuple[int, list[Any]] | None = None
 
     def keep(self, group: Any) -> None:
@@ -320,7 +320,6 @@ class _GroupRecords:
     def _load(
         self, group: Any, record_offset: int = 0, record_count: int | None = None, **options: Any
     ) -> Iterator[Any]:
-        assert self._read is not None
         whole = record_offset == 0 and record_count in (None, int(group.channel_group.cycles_nr))
         if whole and self._kept is not None and self._kept[0] == id(group):
             return iter(self._kept[1])
