@@ -56,7 +56,7 @@ tidy: $(venv)/.dev ## directions of imports, and the project's own rules (circle
 
 .PHONY: test-rust
 test-rust: $(venv)/.dev ## tests of the core
-	cargo test --locked --quiet --package drivetwin-core
+	cargo test --locked --quiet --package drivetwin-core --package drivetwin-table
 
 .PHONY: test-python
 test-python: $(venv)/.dev native ## tests of the package, without the suites that take long

@@ -2,11 +2,14 @@
 """The compiled core. Private: use `drivetwin.simulation` and `drivetwin.gearbox`."""
 
 from collections.abc import Sequence
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "ScannedTable",
+    "TableScanner",
     "batch_sensitivities",
     "gear_statics",
     "linearise",
@@ -89,3 +92,51 @@ def reduce_shift(
     dogs: Sequence[str],
     ends: tuple[str, str],
 ) -> tuple[_Ratios, _Ratios, list[str], list[tuple[str, float, float, float]]]: ...
+
+_Text = tuple[bytes, int]
+
+@final
+class TableScanner:
+    def __new__(
+        cls,
+        *,
+        separator: int | None,
+        width: int,
+        least: int,
+        time: int,
+        time_is_text: bool,
+        skip: int,
+        labels: Sequence[bytes],
+        numbers: Sequence[int],
+        texts: Sequence[int],
+        rows: int,
+    ) -> TableScanner: ...
+    def feed(self, block: bytes) -> None: ...
+    def finish(self) -> ScannedTable: ...
+
+@final
+class ScannedTable:
+    @property
+    def rows(self) -> int: ...
+    @property
+    def last_line(self) -> int: ...
+    @property
+    def lines(self) -> list[tuple[int, int]]: ...
+    @property
+    def remarks(self) -> list[_Text]: ...
+    @property
+    def remark_count(self) -> int: ...
+    @property
+    def ragged(self) -> tuple[int, int] | None: ...
+    @property
+    def ragged_count(self) -> int: ...
+    @property
+    def quote(self) -> tuple[int, str] | None: ...
+    @property
+    def binary(self) -> int | None: ...
+    @property
+    def decimals(self) -> list[tuple[bytes | None, bytes | None, bytes | None, bool]]: ...
+    @property
+    def contents(self) -> list[tuple[int, list[_Text]]]: ...
+    def take_numbers(self, index: int) -> tuple[_Array, NDArray[np.uint8]]: ...
+    def take_texts(self, index: int) -> tuple[bytes, NDArray[np.uint64]]: ...

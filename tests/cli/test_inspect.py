@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
+from drivetwin._native import ScannedTable
 from drivetwin.channels.mapping_file import read_mapping
-from drivetwin.channels.read_options import TimeColumn
 from drivetwin.cli import main
-from drivetwin.logs.formats.csv import read_csv
-from drivetwin.logs.raw import RawLog
+from drivetwin.logs.formats.table_scan import TableReader
 from tests.cli.conftest import Files
 
 
@@ -38,12 +37,13 @@ def test_a_file_is_parsed_once(
     bench_files: Files, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     parsed: list[str] = []
+    scan = TableReader.scan
 
-    def counted(data: bytes, file: str, time: TimeColumn) -> RawLog:
-        parsed.append(file)
-        return read_csv(data, file, time)
+    def counted(self: TableReader, *arguments: Any) -> ScannedTable:
+        parsed.append(self.text.file)
+        return scan(self, *arguments)
 
-    monkeypatch.setattr("drivetwin.logs.formats.detect.read_csv", counted)
+    monkeypatch.setattr(TableReader, "scan", counted)
     _inspect(capsys, str(bench_files.log), "--vehicle", str(bench_files.card))
     assert parsed == [str(bench_files.log)]
 

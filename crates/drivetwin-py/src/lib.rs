@@ -9,6 +9,7 @@ mod gearbox;
 mod linear;
 mod network;
 mod plain;
+mod table;
 
 use pyo3::prelude::*;
 
@@ -27,5 +28,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::reduce_shift, module)?)?;
+    module.add_class::<table::TableScanner>()?;
+    module.add_class::<table::ScannedTable>()?;
     Ok(())
 }

@@ -44,8 +44,11 @@ def integrate_trapezoids(values: FloatArray, time: FloatArray) -> FloatArray:
 
 def find_true_runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first index and end (one past the last) of each run of True in `mask` (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    if not mask.size:
+        return []
+    inner = np.flatnonzero(mask[1:] != mask[:-1]) + 1
+    edges = [*([0] if mask[0] else []), *inner.tolist(), *([mask.size] if mask[-1] else [])]
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def estimate_resolution(values: FloatArray) -> float:

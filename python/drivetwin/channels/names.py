@@ -13,7 +13,7 @@ from drivetwin.errors import MappingError, MissingChannelError, Where
 
 _TIME_NAMES = frozenset(
     (
-        *("t", "time", "times", "timestamp", "timestamps", "tout"),
+        *("t", "time", "times", "timestamp", "timestamps", "tout", "elapsedtime", "xvalue"),
         *("zeit", "zeitstempel", "messzeit", "uhrzeit"),
     )
 )
@@ -22,7 +22,8 @@ _TIME_NAMES = frozenset(
 def split_name_and_unit(cell: str) -> tuple[str, str | None]:
     """`EngTrq [Nm]` -> name and unit; round brackets count where they hold a unit.
 
-    `x[1]` without a blank is an index, part of the name.
+    `x[1]` without a blank is an index, part of the name. A time may have its unit behind `_`, as
+    `time_ms`.
     """
     if match := re.fullmatch(r"(.+?)(\s*)\[([^\[\]]*)\]", cell):
         name, blank, inside = match.groups()
@@ -30,6 +31,8 @@ def split_name_and_unit(cell: str) -> tuple[str, str | None]:
             return name, inside.strip() or None
     if (match := re.fullmatch(r"(.+?)\s*\(([^()]*)\)", cell)) and is_unit(match[2]):
         return match[1], match[2].strip()
+    if (match := re.fullmatch(r"(.+)_([^\W\d_]+)", cell)) and is_time_unit(match[2]):
+        return (match[1], match[2]) if is_time_name(match[1]) else (cell, None)
     return cell, None
 
 
@@ -48,15 +51,18 @@ def find_time_indices(
 ) -> list[int]:
     """Return the indices of all time columns: as stated, else those with a name for time.
 
-    A column of another unit, such as a temperature `T1`, is none.
+    A column of another unit, such as a temperature `T1`, is none. Without such a name it is the
+    first column, if that is the only one in a unit of time.
     """
     if time.source is not None:
         return [index for index, name in enumerate(names) if name == time.source]
-    return [
+    named = [
         index
         for index, (name, unit) in enumerate(zip(names, units, strict=True))
         if is_time_name(name) and can_be_time(unit)
     ]
+    timed = [index for index, unit in enumerate(units) if unit is not None and is_time_unit(unit)]
+    return named or (timed if timed == [0] else [])
 
 
 def find_time_index(

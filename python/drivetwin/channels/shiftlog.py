@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.rich_display import DisplayMixin
+from drivetwin._util.time_steps import compute_median_step
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.pressure_roles import make_pressure_role
-from drivetwin.channels.update_raster import find_updates
+from drivetwin.channels.update_raster import UpdateRaster, find_raster, find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.findings import Finding
 from drivetwin.simulation.dual_clutch import LATEST
@@ -101,7 +102,7 @@ class Channel:
     @cached_property
     def step(self) -> float:
         """Median sample interval [s]."""
-        return float(np.median(np.diff(self.time)))
+        return compute_median_step(self.time)
 
     @cached_property
     def gap_limit(self) -> float:
@@ -112,6 +113,18 @@ class Channel:
     def place(self) -> Where:
         """Place of a finding on the whole channel."""
         return Where(channel=self.source_name)
+
+    @cached_property
+    def raster(self) -> UpdateRaster | None:
+        """Update raster of the channel; None if each sample may be an update."""
+        if self.quantity is Quantity.STATE:
+            return None
+        return find_raster(self.time, self.values)
+
+    @cached_property
+    def fresh(self) -> Channel:
+        """The updates of a channel of which it is not known yet whether it is `held`."""
+        return replace(self, held=self.raster is not None).updates
 
     @cached_property
     def updates(self) -> Channel:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.time_steps import compute_median_step, remember_for_stamps
 
 MIN_CHANGES = 10
 """Fewer changes of value cannot prove a raster."""
@@ -117,16 +118,22 @@ def _find_stamp_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | N
     return best
 
 
+@remember_for_stamps
 def _mean_step(time: FloatArray) -> float:
     """Compute the mean sample interval [s] without pauses: jitter of stamps moves a median."""
     steps = np.diff(time)
-    return float(np.mean(steps[steps < _LOST * np.median(steps)]))
+    return float(np.mean(steps[steps < _LOST * compute_median_step(time)]))
 
 
 def _find_changes(time: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
     """Mark samples with a new value (n-1,), without the first one and those after a pause."""
-    steps = np.diff(time)
-    return np.asarray((np.diff(values) != 0.0) & (steps <= _PAUSE * np.median(steps)))
+    return np.asarray((values[1:] != values[:-1]) & _follow_at_once(time))
+
+
+@remember_for_stamps
+def _follow_at_once(time: FloatArray) -> NDArray[np.bool_]:
+    """Mark samples (n-1,), without the first one, that do not come after a pause."""
+    return np.asarray(np.diff(time) <= _PAUSE * compute_median_step(time))
 
 
 def _fit_raster(changes: FloatArray, period: float, step: float) -> UpdateRaster | None:
@@ -202,13 +209,14 @@ def _match_updates(
     That is the change near an instant, else the sample at it. An instant without a sample has no
     update.
     """
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     margin = 0.5 * step
     first = np.ceil((time[0] - margin - raster.start) / raster.period)
     last = np.floor((time[-1] + margin - raster.start) / raster.period)
     own = np.round((time - raster.start) / raster.period)
     # Of a long pause no instant needs to be looked at.
-    count = np.unique(np.concatenate((own - 1.0, own, own + 1.0)))
+    each = own[np.append(True, np.diff(own) > 0.0)]
+    count = np.unique(np.concatenate((each - 1.0, each, each + 1.0)))
     count = count[(count >= first) & (count <= last)]
     instants = raster.start + raster.period * count
     nearest = np.minimum(np.searchsorted(time, instants - margin), time.size - 1)
@@ -280,6 +288,10 @@ _STAIRS = 1.5
 """Times the least of all changes above which one is no stair of a rounded signal ..."""
 
 
+_NEXT = 1.5
+"""Steps below which a change follows the one before; if most do, each sample may be an update."""
+
+
 _LARGER = 0.2
 """... and the least share of such among changes at the usual distance: a signal that is not held
 goes stair by stair where it does not change with each sample."""
@@ -291,11 +303,13 @@ def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None
     None where each sample may be an update. On even stamps, where changes do jitter, those of a
     rounded signal may seem to be updates: there some must be larger than a step of the rounding.
     """
-    changed = np.flatnonzero(np.diff(values) != 0.0) + 1
+    changed = np.flatnonzero(values[1:] != values[:-1]) + 1
     if changed.size < _LEAST:
         return None
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     apart = np.maximum(np.diff(changed), np.diff(time[changed]) / step)
+    if 2 * np.count_nonzero(apart < _NEXT) > apart.size:
+        return None
     usual = round(float(np.median(apart)))
     near, close, least = _NEAR, _CLOSE, 0.0
     if np.abs(np.diff(time) / step - 1.0).max() < _EVEN:
@@ -312,7 +326,7 @@ def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None
 
 def count_updates(time: FloatArray, values: FloatArray, period: float) -> NDArray[np.intp]:
     """Find the updated samples: the changes, and between them one for each period."""
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     changed = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0.0) + 1))
     last = time.size - 1
     ends = time[np.append(changed, last)]

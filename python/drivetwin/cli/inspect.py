@@ -55,12 +55,14 @@ def inspect(
     from drivetwin.channels.mapping_file import format_mapping, read_mapping
     from drivetwin.files.records import dump_findings
     from drivetwin.logs.formats.detect import open_recording
+    from drivetwin.logs.raw import Remembered
     from drivetwin.logs.survey import survey_recording
     from drivetwin.vehicle.card import load_card
 
     card = None if vehicle is None else load_card(vehicle)
     stated = Mapped({}) if channels is None else read_mapping(channels)
-    with show_step(f"reading {log.name}"), open_recording(log, stated.options) as recording:
+    with show_step(f"reading {log.name}"), open_recording(log, stated.options) as opened:
+        recording = Remembered(opened)
         found = survey_recording(recording, str(log), card, stated)
         findings, refusal, commands = _read_as_mapped_log(recording, log, card, stated)
     if write_mapping is not None:

@@ -15,6 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
+from drivetwin._util.time_steps import compute_median_step
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray, compute_gap_limit
 from drivetwin.errors import DamagedChannelError, Where
@@ -44,13 +45,14 @@ class RawChannel:
     @property
     def stamps(self) -> FloatArray:
         """The time stamps that are numbers [s]."""
-        return self.time[np.isfinite(self.time)]
+        known = np.isfinite(self.time)
+        return self.time if known.all() else self.time[known]
 
     @property
     def step(self) -> float | None:
         """Median sample interval [s]; None below two samples."""
         stamps = self.stamps
-        return float(np.median(np.diff(stamps))) if stamps.size > 1 else None
+        return compute_median_step(stamps) if stamps.size > 1 else None
 
     @property
     def rate(self) -> float | None:
@@ -129,6 +131,37 @@ class Joined:
                 return part.load(index, window)
             index -= len(part.columns)
         raise IndexError(index)
+
+
+MOST_REMEMBERED = 4 * 10**7
+"""Samples that `Remembered` keeps at most."""
+
+
+class Remembered:
+    """A recording whose first channels are kept, as for a survey before they are used."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._kept: dict[int, RawChannel] = {}
+        self._room = MOST_REMEMBERED
+
+    @property
+    def columns(self) -> Sequence[Column]:
+        return self._recording.columns
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return self._recording.warnings
+
+    def load(self, index: int, window: Window | None = None) -> RawChannel:
+        """Read the column at `index`, unless it is kept; see `Recording`."""
+        if index in self._kept:
+            return self._kept[index].select_window(window)
+        channel = self._recording.load(index, window)
+        if window is None and channel.values.size <= self._room:
+            self._room -= channel.values.size
+            self._kept[index] = channel
+        return channel
 
 
 @dataclass(frozen=True, eq=False)

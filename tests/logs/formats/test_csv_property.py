@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.errors import DrivetwinError
-from drivetwin.logs.formats.csv import read_csv
+from tests.logs.formats.text_logs import read_csv
 
 NAMES = st.text("abcdefghijkXYZ_0123456789", min_size=2, max_size=8).filter(
     lambda name: name[0].isalpha()

@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.can.open import is_bus_text, open_blf, open_bus_text
-from drivetwin.logs.formats.csv import read_csv
+from drivetwin.logs.formats.csv import open_csv
 from drivetwin.logs.formats.guarded import open_guarded
 from drivetwin.logs.formats.mat import open_mat
 from drivetwin.logs.formats.mat_integrity import is_version4
@@ -21,18 +20,8 @@ from drivetwin.logs.raw import Opener, Recording
 
 SUFFIXES = frozenset(
     (
-        ".csv",
-        ".txt",
-        ".tsv",
-        ".dat",
-        ".mf4",
-        ".mdf",
-        ".mat",
-        ".parquet",
-        ".asc",
-        ".trc",
-        ".blf",
-        ".log",
+        *(".csv", ".txt", ".tsv", ".dat", ".lvm", ".msl", ".vbo"),
+        *(".mf4", ".mdf", ".mat", ".parquet", ".asc", ".trc", ".blf", ".log"),
     )
 )
 """Endings by which a folder's logs are known; a file that is named by itself may have any."""
@@ -95,9 +84,4 @@ def _select_opener(head: bytes, path: Path) -> Opener:
             )
     if is_version4(head):
         return open_mat
-    return open_bus_text if is_bus_text(head) else _open_csv
-
-
-@contextmanager
-def _open_csv(path: Path, options: ReadOptions) -> Iterator[Recording]:
-    yield read_csv(path.read_bytes(), str(path), options.time)
+    return open_bus_text if is_bus_text(head) else open_csv

@@ -95,15 +95,17 @@ class GuardedRecording:
         self.columns = columns
         self.warnings = warnings
         self._reader = reader
+        self._time: FloatArray = np.empty(0)
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read the column at `index` of `columns`; see `Recording`. Raises ReaderFailureError."""
         reply = self._reader.ask(LoadRequest(index, window))
         self.warnings = tuple(reply["warnings"])
+        self._time = reply.get("time", self._time)
         return RawChannel(
             reply["name"],
             reply["unit"],
-            reply["time"],
+            self._time,
             reply["values"],
             reply["group"],
             tuple(reply["notes"]),
@@ -143,7 +145,7 @@ class _ReaderProcess:
         self._stderr.close()
 
     def ask(self, request: OpenRequest | LoadRequest) -> dict[str, Any]:
-        """Return the reply to a request, with `time` and `values` of a column.
+        """Return the reply to a request, with `values` of a column, and `time` if it is another.
 
         Raises ReaderFailureError without a reply, else the error that it names.
         """
@@ -169,7 +171,7 @@ class _ReaderProcess:
         reply: dict[str, Any] = json.loads(line)
         if "error" in reply:
             raise _parse_error(reply)
-        for name in ("time", "values") if "size" in reply else ():
+        for name in reply.get("numbers", ()):
             reply[name] = self._read_numbers(reply["size"])
         return reply
 

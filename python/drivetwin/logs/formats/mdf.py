@@ -35,6 +35,12 @@ _KIND = "an MDF file"
 _FRAGMENT = 1 << 23
 """Bytes of records read at a time, of all channels; bounds the memory for one channel."""
 
+_KEPT_FROM = 8
+"""The records of a group are kept once an eighth of its channels was asked for ..."""
+
+_MOST_KEPT = 1 << 30
+"""... and they have so many bytes at most."""
+
 _FINISHED = b"MDF     "
 _OPTIONS = {"process_bus_logging": False, "use_display_names": False}
 _MOST_INFLATION = 1100
@@ -116,6 +122,8 @@ class MdfRecording:
         self._mdf = mdf
         self._path = path
         self._stamps: tuple[int, FloatArray] | None = None
+        self._loaded: Counter[int] = Counter()
+        self._records = _GroupRecords(mdf)
         self._asserted = options.time.unit
         self._factors: dict[int, float] = {}
         self.warnings: tuple[str, ...] = ()
@@ -237,7 +245,12 @@ class MdfRecording:
             "samples_only": True,
             "ignore_invalidation_bits": True,  # marked samples are left out here, and counted
         }
-        channel = self._mdf.groups[place.group].channels[place.index]
+        group = self._mdf.groups[place.group]
+        self._loaded[place.group] += 1
+        whole = count == int(group.channel_group.cycles_nr)
+        if whole and _KEPT_FROM * self._loaded[place.group] >= len(group.channels):
+            self._records.keep(group)
+        channel = group.channels[place.index]
         formula = getattr(channel.conversion, "formula", "")
         note = ""
         samples, marks = self._mdf.get(raw=bool(formula), **wanted)
@@ -282,6 +295,34 @@ class MdfRecording:
                 "the file is cut or damaged: record or export the log again",
                 Where(file=str(self._path)),
             )
+
+
+class _GroupRecords:
+    """Records of one group of an MDF 4 file, which asammdf reads anew for each channel."""
+
+    def __init__(self, mdf: Any) -> None:
+        self._reader: Any = getattr(mdf, "_mdf", None)
+        self._read: Any = getattr(self._reader, "_load_data", None)
+        self._kept: tuple[int, list[Any]] | None = None
+
+    def keep(self, group: Any) -> None:
+        """Keep the records of a group of at most _MOST_KEPT bytes for its next channels."""
+        block = group.channel_group
+        size = int(block.cycles_nr) * int(block.samples_byte_nr)
+        is_kept = self._kept is not None and self._kept[0] == id(group)
+        if is_kept or size > _MOST_KEPT or self._read is None or not hasattr(group, "data_blocks"):
+            return
+        self._kept = (id(group), list(self._read(group)))
+        self._reader._load_data = self._load
+
+    def _load(
+        self, group: Any, record_offset: int = 0, record_count: int | None = None, **options: Any
+    ) -> Iterator[Any]:
+        whole = record_offset == 0 and record_count in (None, int(group.channel_group.cycles_nr))
+        if whole and self._kept is not None and self._kept[0] == id(group):
+            return iter(self._kept[1])
+        found: Iterator[Any] = self._read(group, record_offset, record_count, **options)
+        return found
 
 
 def _find_time_channel(group: Any, found: int | None) -> int | None:

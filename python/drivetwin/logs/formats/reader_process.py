@@ -2,7 +2,8 @@
 """Child process that reads one file: `python -m drivetwin.logs.formats.reader_process`.
 
 It answers pickled requests from standard input. A reply is a line of JSON, followed by the time
-stamps and the values of a column as bytes. The process ends with its input.
+stamps and the values of a column as bytes; stamps that are those of the column before are not sent
+again. The process ends with its input.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.process_limits import limit_computing_time, limit_memory
 from drivetwin.errors import DrivetwinError
 from drivetwin.logs.formats.guarded import (
@@ -47,9 +49,10 @@ def main() -> None:
         with opener(opening.path, opening.options) as recording:
             columns = [asdict(column) for column in recording.columns]
             _send(replies, {"columns": columns, "warnings": recording.warnings})
+            sent: FloatArray | None = None
             while (request := requests.get()) is not None:
                 limit_computing_time(opening.limits.seconds)
-                _answer(replies, opening, recording, request)
+                sent = _answer(replies, opening, recording, request, sent)
     except Exception as fault:
         _send_error(replies, opening, fault)
     os._exit(0)  # without the time that libraries take to be unloaded
@@ -67,8 +70,13 @@ def _read_requests(requests: SimpleQueue[LoadRequest | None]) -> None:
 
 
 def _answer(
-    replies: IO[bytes], opening: OpenRequest, recording: Recording, request: LoadRequest
-) -> None:
+    replies: IO[bytes],
+    opening: OpenRequest,
+    recording: Recording,
+    request: LoadRequest,
+    sent: FloatArray | None,
+) -> FloatArray | None:
+    """Send a column; return its stamps, of which those `sent` last are not sent again."""
     try:
         channel = recording.load(request.index, request.window)
         time, values = (
@@ -76,16 +84,19 @@ def _answer(
         )
     except Exception as fault:
         _send_error(replies, opening, fault)
-        return
+        return sent
+    is_known = channel.time is sent
     head = {
         "name": channel.name,
         "unit": channel.unit,
         "group": channel.group,
         "notes": channel.notes,
         "size": time.size,
+        "numbers": ("values",) if is_known else ("time", "values"),
         "warnings": recording.warnings,
     }
-    _send(replies, head, time.data, values.data)
+    _send(replies, head, *(() if is_known else (time.data,)), values.data)
+    return channel.time
 
 
 def _send_error(replies: IO[bytes], opening: OpenRequest, fault: Exception) -> None:

@@ -57,6 +57,9 @@ COARSE = 0.03
 MAX_AT_LIMIT = 0.1
 """Share of samples at the largest number above which an engine torque may be saturated, ..."""
 
+SOME = 10_000
+"""So many samples show the resolution of most channels."""
+
 HELD, LONGER = 0.25, 4.0
 """... unless it holds other numbers too, for this time [s] or one that the longest there is so many
 times as long as: a pedal that is held still makes such a torque."""
@@ -185,7 +188,7 @@ def _check_rest(channel: Channel) -> list[Finding]:
     """Report an engine torque that stays at one number where noise would have moved it."""
     if channel.role != "engine_torque":
         return []
-    fresh = replace(channel, held=find_raster(channel) is not None).updates
+    fresh = channel.fresh
     span = find_longest_rest(fresh.time, fresh.values)
     if span is None:
         return []
@@ -196,9 +199,14 @@ def _check_rest(channel: Channel) -> list[Finding]:
 def _check_rounding(channel: Channel) -> list[Finding]:
     """Report a measured channel that was rounded coarsely."""
     # Not from one sample to the next: along a ramp of a slow channel all may be many steps apart.
-    numbers = np.unique(channel.values[np.isfinite(channel.values)])
-    step, largest = estimate_resolution(numbers), float(np.abs(numbers).max(initial=0.0))
-    if channel.quantity in AUXILIARY or step <= COARSE * largest or _is_binary(channel.values):
+    numbers = channel.values[np.isfinite(channel.values)]
+    largest = float(np.abs(numbers).max(initial=0.0))
+    if channel.quantity in AUXILIARY or _is_binary(channel.values):
+        return []
+    if 0.0 < estimate_resolution(numbers[:SOME]) <= COARSE * largest:
+        return []
+    step = estimate_resolution(numbers)
+    if step <= COARSE * largest:
         return []
     shown, share = Number(step, channel.quantity.unit), 100.0 * step / largest
     return [report(Code.COARSE_RESOLUTION, "", channel.place, step=shown, share=share)]
@@ -249,10 +257,9 @@ def _check_outliers(channel: Channel) -> Damage | None:
 
 def _check_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
     """Apply `look` to the updated samples of a channel; include the samples that repeat them."""
-    held = find_raster(channel) is not None
-    fresh = replace(channel, held=held).updates
+    fresh = channel.fresh
     found = look(fresh)
-    if found is None or not held:
+    if found is None or find_raster(channel) is None:
         return found
     update = np.searchsorted(fresh.time, channel.time, side="right") - 1
     return Damage(found.mask[np.clip(update, 0, None)], found.code)

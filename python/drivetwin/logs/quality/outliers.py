@@ -5,14 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 from scipy.special import erf
 
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
+from drivetwin._util.time_steps import compute_median_step
 from drivetwin.channels.shiftlog import FloatArray, Quantity
 from drivetwin.errors import Where
 from drivetwin.findings import Code, Finding, report
@@ -27,6 +28,9 @@ _SPIKE_WIDTH = 3
 
 _SPIKE_CONTRAST = 5.0
 """A spike stands out by so many times the largest step of its surroundings ..."""
+
+_STEP_INTO_SPIKE = 0.8
+"""Least step into a spike as a share of its height."""
 
 _SURROUNDINGS = 12
 """... which are so many samples on both sides."""
@@ -155,7 +159,7 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
         _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
         _SPIKE_CONTRAST * float(np.median(steps[steps > 0.0])) if steps.any() else np.inf,
     )
-    interval = float(np.median(np.diff(time)))
+    interval = compute_median_step(time)
     for width in range(1, _SPIKE_WIDTH + 1):
         if quantity is not Quantity.SPEED and width * interval > _SPIKE_TIME:
             break
@@ -166,22 +170,27 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
 
 def _find_spike_starts(
     values: FloatArray, steps: FloatArray, width: int, least: float
-) -> list[int]:
-    """First samples of spikes of one width: both neighbours agree, the rest around is calm."""
-    before, after = values[: -width - 1], values[width + 1 :]
-    base, apart = 0.5 * (before + after), np.abs(after - before)
-    inside = np.lib.stride_tricks.sliding_window_view(values[1:-1], width) - base[:, None]
-    height = np.abs(inside).min(axis=1)
+) -> NDArray[np.intp]:
+    """First samples of spikes of one width: both neighbours agree, the rest around is calm.
+
+    The neighbours differ by a fifth of the height at most, so that the step into a spike has nine
+    tenths of it; only samples after such a step are looked at.
+    """
+    count = values.size - width - 1
+    before = np.flatnonzero(steps[:count] > _STEP_INTO_SPIKE * least)
+    after = before + width + 1
+    apart = np.abs(values[after] - values[before])
+    inside = np.lib.stride_tricks.sliding_window_view(values[1:-1], width)[before]
+    inside = inside - 0.5 * (values[before] + values[after])[:, None]
+    height = np.abs(inside).min(axis=1, initial=np.inf)
     height[np.abs(np.sign(inside).sum(axis=1)) < width] = 0.0
+    padded = np.pad(steps, _SURROUNDINGS)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, _SURROUNDINGS)
     # Largest step in the windows that end before and start after the spike.
-    left = maximum_filter1d(steps, _SURROUNDINGS, origin=(_SURROUNDINGS - 1) // 2, mode="nearest")
-    right = maximum_filter1d(steps, _SURROUNDINGS, origin=-(_SURROUNDINGS // 2), mode="nearest")
-    count = height.size
-    lefts = np.concatenate(([0.0], left))[:count]  # steps up to the sample before
-    rights = np.concatenate((right[width + 1 :], [0.0]))[:count]
-    around = np.maximum(np.maximum(lefts, rights), apart)
+    left, right = windows[before].max(axis=1), windows[after + _SURROUNDINGS].max(axis=1)
+    around = np.maximum(np.maximum(left, right), apart)
     found = (height > least) & (height > _SPIKE_CONTRAST * around)
-    return (np.flatnonzero(found) + 1).tolist()
+    return np.asarray(before[found] + 1)
 
 
 def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
@@ -249,17 +258,22 @@ def find_stale(values: FloatArray) -> Damage | None:
     mask = np.zeros(values.size, np.bool_)
     if values.size < 4 * _SURROUNDINGS:
         return None
-    noise = float(np.median(np.abs(np.diff(values, 3)))) / _THIRD_DIFFERENCE
-    size, least = np.abs(steps), _MOVES * max(estimate_resolution(values), noise)
+    size = np.abs(steps)
+    least = cache(lambda: _MOVES * max(estimate_resolution(values), _estimate_white_noise(values)))
     for start, end in find_true_runs(steps == 0.0):
         if start == 0 or end == steps.size or end - start > _LOST:
             continue
         before, after, lost = size[start - 1], size[end], end - start
         onwards = steps[start - 1] * steps[end] > 0.0
         catches_up = before < after < _CATCHES_UP * (lost + 1) * before
-        if onwards and catches_up and before + after >= least * (lost + 2):
+        if onwards and catches_up and before + after >= least() * (lost + 2):
             mask[start + 1 : end + 1] = True
     return _make_damage(mask, Code.MESSAGES_LOST)
+
+
+def _estimate_white_noise(values: FloatArray) -> float:
+    """Standard deviation of the noise of `values` (n,) from its third difference."""
+    return float(np.median(np.abs(np.diff(values, 3)))) / _THIRD_DIFFERENCE
 
 
 def _is_noisy(steps: FloatArray, usual: float) -> bool:
@@ -334,9 +348,11 @@ def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -
     start of a log that of one that was not received yet. What is positive and not above `possible`
     may have been commanded: at the ends of the log, and where it is a fill pulse, it stays.
     """
-    if float(np.median(np.diff(time))) > _BEYOND_STEP:
+    if compute_median_step(time) > _BEYOND_STEP:
         return None
     size = np.abs(values)
+    if size.max() <= BEYOND * np.median(size):
+        return None
     sizes = np.unique(size)
     far = np.flatnonzero(sizes[1:] > BEYOND * sizes[:-1])
     for largest in sizes[far[sizes[far] >= np.median(size)]]:

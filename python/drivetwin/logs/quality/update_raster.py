@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.channels import update_raster
 from drivetwin.channels.filling import FillKind, find_filling
 from drivetwin.channels.roles import AUXILIARY
-from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.channels.update_raster import UpdateRaster
 from drivetwin.findings import Code, Finding, Number, report
 
@@ -22,9 +21,7 @@ rows of 2 ms, however their stamps are rounded, its time is known to a milliseco
 
 def find_raster(channel: Channel) -> UpdateRaster | None:
     """Return the update raster of a channel; None if each sample may be an update."""
-    if channel.quantity is Quantity.STATE:
-        return None
-    return update_raster.find_raster(channel.time, channel.values)
+    return channel.raster
 
 
 def replace_filling(channel: Channel) -> tuple[Channel, list[Finding]]:
@@ -64,8 +61,10 @@ def mark_late_samples(channels: Mapping[str, Channel]) -> tuple[dict[str, Channe
     if not held:
         return dict(channels), []
     rows = max(measured.values(), key=lambda one: one.time.size)
-    in_table = all(np.isin(one.time, rows.time).all() for one in measured.values())
-    if not in_table or rows.step <= _COARSE:
+    if rows.step <= _COARSE:
+        return dict(channels), []
+    recorded = [one for one in measured.values() if one.filling is None]
+    if not all(np.isin(one.time, rows.time).all() for one in recorded):
         return dict(channels), []
     names = ", ".join(repr(one.source_name) for one in held)
     aged = {role: replace(one, late=rows.step) for role, one in measured.items()}

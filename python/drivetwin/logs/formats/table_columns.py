@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""Names, units and time columns of a text table, from its head."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from drivetwin.channels.names import (
+    find_time_index,
+    find_time_indices,
+    is_time_name,
+    split_name_and_unit,
+)
+from drivetwin.channels.read_options import TimeColumn
+from drivetwin.channels.units import is_unit
+from drivetwin.logs.formats.logger_heads import Columns, apply_conventions
+from drivetwin.logs.formats.table_head import TableHead, is_physical_unit, is_remark_name
+
+_DATE_NAMES = frozenset(("date", "datum"))
+
+
+@dataclass(frozen=True)
+class TableColumns:
+    """Names and units of the columns, and of each the index of its time column.
+
+    `is_packed_clock`: time is a clock without colons, as 101112.05.
+    """
+
+    names: Sequence[str]
+    units: Sequence[str | None]
+    times: Sequence[int]
+    is_packed_clock: bool = False
+
+    @property
+    def clocks(self) -> list[int]:
+        """The time columns; each is its own."""
+        return list(dict.fromkeys(self.times))
+
+    @property
+    def date(self) -> int | None:
+        """Index of the column with the day of each row."""
+        days = (i for i, name in enumerate(self.names) if name.casefold() in _DATE_NAMES)
+        return next(days, None)
+
+
+def parse_table_columns(head: TableHead, time: TimeColumn, file: str) -> TableColumns:
+    """Return the columns of a table.
+
+    Raises MissingChannelError without a time column, MappingError where there are several.
+    """
+    cells = list(head.names.cells)
+    while len(cells) > 1 and not cells[-1]:
+        cells.pop()
+    split = [split_name_and_unit(cell) for cell in cells]
+    names = [name for name, _ in split]
+    units = [unit for _, unit in split]
+    below = [_fit(line.cells, len(names)) for line in head.below]
+    stated = max(below, key=_count_units, default=[])
+    if any(map(is_unit, stated)) or (stated and not any(units)):
+        units = [_select_unit(beside, under) for beside, under in zip(units, stated, strict=True)]
+    if all(unit is None or is_time_name(name) for name, unit in zip(names, units, strict=True)):
+        above = _find_units_above(head, len(names))
+        units = [beside or over for beside, over in zip(units, above, strict=True)]
+    meant = apply_conventions(head, Columns(names, units))
+    times = _assign_time_columns(meant.names, meant.units, time, file)
+    return TableColumns(meant.names, meant.units, times, meant.is_packed_clock)
+
+
+def _fit(cells: Sequence[str], width: int) -> list[str]:
+    return [*cells[:width], *[""] * (width - len(cells))]
+
+
+def _find_units_above(head: TableHead, width: int) -> list[str | None]:
+    """Units of the columns from a row above the names; its first cell may be a label."""
+    for line in reversed(head.above):
+        cells = _fit(line.cells, width)
+        if (
+            width - 1 <= len(line.cells) <= width
+            and any(map(is_physical_unit, cells[1:]))
+            and all(not cell or is_unit(cell) for cell in cells[1:])
+        ):
+            first = cells[0] if is_unit(cells[0]) else ""
+            return [cell or None for cell in (first, *cells[1:])]
+    return [None] * width
+
+
+def _assign_time_columns(
+    names: Sequence[str], units: Sequence[str | None], time: TimeColumn, file: str
+) -> list[int]:
+    """The index of the time column of each column: the one, or of several the one before it.
+
+    Several count where each stands before columns of its own and is named as the others but for
+    digits, as `t1, EngTrq, t2, SpdIn`.
+    """
+    found = find_time_indices(names, units, time)
+    stems = {re.sub(r"[^a-z]", "", names[index].casefold()) for index in found}
+    before_others = all(after - one > 1 for one, after in pairwise([*found, len(names)]))
+    before = all(not name or is_remark_name(name) for name in names[: found[0]]) if found else False
+    if len(found) > 1 and before and len(stems) == 1 and before_others:
+        return [
+            max((one for one in found if one <= index), default=found[0])
+            for index in range(len(names))
+        ]
+    return [find_time_index(names, units, time, file)] * len(names)
+
+
+def _count_units(row: Sequence[str]) -> tuple[int, int]:
+    """Count the units in a row below the names: physical units first, then all units.
+
+    Some tools fill a row of comments with `-`, so `-` alone is weak evidence of a row of units.
+    """
+    return sum(map(is_physical_unit, row)), sum(map(is_unit, row))
+
+
+def _select_unit(beside: str | None, under: str) -> str | None:
+    """Unit of a column from its name and the row below, where a comment or a type may stand.
+
+    If the row below has no unit, or a placeholder such as `-`, the unit in the name is used.
+    """
+    tells = is_physical_unit(under)
+    return under if tells or (beside is None and under) else beside
