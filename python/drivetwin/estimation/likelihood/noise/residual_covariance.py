@@ -107,7 +107,9 @@ class Whitener:
         return total + 2.0 * float(np.sum(np.log(self.path.factor[0]))) - float(np.sum(of_steps))
 
     def apply_inverse(self, columns: FloatArray) -> FloatArray:
-        """Compute Σ⁻¹·columns, (n,) or (n, q)."""
+        """Compute Σ⁻¹·columns, (n,) or (n, q), of no column as well."""
+        if columns.size == 0:
+            return columns
         each = columns.reshape(len(columns), -1)
         weighted = (each - self.estimate_input_part(each)) / self.variance[:, None]
         if self.path is not None:
