@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.linear.load_balance import is_common_load
@@ -71,7 +71,7 @@ def _estimate_scatter(name: str, value: float, shifts: Sequence[IntegralShift]) 
         for k in (shift.ids.index(name),)
     ]
     square, freedom = float(np.sum(np.square(told))), len(told) - 1
-    if freedom < 1 or square < chi2.isf(COMBINATION.min_agreement, freedom):
+    if freedom < 1 or square < chdtri(freedom, COMBINATION.min_agreement):
         return 1.0
     return float(np.sqrt(square / freedom))
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
@@ -85,7 +85,7 @@ def is_common_load(differences: FloatArray, covariance: FloatArray) -> bool:
     scale = np.sqrt(np.diag(covariance))
     inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
     unit = differences / scale
-    return bool(unit @ inverse @ unit < chi2.isf(LOAD_BALANCE.min_common_load, differences.size))
+    return bool(unit @ inverse @ unit < chdtri(differences.size, LOAD_BALANCE.min_common_load))
 
 
 def report_different_loads(loads: Sequence[float]) -> list[Finding]:

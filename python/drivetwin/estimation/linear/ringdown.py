@@ -12,9 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, expm, solve_banded
 from scipy.optimize import least_squares
-from scipy.signal import cont2discrete, lfilter
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
@@ -277,10 +276,27 @@ def compute_forced_response(
     (2σp + ω_n²)/(p² + 2σp + ω_n²).
     """
     step, square = float(time[1] - time[0]), rate**2 + omega**2
-    numerator = np.array([2.0 * rate, square])
-    denominator = np.array([1.0, 2.0 * rate, square])
-    top, bottom, _ = cont2discrete((numerator, denominator), step, method="foh")
-    return np.asarray(lfilter(np.ravel(top), bottom, drive, axis=0), dtype=float)
+    system = np.array([[0.0, 1.0], [-square, -2.0 * rate]])
+    seen = np.array([square, 2.0 * rate])
+    # Exact for a torque that is linear between samples: transition with ramp input (Van Loan 1978).
+    augmented = np.zeros((4, 4))
+    augmented[:2, :2] = step * system
+    augmented[1, 2], augmented[2, 3] = step, 1.0
+    moved = expm(augmented)
+    transition, level, ramp = moved[:2, :2], moved[:2, 2], moved[:2, 3]
+    push = level + transition @ ramp - ramp
+    trace, determinant, direct = float(np.trace(transition)), np.linalg.det(transition), seen @ ramp
+    top = (
+        direct,
+        seen @ push - direct * trace,
+        direct * determinant + seen @ (transition @ push - trace * push),
+    )
+    forced = top[0] * drive
+    forced[1:] += top[1] * drive[:-1]
+    forced[2:] += top[2] * drive[:-2]
+    bands = np.ones((3, drive.shape[0]))
+    bands[1], bands[2] = -trace, determinant
+    return np.asarray(solve_banded((2, 0), bands, forced), dtype=float)
 
 
 def remove_jitter(torque: MeasuredSignal, block: int = 4, still: int = 12) -> MeasuredSignal:

@@ -55,14 +55,12 @@ def plot_agreement(names: Sequence[str], found: Sequence[Agreement]) -> go.Figur
         "ticktext": [get_parameter_label(one.id) for one in shown],
         "range": [len(shown) - 0.4, -0.6],
     }
-    figure.add_vline(x=0.0, line={"color": "rgba(128,128,128,0.7)", "width": 1})
-    figure.update_layout(
-        make_layout(
-            120 + (18 + 12 * len(names)) * len(shown),
-            xaxis=make_axis("deviation from the common mean, with 95 % interval [σ]"),
-            yaxis=make_axis("", **ticks),
-        )
+    figure.layout = make_layout(
+        120 + (18 + 12 * len(names)) * len(shown),
+        xaxis=make_axis("deviation from the common mean, with 95 % interval [σ]"),
+        yaxis=make_axis("", **ticks),
     )
+    figure.add_vline(x=0.0, line={"color": "rgba(128,128,128,0.7)", "width": 1})
     return figure
 
 
@@ -95,13 +93,11 @@ def plot_friction_overlay(
             legendgroup=name,
             line={"color": style.colour, "width": 2.0, "dash": style.dash},
         )
-    figure.update_layout(
-        make_layout(
-            400,
-            xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
-            yaxis=make_axis("friction coefficient μ [–]"),
-            hovermode="x",
-        )
+    figure.layout = make_layout(
+        400,
+        xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
+        yaxis=make_axis("friction coefficient μ [–]"),
+        hovermode="x",
     )
     return figure
 
@@ -152,11 +148,9 @@ def plot_fit_matrix(
             hovertemplate="%{y} on %{x}: %{text} %<extra></extra>",
         )
     )
-    figure.update_layout(
-        make_layout(
-            130 + 34 * len(rows),
-            xaxis=make_axis("log and shift", ticks="", side="top"),
-            yaxis=make_axis("", ticks="", autorange="reversed"),
-        )
+    figure.layout = make_layout(
+        130 + 34 * len(rows),
+        xaxis=make_axis("log and shift", ticks="", side="top"),
+        yaxis=make_axis("", ticks="", autorange="reversed"),
     )
     return figure

@@ -90,7 +90,7 @@ def plot_energy(run: DriveRun) -> go.Figure:
         )
     )
     options = {"xaxis": make_axis("heat [kJ]"), "yaxis": make_axis("", autorange="reversed")}
-    figure.update_layout(make_layout(120 + 30 * len(parts), **options))
+    figure.layout = make_layout(120 + 30 * len(parts), **options)
     return figure
 
 

@@ -45,15 +45,11 @@ def plot_friction(element: str, curve: FrictionCurve) -> go.Figure:
             name="Stribeck law",
             line={"color": COMPARED, "width": 1.6, "dash": "dash"},
         )
-    figure.update_layout(
-        make_layout(
-            420,
-            xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
-            yaxis=make_axis(
-                f"friction coefficient {curve.symbol} [–]", range=_compute_mu_range(curve)
-            ),
-            hovermode="x",
-        )
+    figure.layout = make_layout(
+        420,
+        xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
+        yaxis=make_axis(f"friction coefficient {curve.symbol} [–]", range=_compute_mu_range(curve)),
+        hovermode="x",
     )
     return figure
 

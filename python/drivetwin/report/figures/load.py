@@ -32,11 +32,9 @@ def plot_load(fit: LoadFit, final_drive: float | None) -> go.Figure:
             name=f"J3 = {fit.J_vehicle:.4g} kg·m²",
             line={"color": FITTED, "width": 1.8},
         )
-    figure.update_layout(
-        make_layout(
-            400,
-            xaxis=make_axis("wheel acceleration ω_w′, window mean [rad/s²]"),
-            yaxis=make_axis("T_o − T_v/i_f, window mean [Nm]"),
-        )
+    figure.layout = make_layout(
+        400,
+        xaxis=make_axis("wheel acceleration ω_w′, window mean [rad/s²]"),
+        yaxis=make_axis("T_o − T_v/i_f, window mean [Nm]"),
     )
     return figure

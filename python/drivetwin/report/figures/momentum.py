@@ -8,7 +8,15 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from drivetwin.estimation.linear.momentum_balance import MomentumFit
-from drivetwin.report.style import COMPARED, FITTED, MEASURED, SECOND, make_axis, make_layout
+from drivetwin.report.style import (
+    COMPARED,
+    FITTED,
+    MEASURED,
+    SECOND,
+    make_axis,
+    make_layout,
+    merge_layout,
+)
 
 _STRETCHES = {
     "before": ("gear before the shift", MEASURED),
@@ -50,8 +58,9 @@ def plot_momentum(fit: MomentumFit) -> go.Figure:
     ends = [float(both.min()), float(both.max())]
     line = {"color": FITTED, "width": 1.6}
     figure.add_scatter(x=ends, y=ends, mode="lines", name="balance", line=line, row=1, col=1)
-    figure.update_layout(make_layout(560))
-    figure.update_layout(
+    merge_layout(
+        figure,
+        **make_layout(560),
         xaxis=make_axis("inertia torque Σ J·ω′, window mean [Nm]"),
         yaxis=make_axis("η·T_e − T_o/i,<br>window mean [Nm]"),
         xaxis3=make_axis("time [s]"),
@@ -66,7 +75,8 @@ def _add_scan(figure: go.Figure, fit: MomentumFit) -> None:
     shown = np.ones(scan.delay.size, dtype=bool)
     if scan.best is not None:
         shown = np.abs(scan.delay - scan.best) <= _SCAN_VIEW
-    figure.update_layout(
+    merge_layout(
+        figure,
         xaxis2=make_axis("assumed age of T_e [ms]"),
         yaxis2=make_axis("misfit Q − min Q [–]", rangemode="tozero"),
     )

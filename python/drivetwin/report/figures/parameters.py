@@ -46,17 +46,15 @@ def plot_intervals(estimates: Mapping[str, Estimate]) -> go.Figure:
         marker={"color": MUTED, "symbol": "line-ns-open", "size": 12, "line": {"width": 2.5}},
         hovertemplate="%{y}: ±%{x:.2g} % from noise<extra></extra>",
     )
-    figure.update_layout(
-        make_layout(
-            90 + 26 * len(shown),
-            xaxis=make_axis(
-                "half width of the 95 % interval [% of the value]",
-                type="log",
-                tickvals=_TICKS,
-                ticktext=[f"{tick:g}" for tick in _TICKS],
-            ),
-            yaxis=make_axis("", autorange="reversed"),
-        )
+    figure.layout = make_layout(
+        90 + 26 * len(shown),
+        xaxis=make_axis(
+            "half width of the 95 % interval [% of the value]",
+            type="log",
+            tickvals=_TICKS,
+            ticktext=[f"{tick:g}" for tick in _TICKS],
+        ),
+        yaxis=make_axis("", autorange="reversed"),
     )
     return figure
 
@@ -87,9 +85,7 @@ def plot_correlation(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
             texttemplate="%{z:.2f}",
         )
     )
-    figure.update_layout(
-        make_layout(
-            140 + 34 * len(ids), xaxis=make_axis(""), yaxis=make_axis("", autorange="reversed")
-        )
+    figure.layout = make_layout(
+        140 + 34 * len(ids), xaxis=make_axis(""), yaxis=make_axis("", autorange="reversed")
     )
     return figure

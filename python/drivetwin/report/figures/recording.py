@@ -42,16 +42,17 @@ def plot_log(log: ShiftLog, shifts: Sequence[Shift] = ()) -> go.Figure:
     A shift is too short in a whole log for the numbers of its phases to stand side by side.
     """
     panels = build_log_panels(log)
-    figure = plot_over_time_axis(panels, compute_full_range(panels), 120 + 170 * len(panels))
-    zooms = {"whole": compute_full_range(panels)}
-    for shift in shifts:
-        spans = get_shift_spans(shift)
-        name = f"{shift.start_gear}→{shift.end_gear}"
-        shade_phases(figure, spans)
-        write_above(figure, 0.5 * (spans["torque"][0] + spans["inertia"][1]), name)
-        zooms[f"{name}, {shift.lockup_time:.1f} s"] = compute_shift_view(spans)
-    if shifts:
-        figure.update_layout(updatemenus=[build_zoom_buttons(panels, zooms)], margin={"t": 64})
+    whole = compute_full_range(panels)
+    names = [f"{shift.start_gear}→{shift.end_gear}" for shift in shifts]
+    spans = [get_shift_spans(shift) for shift in shifts]
+    zooms = {"whole": whole}
+    for name, shift, span in zip(names, shifts, spans, strict=True):
+        zooms[f"{name}, {shift.lockup_time:.1f} s"] = compute_shift_view(span)
+    buttons = build_zoom_buttons(panels, zooms) if shifts else None
+    figure = plot_over_time_axis(panels, whole, 120 + 170 * len(panels), buttons)
+    for name, span in zip(names, spans, strict=True):
+        shade_phases(figure, span)
+        write_above(figure, 0.5 * (span["torque"][0] + span["inertia"][1]), name)
     return figure
 
 

@@ -17,7 +17,7 @@ from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
 from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.labels import get_channel_symbol, get_channel_unit, get_parameter_label
-from drivetwin.report.style import DIVERGING, make_axis, make_layout
+from drivetwin.report.style import DIVERGING, make_axis, make_layout, merge_layout
 
 _KINDS = {
     "gain": f"gain + {100 * SIZE:g} %",
@@ -59,10 +59,14 @@ def plot_sensitivity(found: Sensitivity) -> go.Figure:
             col=column,
         )
         figure.update_xaxes(make_axis(title, side="top", tickangle=angle, ticks=""), col=column)
-    figure.update_layout(make_layout(170 + 27 * len(names)))
-    figure.update_yaxes(autorange="reversed", ticks="")
-    figure.update_layout(
-        yaxis=make_axis("", autorange="reversed", ticks=""), margin={"t": 80, "b": 20}
+    merge_layout(
+        figure,
+        **{
+            **make_layout(170 + 27 * len(names)),
+            "margin": {"l": 70, "r": 20, "t": 80, "b": 20},
+            "yaxis": make_axis("", autorange="reversed", ticks=""),
+        },
+        **{f"yaxis{k}": {"autorange": "reversed", "ticks": ""} for k in range(2, len(_KINDS) + 1)},
     )
     return figure
 

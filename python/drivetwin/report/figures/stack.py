@@ -69,33 +69,38 @@ def stack_panels(panels: Sequence[Panel], phases: Phases, height: int) -> go.Fig
     shift, buttons zoom to the phases.
     """
     view = compute_shift_view(phases)
-    figure = plot_over_time_axis(panels, view, height)
-    figure.update_layout(
-        updatemenus=[build_zoom_buttons(panels, _compute_zooms(panels, phases, view))]
-    )
-    figure.update_layout(margin={"t": 64})
+    buttons = build_zoom_buttons(panels, _compute_zooms(panels, phases, view))
+    figure = plot_over_time_axis(panels, view, height, buttons)
     mark_phases(figure, phases)
     return figure
 
 
 def plot_over_time_axis(
-    panels: Sequence[Panel], view: tuple[float, float], height: int
+    panels: Sequence[Panel],
+    view: tuple[float, float],
+    height: int,
+    buttons: Mapping[str, Any] | None = None,
 ) -> go.Figure:
-    """Draw panels from top to bottom over a common time axis [s] that opens on `view`."""
-    figure = go.Figure()
+    """Draw panels from top to bottom over a common time axis [s] that opens on `view`.
+
+    `buttons` are those of `build_zoom_buttons`; None: no buttons.
+    """
     domains = _compute_domains([panel.weight for panel in panels])
+    ranges = compute_y_ranges(panels, view)
+    traces: list[go.Scatter] = []
     options: dict[str, Any] = {}
     for number, (panel, domain) in enumerate(zip(panels, domains, strict=True), start=1):
         suffix = "" if number == 1 else str(number)
-        options[f"yaxis{suffix}"] = _build_y_axis(panel, domain)
+        axis = f"yaxis{suffix}"
+        shown = {"range": ranges[axis]} if axis in ranges else {}
+        options[axis] = {**_build_y_axis(panel, domain), **shown}
         options[f"legend{suffix}"] = {
             "x": 1.01,
             "y": domain[1],
             "yanchor": "top",
             "bgcolor": "rgba(0,0,0,0)",
         }
-        for curve in panel.curves:
-            figure.add_trace(_build_trace(curve, panel, suffix, view))
+        traces += [_build_trace(curve, panel, suffix, view) for curve in panel.curves]
     options["xaxis"] = make_axis(
         "time [s]",
         anchor=f"y{len(panels)}" if len(panels) > 1 else "y",
@@ -106,14 +111,12 @@ def plot_over_time_axis(
         spikedash="dot",
         spikecolor="#8a8f98",
     )
-    figure.update_layout(make_layout(height, **options))
-    figure.update_layout(
-        {f"{name}.range": span for name, span in compute_y_ranges(panels, view).items()},
-        margin={"r": 150},
-        hovermode="x unified",
-        hoversubplots="axis",
-    )
-    return figure
+    options["margin"] = {"l": 70, "r": 150, "t": 64 if buttons else 30, "b": 50}
+    if buttons:
+        options["updatemenus"] = [buttons]
+    # Given at once: an update of the layout takes plotly as long as ten figures.
+    layout = make_layout(height, hovermode="x unified", hoversubplots="axis", **options)
+    return go.Figure(traces, layout)
 
 
 def compute_y_ranges(

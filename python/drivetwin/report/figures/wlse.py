@@ -11,7 +11,15 @@ from plotly.subplots import make_subplots
 
 from drivetwin.estimation.paper.wlse import GridFit
 from drivetwin.estimation.result.estimate import FloatArray
-from drivetwin.report.style import COMPARED, FITTED, MEASURED, MUTED, make_axis, make_layout
+from drivetwin.report.style import (
+    COMPARED,
+    FITTED,
+    MEASURED,
+    MUTED,
+    make_axis,
+    make_layout,
+    merge_layout,
+)
 
 
 @dataclass(frozen=True)
@@ -75,8 +83,9 @@ def plot_wlse(fit: GridFit, labels: WlseLabels) -> go.Figure:
         row=1,
         col=2,
     )
-    figure.update_layout(make_layout(430))
-    figure.update_layout(
+    merge_layout(
+        figure,
+        **make_layout(430),
         xaxis=make_axis(labels.acceleration),
         yaxis=make_axis(labels.torque),
         xaxis2=make_axis(f"{labels.grid} [{labels.unit}]"),

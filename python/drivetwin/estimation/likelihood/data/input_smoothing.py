@@ -14,8 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
-from scipy.signal import savgol_coeffs, savgol_filter
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import MeasuredSignal
@@ -63,7 +62,7 @@ def smooth_pressure(pressure: MeasuredSignal, fill: PriorValue | None = None) ->
         steady = _select_steady(pressure, smooth)
         band = SMOOTHING.fill_sigma * pressure.sigma + 2.0 * fill.std
         smooth = np.where(np.abs(steady - fill.value) < band, steady, smooth)
-    return np.where(maximum_filter1d(apart, _count_samples(pressure.time)), pressure.values, smooth)
+    return np.where(_spread(apart, _count_samples(pressure.time)), pressure.values, smooth)
 
 
 def _select_steady(pressure: MeasuredSignal, smooth: FloatArray) -> FloatArray:
@@ -84,7 +83,7 @@ def _select_steady(pressure: MeasuredSignal, smooth: FloatArray) -> FloatArray:
         size = _count_samples(pressure.time, window)
         if not CUBIC + 1 < size <= values.size:
             continue
-        trial = savgol_filter(values, size, CUBIC)
+        trial = filter_local_cubic(values, size)
         margin = SMOOTHING.cubic_sigma * pressure.sigma * _compute_noise_gain(size)
         low, high = np.maximum(low, trial - margin), np.minimum(high, trial + margin)
         open_ &= low <= high
@@ -96,7 +95,7 @@ def _compute_noise_gain(size: int) -> float:
     """Compute the noise of the middle of a cubic over `size` samples, over that of a sample."""
     if size <= CUBIC + 1:
         return 1.0
-    return float(np.linalg.norm(savgol_coeffs(size, CUBIC)))
+    return float(np.linalg.norm(_compute_cubic_weights(size)[size // 2]))
 
 
 def smooth_local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -107,7 +106,7 @@ def smooth_local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
     size = _count_samples(time)
     if size <= CUBIC + 1 or size > values.size:
         return values
-    return np.asarray(savgol_filter(values, size, CUBIC), dtype=np.float64)
+    return filter_local_cubic(values, size)
 
 
 def compute_bend(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -147,3 +146,30 @@ def smooth_adaptive(signal: MeasuredSignal) -> FloatArray:
         open_ &= low <= high
         mean = np.where(open_, trial, mean)
     return np.asarray(mean)
+
+
+def filter_local_cubic(values: FloatArray, size: int) -> FloatArray:
+    """Return the middle of the cubic over `size` samples, odd, about each of `values` (n,).
+
+    At both ends the first and the last cubic are read off (Savitzky and Golay 1964). Written here,
+    as the import of SciPy's takes longer than a fit.
+    """
+    weights = _compute_cubic_weights(size)
+    half = size // 2
+    smooth = np.empty(values.size)
+    smooth[half : values.size - half] = np.convolve(values, weights[half][::-1], mode="valid")
+    smooth[:half] = weights[:half] @ values[:size]
+    smooth[values.size - half :] = weights[half + 1 :] @ values[-size:]
+    return smooth
+
+
+def _compute_cubic_weights(size: int) -> FloatArray:
+    """Return the weights (size, size) by which samples give a cubic at each of them."""
+    powers = np.vander(np.linspace(-1.0, 1.0, size), CUBIC + 1)
+    orthogonal = np.linalg.qr(powers).Q
+    return np.asarray(orthogonal @ orthogonal.T)
+
+
+def _spread(marked: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
+    """Mark all samples within `size`, odd, about a marked one (n,)."""
+    return np.convolve(marked, np.ones(size), mode="same") > 0.5
