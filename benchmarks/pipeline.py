@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: MIT
+"""CPU time and peak memory of whole commands, beside other programs in the same run.
+
+`python -m benchmarks.pipeline [--large] [--write]`: each command is a process of its own on one
+BLAS thread. `--large` adds the CSV log of one hour and the MDF file of 0.3 GB, `--write` writes
+docs/benchmarks-pipeline.md. The other programs are pandas, and a fit by SciPy's least squares with
+a simulator in C (`peers/run_identify.py` of the shared data, where that is at hand).
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.large_logs import write_large_csv, write_large_mdf
+from benchmarks.whole_drives import DRIVES, write_drive
+
+ROOT = Path(__file__).resolve().parents[1]
+SHARED = ROOT.parent / "shared"
+PAGE = ROOT / "docs" / "benchmarks-pipeline.md"
+REPEATS = 3
+"""Runs of each command; the shortest counts, as other work on the machine only adds."""
+
+_FIT = """
+import sys, time
+from pathlib import Path
+from drivetwin.estimation.result.method import Method
+from drivetwin.logs.read import read_log
+from drivetwin.pipeline import identify
+from drivetwin.shifts.detect import require_shifts
+from drivetwin.vehicle.card import load_card
+card = load_card(Path(sys.argv[2]))
+log = read_log(Path(sys.argv[1]), card)
+shifts = require_shifts(log, card)
+start = time.process_time()
+identify(log, card, shifts, Method.LIKELIHOOD)
+print(time.process_time() - start)
+"""
+_PANDAS = """
+import sys, time
+import pandas
+start = time.process_time()
+pandas.read_csv(sys.argv[1], skiprows=[1])
+print(time.process_time() - start)
+"""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """CPU time [s] and peak memory [GB] of a command, the limit of the time and that of the ratio.
+
+    `peer` is the time [s] of the other program that does the same; None where there is none.
+    """
+
+    name: str
+    seconds: float
+    memory: float
+    limit: float
+    peer: float | None = None
+    ratio_limit: float | None = None
+
+    @property
+    def is_met(self) -> bool:
+        """True where both limits hold."""
+        if self.seconds > self.limit:
+            return False
+        if self.peer is None or self.ratio_limit is None:
+            return True
+        return self.seconds <= self.ratio_limit * self.peer
+
+    def format_row(self) -> str:
+        """Return the row of the table."""
+        peer = "–" if self.peer is None else f"{self.peer:.2f}"
+        ratio = "–" if self.peer is None else f"{self.seconds / self.peer:.1f}"
+        limits = f"{self.limit:g} s" + (f", {self.ratio_limit:g} ×" if self.ratio_limit else "")
+        verdict = "met" if self.is_met else "missed"
+        cells = (self.name, f"{self.seconds:.2f}", f"{self.memory:.2f}", peer, ratio, limits)
+        return f"| {' | '.join((*cells, verdict))} |"
+
+
+_HEAD = """# Time of whole commands
+
+Written by `python -m benchmarks.pipeline --large --write`. CPU seconds of the whole process,
+imports included, unless a row says otherwise; the shortest of {repeats} runs; one BLAS thread; the
+other program in the same run. Memory is the largest of a process.
+
+Measured on: {machine}; Python {python}; load average {load:.1f}.
+
+| command | CPU s | GB | other program s | ratio | limit | |
+|---|---|---|---|---|---|---|
+"""
+
+
+def run_process(command: Sequence[str]) -> tuple[float, float, str]:
+    """Run a command; return its CPU time [s], peak memory [GB] and output.
+
+    Raises CalledProcessError where it fails.
+    """
+    alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT / "python")}
+    with tempfile.TemporaryFile() as output:
+        process = subprocess.Popen(command, stdout=output, env=alone)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            raise subprocess.CalledProcessError(process.returncode, command)
+        output.seek(0)
+        text = output.read().decode()
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1e6, text
+
+
+def measure_command(*arguments: str) -> tuple[float, float]:
+    """Return the least CPU time [s] and memory [GB] of `drivetwin` with these arguments."""
+    command = [sys.executable, "-m", "drivetwin", *arguments]
+    runs = [run_process(command)[:2] for _ in range(REPEATS)]
+    return min(runs)
+
+
+def measure_script(script: str, *arguments: str) -> tuple[float, float]:
+    """Return the least time [s] that a script prints, and its memory [GB]."""
+    runs = [run_process([sys.executable, "-c", script, *arguments]) for _ in range(REPEATS)]
+    return min((float(text.split()[-1]), memory) for _, memory, text in runs)
+
+
+def measure_peer_fit() -> float:
+    """Return the CPU time [s] of the fit of `run_identify.py`."""
+    script = str(SHARED / "peers" / "run_identify.py")
+    texts = [run_process([sys.executable, script])[2] for _ in range(REPEATS)]
+    return min(float(text.split()[1]) for text in texts)
+
+
+def measure_paper_log(folder: Path) -> Iterator[Measurement]:
+    """Measure the commands on `paper_like.csv`."""
+    log = str(SHARED / "logs" / "paper_like.csv")
+    card = str(ROOT / "examples" / "vehicles" / "paper_like.toml")
+    peer = measure_peer_fit()
+    out = str(folder / "out")
+    identify = ("identify", log, "--vehicle", card, "-o", out)
+    yield Measurement("`--help`", *measure_command("--help"), 0.25)
+    yield Measurement("`identify`", *measure_command(*identify), 2.5, peer, 7.0)
+    fit = measure_script(_FIT, log, card)
+    yield Measurement("fit with intervals alone", *fit, 3.0 * peer, peer, 3.0)
+    paper = measure_command(*identify, "--method", "paper")
+    yield Measurement("`identify --method paper`", *paper, 1.3)
+
+
+def measure_drives(folder: Path) -> Iterator[Measurement]:
+    """Measure `shifts` on whole drives and on a truck's log."""
+    for drive in DRIVES:
+        log, card = write_drive(drive, folder)
+        taken = measure_command("shifts", str(log), "--vehicle", str(card))
+        yield Measurement(f"`shifts`, {drive.name}", *taken, drive.limit)
+
+
+def measure_large_files(folder: Path) -> Iterator[Measurement]:
+    """Measure `inspect` on large files."""
+    csv, mf4 = folder / "hour.csv", folder / "large.mf4"
+    write_large_csv(csv)
+    parsed, _ = measure_script(_PANDAS, str(csv))
+    taken = measure_command("inspect", str(csv))
+    yield Measurement("`inspect`, CSV of 1 h × 1 kHz × 7", *taken, 12.0, parsed, 5.0)
+    csv.unlink()
+    write_large_mdf(mf4)
+    yield Measurement("`inspect`, MDF 4 of 0.3 GB", *measure_command("inspect", str(mf4)), 5.0)
+
+
+def main() -> int:
+    """Measure; return 1 where a limit is missed."""
+    parts: list[Callable[[Path], Iterator[Measurement]]] = [measure_drives]
+    if SHARED.is_dir():
+        parts.insert(0, measure_paper_log)
+    if "--large" in sys.argv:
+        parts.append(measure_large_files)
+    rows: list[Measurement] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for part in parts:
+            for one in part(Path(folder)):
+                rows.append(one)
+                print(one.format_row(), flush=True)
+    if "--write" in sys.argv:
+        head = _HEAD.format(
+            repeats=REPEATS,
+            machine=f"{os.cpu_count()} × {platform.machine()}, {platform.system()}",
+            python=platform.python_version(),
+            load=os.getloadavg()[0],
+        )
+        PAGE.write_text(head + "\n".join(one.format_row() for one in rows) + "\n", "utf-8")
+    return 0 if all(one.is_met for one in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
