@@ -21,9 +21,13 @@ class NumberTexts:
 
 
 def parse_numbers(texts: Iterable[str]) -> FloatArray:
-    """Return the numbers (n,) of texts; NaN for texts that are no numbers."""
-    stripped = (text.strip() for text in texts)
-    return np.array([float(one) if is_number(one) else np.nan for one in stripped], np.float64)
+    """Return the numbers (n,) of texts; NaN for texts that are no numbers.
+
+    A comma may be a decimal sign or stand between thousands: such a text is no number.
+    """
+    stripped = [text.strip() for text in texts]
+    known = [is_number(text) and "," not in text for text in stripped]
+    return np.array([float(x) if ok else np.nan for x, ok in zip(stripped, known, strict=True)])
 
 
 def select_numbers(texts: Sequence[str], codes: FloatArray) -> NumberTexts | None:
