@@ -19,6 +19,8 @@ pub struct ConstraintSolver<'a, T> {
     pub rows: Matrix<T>,
     /// Number of rows at rest; the others are prescribed.
     pub resting: usize,
+    /// Rows at rest that no torque overcomes (one-way clutches).
+    pub firm: Vec<usize>,
 }
 
 /// Accelerations, speeds × columns, and torques, rows × columns, for each column of f and g.
@@ -31,7 +33,7 @@ pub struct ConstraintForces<T> {
 
 impl<T: Number> ConstraintSolver<'_, T> {
     /// Solve for the accelerations and the holding torques. Prescribed rows take precedence over rows that
-    /// contradict them. Torques of redundant rows minimise `Σ (τ_j / weight_j)²`. `None` if the
+    /// contradict them, then firm ones. Torques of redundant rows minimise `Σ (τ_j / weight_j)²`. `None` if the
     /// efficiencies leave the accelerations undetermined.
     pub fn solve(
         &self,
@@ -70,9 +72,13 @@ impl<T: Number> ConstraintSolver<'_, T> {
         self.shared(&balance, &vec![T::of(1.0); self.rows.rows])
     }
 
-    /// Rows that are independent of each other, prescribed ones first.
+    /// Rows that are independent of each other: prescribed ones first, then firm ones, as others give way
+    /// to these.
     fn independent(&self) -> Vec<usize> {
-        let order: Vec<usize> = (self.resting..self.rows.rows).chain(0..self.resting).collect();
+        let yielding = (0..self.resting).filter(|row| !self.firm.contains(row));
+        let firm = self.firm.iter().copied();
+        let order: Vec<usize> =
+            (self.resting..self.rows.rows).chain(firm).chain(yielding).collect();
         let found = independent_rows(&self.rows.select_rows(&order));
         found.into_iter().map(|i| order[i]).collect()
     }
@@ -115,7 +121,7 @@ impl<T: Number> ConstraintSolver<'_, T> {
     }
 
     /// B of some rows.
-    fn acting(&self, rows: &[usize]) -> Matrix<T> {
+    pub fn acting(&self, rows: &[usize]) -> Matrix<T> {
         match &self.acting {
             Some(acting) => acting.select_columns(rows),
             None => self.rows.select_rows(rows).transposed(),

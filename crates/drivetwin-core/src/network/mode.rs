@@ -5,7 +5,7 @@
 use super::compile::Network;
 use super::constraint_forces::{ConstraintForces, ConstraintSolver};
 use super::constraints::{constraint_matrix, force_map};
-use super::linalg::{Matrix, SparseRows, is_nothing, is_zero, solve};
+use super::linalg::{Matrix, SparseRows, is_nothing, is_zero, least_norm, solve};
 use super::spectral_radius::spectral_radius_bound;
 use crate::model::mechanism::{self, Loss, LossLaw};
 use crate::number::{Number, Values};
@@ -162,6 +162,11 @@ impl<T: Number> Network<T> {
         }
     }
 
+    /// Return true for a one-way clutch.
+    pub fn is_one_way(&self, row: RowId) -> bool {
+        matches!(row, RowId::Friction(j) if self.frictions[j].one_way)
+    }
+
     /// Name of a row's element.
     pub fn element_of(&self, row: RowId) -> &str {
         match row {
@@ -179,8 +184,7 @@ impl<T: Number> Network<T> {
             let (acceleration, torque) = (motion.free.clone(), Matrix::zeros(0, self.basis()));
             ConstraintForces { acceleration, torque, redundant: false }
         } else {
-            let (speeds, nodes) = self.held_speeds(&stuck);
-            let hold = self.hold(&motion, speeds, &nodes, stuck.len());
+            let hold = self.hold(&motion, &stuck);
             let rates = self.rates(stuck.len());
             hold.solve(&motion.forces, rates.as_ref(), || self.weights(&stuck, capacity))?
         };
@@ -197,16 +201,29 @@ impl<T: Number> Network<T> {
         })
     }
 
-    /// The rows and nodes of [`Network::held_speeds`] in a motion, so many of them at rest.
-    fn hold<'m>(
+    /// Rows at rest and prescribed speeds in a motion.
+    pub(super) fn hold<'m>(
         &self,
         motion: &'m Motion<T>,
-        rows: Matrix<T>,
-        nodes: &[mechanism::Row<T>],
-        resting: usize,
+        rows: &[RowId],
     ) -> ConstraintSolver<'m, T> {
-        let acting = (!self.losses.is_empty()).then(|| motion.force_map.times_columns(nodes));
-        ConstraintSolver { inertia: &motion.mass, acting, rows, resting }
+        let (speeds, nodes) = self.held_speeds(rows);
+        let acting = (!self.losses.is_empty()).then(|| motion.force_map.times_columns(&nodes));
+        let firm = (0..rows.len()).filter(|&i| self.is_one_way(rows[i])).collect();
+        ConstraintSolver { inertia: &motion.mass, acting, rows: speeds, resting: rows.len(), firm }
+    }
+
+    /// Rows at rest and prescribed speeds of the mass matrix alone, whatever gears lose.
+    pub fn hold_by_mass(&self, rows: &[RowId]) -> ConstraintSolver<'_, T> {
+        let (speeds, _) = self.held_speeds(rows);
+        let firm = (0..rows.len()).filter(|&i| self.is_one_way(rows[i])).collect();
+        ConstraintSolver {
+            inertia: &self.mass,
+            acting: None,
+            rows: speeds,
+            resting: rows.len(),
+            firm,
+        }
     }
 
     /// Accelerations of held speeds over the basis, where some behind those at rest are prescribed.
@@ -223,7 +240,7 @@ impl<T: Number> Network<T> {
 
     /// The motion that the modes of a key share; compiled with the network where it has no gear whose
     /// loss depends on its state.
-    fn motion_of(&self, key: ModeKey) -> Option<Cow<'_, Motion<T>>> {
+    pub(super) fn motion_of(&self, key: ModeKey) -> Option<Cow<'_, Motion<T>>> {
         match &self.motion {
             Some(motion) => Some(Cow::Borrowed(motion)),
             None => self.motion(key).map(Cow::Owned),
@@ -270,7 +287,7 @@ impl<T: Number> Network<T> {
     }
 
     /// Speeds kept at zero or prescribed, over the independent speeds and over the nodes.
-    fn held_speeds(&self, stuck: &[RowId]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
+    pub(super) fn held_speeds(&self, stuck: &[RowId]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
         let count = stuck.len() + self.prescribed.len();
         let mut speeds = Matrix::zeros(count, self.speeds());
         let mut nodes = Vec::with_capacity(count);
@@ -310,34 +327,15 @@ impl<T: Number> Network<T> {
     }
 
     /// Torque that enters each lossy gear at its driving side, computed from the residual of the node
-    /// balance.
-    fn entering(&self, key: ModeKey, residual: &Matrix<T>) -> Matrix<T> {
+    /// balance, which has a solution.
+    pub(super) fn entering(&self, key: ModeKey, residual: &Matrix<T>) -> Matrix<T> {
         let dependent = &self.coordinates.dependent;
         let balance = self.force_rows(key).select_columns(dependent).transposed();
-        let multipliers = solve(balance, residual.select_rows(dependent));
-        let multipliers = multipliers.expect("the forces determine the accelerations");
+        let residual = residual.select_rows(dependent);
+        let multipliers = solve(balance.clone(), residual.clone())
+            .unwrap_or_else(|_| least_norm(&balance, &residual));
         let lossy: Vec<usize> = self.losses.iter().map(|loss| loss.constraint).collect();
         multipliers.select_rows(&lossy)
-    }
-
-    /// Response to the impulses that reduce the speeds of rows by `excess` (rows and prescribed speeds × 1,
-    /// rad/s): change of the independent speeds, speeds × 1, and impulse that enters each lossy gear,
-    /// losses × 1. Impulses act through the gears as torques do: `KᵀIN Δv = -Kᵀ g λ`. `None` as of
-    /// [`Network::mode`].
-    pub fn impulse(
-        &self,
-        key: ModeKey,
-        rows: &[RowId],
-        excess: &Matrix<T>,
-    ) -> Option<(Matrix<T>, Matrix<T>)> {
-        let motion = self.motion_of(key)?;
-        let (speeds, nodes) = self.held_speeds(rows);
-        let hold = self.hold(&motion, speeds, &nodes, rows.len());
-        let change = hold.stop(excess)?;
-        let mut residual = Matrix::zeros(self.inertia.rows, 1);
-        residual.subtract(&self.inertia.times(&self.coordinates.speeds).times(&change));
-        subtract_held(&mut residual, &nodes, &hold.impulses(&change));
-        Some((change, self.entering(key, &residual)))
     }
 
     fn with_other_states(&self, acceleration: &Matrix<T>) -> Matrix<T> {
@@ -386,7 +384,7 @@ impl<T: Number> Mode<T> {
 }
 
 /// Take off node torques what held speeds exert: their nodes and their torques, one row each.
-fn subtract_held<T: Number>(
+pub(super) fn subtract_held<T: Number>(
     node_torques: &mut Matrix<T>,
     nodes: &[mechanism::Row<T>],
     torques: &Matrix<T>,

@@ -5,9 +5,9 @@ use crate::model::mechanism::{Account, ForceLaw, SpringLaw, Stop};
 use crate::network::nonlinear_torque::form;
 use crate::network::{GearState, Network};
 use crate::number::Real;
-use crate::solver::{Integrator, Step};
+use crate::solver::{HybridState, Integrator, Step};
 
-/// Work over a run, J: `source = stored + friction + gear_loss + shaft + load + converter + error`.
+/// Work over a run, J: `source = stored + friction + gear_loss + shaft + load + converter + impulse + error`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyAudit {
     /// Work of the sources.
@@ -24,6 +24,8 @@ pub struct EnergyAudit {
     pub load: f64,
     /// Heat of torque converters.
     pub converter: f64,
+    /// Energy lost in the impulse of the start.
+    pub impulse: f64,
     /// Energy that gears created, as a positive number; part of `gear_loss`.
     pub created: f64,
     /// Residual of the balance.
@@ -121,11 +123,14 @@ impl EnergyBalance {
         }
     }
 
-    /// Close the balance at state `x`.
-    pub fn close<T: Real>(mut self, network: &Network<T>, x: &[T]) -> EnergyAudit {
+    /// Close the balance at the state reached.
+    pub fn close<T: Real>(mut self, state: &HybridState<'_, T>) -> EnergyAudit {
         let a = &mut self.audit;
-        a.stored = stored_energy(network, x) - self.start;
-        a.error = a.source - a.stored - a.friction - a.gear_loss - a.shaft - a.load - a.converter;
+        a.source += state.starting_impulse.source.re();
+        a.impulse = state.starting_impulse.lost.re();
+        a.stored = stored_energy(state.network, &state.x) - self.start;
+        let taken = a.stored + a.friction + a.gear_loss + a.shaft + a.load + a.converter + a.impulse;
+        a.error = a.source - taken;
         self.audit
     }
 }

@@ -4,6 +4,7 @@
 use super::energy_balance::EnergyBalance;
 use super::start::{Start, StartError, State};
 use super::trajectory::{Output, Recorder, Target, Trajectory};
+use crate::model::Name;
 use crate::network::{CompileError, Mode, ModeKey, Network};
 use crate::number::Real;
 use crate::solver::{
@@ -121,10 +122,10 @@ impl<T: Real> Plan<T> {
             let mut run =
                 self.integrator(std::mem::replace(known, SolverCache::new(network)), start)?;
             let outcome = if self.audit {
-                let mut auditor = EnergyBalance::new(network, &run.state.x);
+                let mut auditor = EnergyBalance::new(network, &start.x);
                 let outcome =
                     recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
-                balance = Some(auditor.close(network, &run.state.x));
+                balance = Some(auditor.close(&run.state));
                 outcome
             } else {
                 recorder.run_to_end(&mut run)
@@ -135,9 +136,10 @@ impl<T: Real> Plan<T> {
             outcome
         };
         let status = integrate().err().unwrap_or(Status::Completed);
-        let frictions = network.frictions.iter().map(|row| row.element.to_string());
-        let elements =
-            frictions.chain(network.losses.iter().map(|gear| gear.element.to_string())).collect();
+        let frictions = network.frictions.iter().map(|row| &row.element);
+        let gears = network.losses.iter().map(|gear| &gear.element);
+        let prescribed = network.mechanism.prescribed.iter().map(|prescribed| &prescribed.element);
+        let elements = frictions.chain(gears).chain(prescribed).map(Name::to_string).collect();
         let (time, (columns, derivatives)) = (self.grid.clone(), recorder.finish());
         let audit = balance;
         Trajectory { time, columns, derivatives, elements, events, status, grazing, audit }

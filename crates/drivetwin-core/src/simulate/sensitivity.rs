@@ -137,7 +137,10 @@ fn pass<const P: usize>(
 fn split_derivatives<const P: usize>(
     run: DualClutchRun<Dual<P>>,
 ) -> (DualClutchRun<f64>, Vec<Vec<f64>>) {
-    let event = |e: &Event<Dual<P>>| Event { time: e.time.re, element: e.element, kind: e.kind };
+    let event = |e: &Event<Dual<P>>| {
+        let Event { time, element, kind, energy } = *e;
+        Event { time: time.re, element, kind, energy: energy.re }
+    };
     let values = Trajectory {
         time: run.time,
         columns: run.columns,

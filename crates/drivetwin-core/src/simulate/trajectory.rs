@@ -108,7 +108,7 @@ pub struct Trajectory<T: Real> {
     pub columns: Vec<Vec<f64>>,
     /// Derivatives of every column by the parameters, where numbers carry any.
     pub derivatives: Vec<Vec<T::Slopes>>,
-    /// Names of the friction elements that events refer to.
+    /// Names of the elements that events refer to.
     pub elements: Vec<String>,
     /// Events of friction elements.
     pub events: Vec<Event<T>>,

@@ -30,6 +30,27 @@ pub enum Status {
         /// Name of the element.
         element: String,
     },
+    /// A one-way clutch blocks a motion that cannot be stopped.
+    Blocked {
+        /// Time, s.
+        time: f64,
+        /// Name of the one-way clutch.
+        element: String,
+        /// Prescribed speeds and other elements that demand the motion.
+        with: Vec<String>,
+    },
+    /// Inertias of too different size leave the motion undetermined.
+    Undetermined {
+        /// Time, s.
+        time: f64,
+        /// Members.
+        members: Vec<String>,
+    },
+    /// The caller asked for the end.
+    Interrupted {
+        /// Time, s.
+        time: f64,
+    },
     /// The step became too small for the arithmetic.
     StepTooSmall {
         /// Time, s.
@@ -55,6 +76,19 @@ impl fmt::Display for Status {
             Self::SelfLocking { time, element } => {
                 write!(f, "{element} is self-locking at {time:.9} s")
             }
+            Self::Blocked { time, element, with } => write!(
+                f,
+                "{element} blocks at {time:.9} s the motion that {} prescribe; reverse {element} \
+                 or change that speed",
+                with.join(", ")
+            ),
+            Self::Undetermined { time, members } => write!(
+                f,
+                "the inertias leave the motion of {} undetermined at {time:.9} s; they differ \
+                 by too many decades",
+                members.join(", ")
+            ),
+            Self::Interrupted { time } => write!(f, "interrupted at {time:.9} s"),
             Self::StepTooSmall { time } => write!(f, "step too small at {time:.9} s"),
             Self::NotFinite { time } => write!(f, "state not finite at {time:.9} s"),
         }

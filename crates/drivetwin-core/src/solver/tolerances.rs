@@ -24,6 +24,9 @@ pub(crate) const ACCELERATION_ATOL: f64 = 1e-9;
 /// Acceleration of an element at rest that is round-off, relative to 1 rad/s² plus the largest
 /// prescribed acceleration.
 pub(crate) const FORCED_ACCELERATION_RTOL: f64 = 1e-9;
+/// Slip of an element at rest by which a prescribed speed has moved it, relative to the largest of its
+/// terms and 1 rad/s.
+pub(crate) const FORCED_SLIP_RTOL: f64 = 1e-10;
 /// Distance of the one-sided limit t⁺ from an event, s. Rates decide there where values agree.
 pub(crate) const T_PLUS: f64 = 1e-10;
 /// Largest distance of t⁺, relative to the rest of the input segment.

@@ -72,6 +72,8 @@ pub enum EventKind {
     ClutchFilled,
     /// The pressure fell below the fill pressure.
     ClutchVented,
+    /// The impulse at the start of the run lost energy in the element.
+    Impulse,
 }
 
 /// A change of friction mode.
@@ -79,16 +81,23 @@ pub enum EventKind {
 pub struct Event<T> {
     /// Time, s; carries derivatives.
     pub time: T,
-    /// Index of the friction element, or after these of the lossy gear.
+    /// Index of the friction element, after these of the lossy gear, after these of the prescribed speed.
     pub element: usize,
     /// Kind of the change.
     pub kind: EventKind,
+    /// Energy lost in an impulse, J; zero for other kinds.
+    pub energy: T,
 }
 
 impl<const K: usize> Event<SimdVector<K>> {
     /// Return the event of one lane.
     pub(crate) fn extract_run(&self, run: usize) -> Event<f64> {
-        Event { time: self.time.0[run], element: self.element, kind: self.kind }
+        Event {
+            time: self.time.0[run],
+            element: self.element,
+            kind: self.kind,
+            energy: self.energy.0[run],
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::solver::hybrid::zero_crossing::first_zero_crossing;
 use crate::solver::lane_mask::lanes_in;
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::tolerances::{
-    ACCELERATION_ATOL, BOUND_RTOL, GRAZING_RTOL, RELEASE_RATE_RTOL, SUM_RTOL, TORQUE_ATOL,
+    ACCELERATION_ATOL, BOUND_RTOL, FORCED_SLIP_RTOL, GRAZING_RTOL, RELEASE_RATE_RTOL, SUM_RTOL, TORQUE_ATOL,
     sum_and_scale,
 };
 
@@ -109,6 +109,7 @@ fn friction_guards<T: Number>(
             consider(departing(slip, sign, state.released[j]), cause);
         }
         FrictionState::Sticking => {
+            forced_guards(state, RowId::Friction(j), consider);
             let torque = holding_torque(state, RowId::Friction(j));
             let capacity = row.law.at(T::zero_()) * row.peak;
             let mut cap = scaled(&normal, if pressed { capacity } else { T::zero_() });
@@ -152,6 +153,7 @@ fn gear_guards<T: Number>(
             consider(departing(&speed, sign, released), EventCause::SlipZero(RowId::Gear(i)));
         }
         GearState::Locked => {
+            forced_guards(state, RowId::Gear(i), consider);
             let loss = holding_torque(state, RowId::Gear(i));
             let bounds = gear.loss.bounds();
             let line = |(slope, drag): (T, T)| {
@@ -166,6 +168,26 @@ fn gear_guards<T: Number>(
             consider(combined(&upper, &loss, -1.0), EventCause::TorqueLimit(RowId::Gear(i), 1.0));
             consider(combined(&loss, &lower, -1.0), EventCause::TorqueLimit(RowId::Gear(i), -1.0));
         }
+    }
+}
+
+/// Prescribed speeds can force a row at rest to move; nothing else can.
+fn forced_guards<T: Number>(
+    state: &HybridState<'_, T>,
+    row: RowId,
+    consider: &mut impl FnMut(Series<T>, EventCause),
+) {
+    if state.network.prescribed.is_empty() {
+        return;
+    }
+    let speeds = state.network.slip_of(row);
+    let slip = state.expansion.speed_form(speeds);
+    let terms = speeds.iter().zip(&state.x).map(|(c, v)| (c.re() * v.re()).magnitude());
+    let scale = terms.fold(T::Values::of(1.0), |largest, term| term.larger(largest));
+    for sign in [1.0, -1.0] {
+        let mut room = scaled(&slip, T::of(-sign));
+        room[0] += T::promote(scale * FORCED_SLIP_RTOL);
+        consider(room, EventCause::TorqueLimit(row, sign));
     }
 }
 

@@ -4,6 +4,7 @@
 pub(crate) mod active_set;
 pub(crate) mod event;
 pub(crate) mod event_search;
+mod impulse;
 pub(crate) mod mode_cache;
 pub(crate) mod stall;
 pub(crate) mod state;

@@ -5,6 +5,7 @@ use crate::network::nonlinear_torque::ChannelSeries;
 use crate::network::{Branch, GearState, Mode, ModeKey, Network, RowId};
 use crate::number::{Number, Series, TERMS, Values, evaluate};
 use crate::solver::hybrid::event::{Event, EventCause, FrictionState};
+use crate::solver::hybrid::impulse::ImpulseEnergy;
 use crate::solver::hybrid::mode_cache::ModeCache;
 use crate::solver::hybrid::taylor::TaylorExpansion;
 use crate::solver::settings::Accuracy;
@@ -28,6 +29,8 @@ pub struct HybridState<'a, T> {
     pub expansion: TaylorExpansion<T>,
     /// Events so far.
     pub events: Vec<Event<T>>,
+    /// Energy account of the starting impulse.
+    pub starting_impulse: ImpulseEnergy<T>,
     /// Compiled modes, including those of this run.
     pub(crate) modes: ModeCache<T>,
     pub(crate) t: T,
@@ -64,6 +67,7 @@ impl<'a, T: Number> HybridState<'a, T> {
             rows: vec![FrictionState::Open; frictions],
             expansion: TaylorExpansion::new(network),
             events: Vec::new(),
+            starting_impulse: ImpulseEnergy { lost: T::zero_(), source: T::zero_() },
             t,
             remaining: T::zero_(),
             branches: vec![Branch::Off; network.channels.len()],

@@ -40,7 +40,10 @@ impl<T: Number> HybridState<'_, T> {
         let mut trial = self.assignment();
         match overloaded {
             // After an overload, rows that have just moved off or are at their capacity keep that state.
-            Some((row, sign)) => self.release(&mut trial, row, sign, &candidates),
+            Some((row, sign)) => {
+                self.refuse_blocked(row, sign, &candidates)?;
+                self.release(&mut trial, row, sign, &candidates);
+            }
             None => candidates.iter().for_each(|&row| trial.rest(row)),
         }
         let mut visited: Vec<ActiveSet> = Vec::new();
@@ -72,6 +75,7 @@ impl<T: Number> HybridState<'_, T> {
             visited.push(trial.clone());
             match fault {
                 Violation::TorqueBound(row, sign) => {
+                    self.refuse_blocked(row, sign, &candidates)?;
                     self.release(&mut trial, row, sign, &candidates);
                 }
                 Violation::SlipDirection(row) => {
@@ -188,7 +192,7 @@ impl<T: Number> HybridState<'_, T> {
         let mut digits = number >> gears;
         for &row in candidates {
             match digits % 3 {
-                1 if self.blocks_forward(row) => return None,
+                1 if self.network.is_one_way(row) => return None,
                 0 => trial.rest(row),
                 1 => trial.move_off(row, 1.0),
                 _ => trial.move_off(row, -1.0),
@@ -218,8 +222,17 @@ impl<T: Number> HybridState<'_, T> {
         }
     }
 
-    fn blocks_forward(&self, row: RowId) -> bool {
-        matches!(row, RowId::Friction(j) if self.network.frictions[j].one_way)
+    /// Refuse to release a one-way clutch in its blocked direction, which only prescribed speeds can demand.
+    fn refuse_blocked(&self, row: RowId, sign: f64, candidates: &[RowId]) -> Result<(), Status> {
+        if sign < 0.0 || !self.network.is_one_way(row) {
+            return Ok(());
+        }
+        let others = candidates.iter().copied();
+        let firm: Vec<RowId> =
+            others.filter(|&other| other != row && self.network.is_one_way(other)).collect();
+        let with = self.network.holders_of(row, &firm);
+        let element = self.network.element_of(row).to_owned();
+        Err(Status::Blocked { time: self.time(), element, with })
     }
 
     fn assignment(&self) -> ActiveSet {

@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: MIT
 //! Changes of mode at events and at jumps of the inputs.
 
-use crate::network::linalg::Matrix;
 use crate::network::nonlinear_torque::form;
-use crate::network::{ConstraintSolver, GearState, ModeKey, RowId};
+use crate::network::{GearState, RowId};
 use crate::number::{Number, Values};
 use crate::solver::hybrid::active_set::ActiveSet;
 use crate::solver::hybrid::event::{Event, EventCause, EventKind, FrictionState, signum_nonneg};
-use crate::solver::hybrid::state::{HybridState, self_locking};
+use crate::solver::hybrid::state::HybridState;
 use crate::solver::status::Status;
-use crate::solver::tolerances::{STALLED_SLIP, START_SPEED_RTOL, VENT_TIME};
+use crate::solver::tolerances::{STALLED_SLIP, VENT_TIME};
 
 impl<T: Number> HybridState<'_, T> {
     /// Carry out what an event caused; the inputs are those about this instant.
     pub(crate) fn change(&mut self, cause: EventCause) -> Result<(), Status> {
         match cause {
             EventCause::SlipZero(row) => {
-                self.apply_locking_impulse(&[row]);
+                self.apply_locking_impulse(&[row])?;
                 self.decide(None)
             }
             EventCause::LoadOnset(j) => {
@@ -31,11 +30,11 @@ impl<T: Number> HybridState<'_, T> {
                 self.decide(None)
             }
             EventCause::TorqueLimit(row, sign) => {
-                self.apply_locking_impulse(&[]);
+                self.apply_locking_impulse(&[])?;
                 self.decide(Some((row, sign)))
             }
             EventCause::TorqueLimitAtKnot(_) => {
-                self.apply_locking_impulse(&[]);
+                self.apply_locking_impulse(&[])?;
                 self.decide(None)
             }
             EventCause::PowerReversal(i) => {
@@ -45,7 +44,7 @@ impl<T: Number> HybridState<'_, T> {
                 self.decide(None)
             }
             EventCause::Stalled => {
-                self.apply_locking_impulse(&self.nearly_at_rest());
+                self.apply_locking_impulse(&self.nearly_at_rest())?;
                 self.decide(None)
             }
             EventCause::BranchBoundary(channel, branch) => {
@@ -92,16 +91,13 @@ impl<T: Number> HybridState<'_, T> {
     /// Start of a run: prescribed speeds, elements at rest, directions of gears, branches.
     pub(crate) fn engage_initial(&mut self, locked: &[usize]) -> Result<(), Status> {
         let locked: Vec<RowId> = locked.iter().map(|&j| RowId::Friction(j)).collect();
-        if !self.network.losses.is_empty() {
-            self.lock_through_gears(&locked)?;
-        }
-        self.apply_locking_impulse(&locked);
+        let events = self.apply_starting_impulse(&locked)?;
         self.turn_gears();
         for i in self.rows.len()..self.network.channels.len() {
             self.branches[i] = self.cell_now(i);
         }
         self.refresh()?;
-        self.events.clear();
+        self.events = events;
         Ok(())
     }
 
@@ -149,92 +145,10 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Directions of lossy gears by their speeds, power taken to flow forward.
-    fn turn_gears(&mut self) {
+    pub(super) fn turn_gears(&mut self) {
         for (gear, loss) in self.gears.iter_mut().zip(&self.network.losses) {
             let sign = signum_nonneg(form(&loss.speed, &self.x).re());
             *gear = GearState::Meshing { sign, power_reversed: false };
-        }
-    }
-
-    /// Set prescribed speeds and bring rows to rest by impulses that pass the lossy gears as torques do, each in
-    /// the direction of its own; where no directions agree with their impulses, nothing is done.
-    fn lock_through_gears(&mut self, rows: &[RowId]) -> Result<(), Status> {
-        let network = self.network;
-        let excess = self.excess(rows);
-        let speed = |largest: T::Values, v: &T| v.re().magnitude().larger(largest);
-        let fastest = self.x[..network.speeds()].iter().fold(T::Values::zero_(), speed);
-        let is_round_off = excess
-            .max_abs()
-            .decide_with(fastest, |excess, fastest| excess <= START_SPEED_RTOL * fastest);
-        if is_round_off && !T::DERIVATIVES {
-            return Ok(());
-        }
-        self.turn_gears();
-        for _ in 0..=2 * self.gears.len() {
-            let key = ModeKey::new(std::iter::empty(), &self.gears);
-            let found = network.impulse(key, rows, &excess);
-            let (change, entering) = found.ok_or_else(|| self_locking(network, self.time()))?;
-            let before = self.gears.clone();
-            for (i, gear) in self.gears.iter_mut().enumerate() {
-                if let GearState::Meshing { sign, power_reversed } = gear
-                    && network.losses[i].loss.is_directional()
-                    && !is_round_off
-                {
-                    *power_reversed = entering[(i, 0)].re().decide(|impulse| impulse * *sign < 0.0);
-                }
-            }
-            if self.gears == before {
-                for i in 0..network.speeds() {
-                    self.x[i] += change[(i, 0)];
-                }
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Speeds of rows that are to rest, then what prescribed speeds are off theirs, rows × 1, rad/s.
-    fn excess(&self, rows: &[RowId]) -> Matrix<T> {
-        let network = self.network;
-        let mut excess = Matrix::zeros(rows.len() + network.prescribed.len(), 1);
-        for (i, &row) in rows.iter().enumerate() {
-            excess[(i, 0)] = form(network.slip_of(row), &self.x);
-        }
-        for (i, (speed, input)) in (rows.len()..).zip(&network.prescribed) {
-            excess[(i, 0)] = form(speed, &self.x) - self.expansion.inputs[*input][0];
-        }
-        excess
-    }
-
-    /// Set prescribed speeds and remove the round-off speed of everything at rest and of `more`,
-    /// changing the momentum least.
-    pub(crate) fn apply_locking_impulse(&mut self, more: &[RowId]) {
-        let network = self.network;
-        let resting = |j: usize| {
-            matches!(self.rows[j], FrictionState::Sticking | FrictionState::Saturated { .. })
-        };
-        let frictions = (0..self.rows.len()).filter(|&j| resting(j)).map(RowId::Friction);
-        let held = |i: &usize| self.gears[*i] == GearState::Locked;
-        let gears = (0..self.gears.len()).filter(held).map(RowId::Gear);
-        let mut rows: Vec<RowId> = frictions.chain(gears).collect();
-        rows.extend(more.iter().filter(|row| !rows.contains(row)).copied().collect::<Vec<_>>());
-        let count = rows.len() + network.prescribed.len();
-        if count == 0 {
-            return;
-        }
-        let mut g = Matrix::zeros(count, network.speeds());
-        for (i, &row) in rows.iter().enumerate() {
-            g.row_mut(i).copy_from_slice(network.slip_of(row));
-        }
-        for (i, (speed, _)) in (rows.len()..).zip(&network.prescribed) {
-            g.row_mut(i).copy_from_slice(speed);
-        }
-        let excess = self.excess(&rows);
-        let hold =
-            ConstraintSolver { inertia: &network.mass, acting: None, rows: g, resting: rows.len() };
-        let change = hold.stop(&excess).expect("the mass is regular");
-        for i in 0..network.speeds() {
-            self.x[i] += change[(i, 0)];
         }
     }
 
@@ -298,6 +212,8 @@ impl<T: Number> HybridState<'_, T> {
             events.push((self.rows.len() + i, kind));
         }
         let time = self.t;
-        self.events.extend(events.into_iter().map(|(element, kind)| Event { time, element, kind }));
+        let energy = T::zero_();
+        let event = |(element, kind)| Event { time, element, kind, energy };
+        self.events.extend(events.into_iter().map(event));
     }
 }
