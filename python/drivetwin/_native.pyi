@@ -24,9 +24,9 @@ _Array = NDArray[np.float64]
 _Options = tuple[float, float, int | None, bool, bool]
 _Run = tuple[
     _Array,
-    list[tuple[float, str, str]],
+    list[tuple[float, str, str, float]],
     str,
-    tuple[float, float, float, float, float, float, float, float, float] | None,
+    list[float] | None,
 ]
 
 _Ratios = tuple[str, float, float, float]
@@ -49,7 +49,7 @@ def sensitivities(
     start: tuple[float, float, float, float, Sequence[str]],
     grid: _Array,
     options: tuple[float, Sequence[str]],
-) -> tuple[_Array, list[tuple[float, str, str]], str, list[list[_Array]], _Array]: ...
+) -> tuple[_Array, list[tuple[float, str, str, float]], str, list[list[_Array]], _Array]: ...
 def linearise(
     driveline: str,
     locked: Sequence[str],

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Many runs of the dual-clutch driveline; see `drivetwin.simulation.batch`.
 
+use crate::border::call;
 use crate::dual_clutch::{Delayed, Start, model_of, start_of};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{
@@ -65,9 +66,10 @@ pub fn simulate_batch<'py>(
     let measured = rows_of(&wanted.0);
     let keep = keep_of(&wanted.1, &measured)?;
     let values = values.as_slice_mut()?;
-    let batch = py
-        .detach(|| dual_clutch_batch(&model, &plans, &names, sets, keep, threads, values))
-        .map_err(|e| refused(&e))?;
+    let batch = call(py, || {
+        dual_clutch_batch(&model, &plans, &names, sets, keep, threads, values)
+    })?;
+    let batch = batch.map_err(|e| refused(&e))?;
     Ok(ends(py, batch))
 }
 
@@ -94,11 +96,10 @@ pub fn batch_sensitivities<'py>(
     let keep = keep_of(&wanted.1, &measured)?;
     let sets = ParameterSets { names: &names, values: sets };
     let recording = Recording { grid, outputs: &outputs, keep };
-    let (batch, derivatives) = py
-        .detach(|| {
-            dual_clutch_batch_sensitivities(&model, &scenarios, sets, recording, &by, threads)
-        })
-        .map_err(|e| refused(&e))?;
+    let done = call(py, || {
+        dual_clutch_batch_sensitivities(&model, &scenarios, sets, recording, &by, threads)
+    })?;
+    let (batch, derivatives) = done.map_err(|e| refused(&e))?;
     let grazing = derivatives.grazing.iter();
     let grazing = grazing
         .map(|(i, time, element)| (*i, format!("{element} grazes its event at {time:.9} s")));

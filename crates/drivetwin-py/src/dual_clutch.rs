@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! Simulation of the dual-clutch driveline; see `drivetwin.simulation.dual_clutch`.
 
-use crate::plain::{Audit, Event, as_tuple, events_of};
+use crate::border::call;
+use crate::plain::{Audit, Event, as_array, events_of};
 use drivetwin_core::model::DualClutch;
 use drivetwin_core::simulate::{
     DualClutchStart, RunOptions, Sampled, Trajectory, dual_clutch_sensitivities, run_dual_clutch,
@@ -42,12 +43,12 @@ pub fn simulate<'py>(
     let start = start_of(start);
     let (tolerance, max_step, order, sprint, audit) = options;
     let settings = Settings { tolerance, max_step, order, exponential_steps: sprint };
-    let run = py
-        .detach(|| run_dual_clutch(&model, &signals, &start, grid, RunOptions { settings, audit }))
+    let options = RunOptions { settings, audit };
+    let run = call(py, || run_dual_clutch(&model, &signals, &start, grid, options))?
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let columns = PyArray2::from_vec2(py, &run.columns)?;
     let events = events_of(&run);
-    Ok((columns, events, run.status.to_string(), run.audit.map(as_tuple)))
+    Ok((columns, events, run.status.to_string(), run.audit.map(as_array)))
 }
 
 /// Columns (n_columns, n_time), events, status, derivatives of every column, pass by pass (n_time,
@@ -85,9 +86,10 @@ pub fn sensitivities<'py>(
     let (tolerance, parameters) = options;
     let names: Vec<&str> = parameters.iter().map(String::as_str).collect();
     let settings = Settings { tolerance, ..Settings::default() };
-    let found = py
-        .detach(|| dual_clutch_sensitivities(&model, &signals, &start, grid, settings, &names))
-        .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let found = call(py, || {
+        dual_clutch_sensitivities(&model, &signals, &start, grid, settings, &names)
+    })?
+    .map_err(|e| PyValueError::new_err(e.to_string()))?;
     // Handed over as they are, the memory of the core.
     let handed = |slopes: Vec<f64>| {
         let parameters = slopes.len() / grid.len();

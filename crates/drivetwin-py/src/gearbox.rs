@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! Gears and shifts of a gearbox: driveline as JSON in, plain data out.
 
+use crate::border::call;
 use drivetwin_core::model::{Driveline, Mechanism};
+use drivetwin_core::network::mobility::EngagedError;
 use drivetwin_core::network::reduction::{ElementRatios, Exchange, Reduction};
 use drivetwin_core::network::statics::Statics;
 use pyo3::exceptions::PyValueError;
@@ -33,14 +35,19 @@ fn mechanism(driveline: &str) -> PyResult<Mechanism<f64>> {
 /// Speeds and torques of a gear; see `drivetwin.gearbox.Gearbox.gear`.
 #[pyfunction]
 pub fn gear_statics(
+    py: Python<'_>,
     driveline: &str,
     engaged: Vec<String>,
     input: &str,
     output: &str,
 ) -> PyResult<Gear> {
     let mechanism = mechanism(driveline)?;
-    let gear = Statics::solve(&mechanism, &engaged, input, output).map_err(refused)?;
-    let imbalance = gear.imbalance(input, output);
+    let (gear, imbalance) = call(py, || {
+        let gear = Statics::solve(&mechanism, &engaged, input, output)?;
+        let imbalance = gear.imbalance(input, output);
+        Ok::<_, EngagedError>((gear, imbalance))
+    })?
+    .map_err(refused)?;
     let torques = gear.flanges.into_iter().map(|f| (f.element, f.member, f.torque)).collect();
     Ok((gear.speeds, torques, imbalance))
 }
@@ -48,6 +55,7 @@ pub fn gear_statics(
 /// Dual-clutch form of the shift between two sets of elements; see `drivetwin.gearbox.reduce`.
 #[pyfunction]
 pub fn reduce_shift(
+    py: Python<'_>,
     driveline: &str,
     from_elements: Vec<String>,
     to_elements: Vec<String>,
@@ -55,8 +63,11 @@ pub fn reduce_shift(
     ends: (String, String),
 ) -> PyResult<Shift> {
     let mechanism = mechanism(driveline)?;
-    let exchange = Exchange::between(&from_elements, &to_elements, &dogs).map_err(refused)?;
-    let shift = Reduction::of(&mechanism, &exchange, &ends.0, &ends.1).map_err(refused)?;
+    let shift = call(py, || {
+        let exchange = Exchange::between(&from_elements, &to_elements, &dogs)?;
+        Reduction::of(&mechanism, &exchange, &ends.0, &ends.1)
+    })?
+    .map_err(refused)?;
     let members = shift.members.into_iter().map(|m| (m.member, m.inertia, m.a, m.b)).collect();
     Ok((ratios(shift.off_going), ratios(shift.on_coming), shift.common, members))
 }

@@ -4,6 +4,7 @@
 //! Private to the package; the Python modules of the same names are its face.
 
 mod batch;
+mod border;
 mod dual_clutch;
 mod gearbox;
 mod linear;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! The linear system about an operating point; see `drivetwin.simulation.linearize`.
 
+use crate::border::call;
 use crate::dual_clutch::model_of;
 use crate::network::parse;
 use drivetwin_core::network::Network;
@@ -29,12 +30,15 @@ pub fn linearise<'py>(
         false => model_of(driveline)?.driveline(),
     };
     let outputs: Vec<Output> = serde_json::from_str(outputs).map_err(|e| refuse(&e))?;
-    let network = Network::compile(&elements).map_err(|e| refuse(&e))?;
     let slipping: Vec<Slipping> = slipping
         .into_iter()
         .map(|(element, slip, pressure)| Slipping { element, slip, pressure })
         .collect();
-    let system = linearised(&network, &locked, &slipping, &outputs).map_err(|e| refuse(&e))?;
+    let system = call(py, || {
+        let network = Network::compile(&elements)?;
+        linearised(&network, &locked, &slipping, &outputs)
+    })?
+    .map_err(|e| refuse(&e))?;
     let array = |m: &Matrix<f64>| {
         let rows: Vec<Vec<f64>> = (0..m.rows).map(|i| m.row(i).to_vec()).collect();
         PyArray2::from_vec2(py, &rows)

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! Simulation of any network of elements; see `drivetwin.simulation.network`.
 
-use crate::plain::{Audit, Event, as_tuple, events_of};
+use crate::border::call;
+use crate::plain::{Audit, Event, as_array, events_of};
 use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{Output, RunOptions, Start, run_network};
@@ -52,15 +53,14 @@ pub fn simulate_network<'py>(
     let start = Start { speeds, twists, locked };
     let (tolerance, max_step, order, sprint, audit) = options;
     let settings = Settings { tolerance, max_step, order, exponential_steps: sprint };
-    let trajectory = py
-        .detach(|| {
-            let network = Network::compile(&driveline)?;
-            run_network(&network, &inputs, &start, grid, &outputs, RunOptions { settings, audit })
-        })
-        .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let trajectory = call(py, || {
+        let network = Network::compile(&driveline)?;
+        run_network(&network, &inputs, &start, grid, &outputs, RunOptions { settings, audit })
+    })?
+    .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let columns = PyArray2::from_vec2(py, &trajectory.columns)?;
     let events = events_of(&trajectory);
-    Ok((columns, events, trajectory.status.to_string(), trajectory.audit.map(as_tuple)))
+    Ok((columns, events, trajectory.status.to_string(), trajectory.audit.map(as_array)))
 }
 
 /// Read the elements one by one, so that a fault names its element.

@@ -4,20 +4,25 @@
 use drivetwin_core::simulate::{EnergyAudit, Trajectory};
 use drivetwin_core::solver::EventKind;
 
-/// Time [s], element, kind.
-pub type Event = (f64, String, &'static str);
-/// Source, stored, friction, gear loss, shaft, load, converter, created, error [J].
-pub type Audit = (f64, f64, f64, f64, f64, f64, f64, f64, f64);
+/// Time [s], element, kind, energy lost in an impulse [J].
+pub type Event = (f64, String, &'static str, f64);
+/// Source, stored, friction, gear loss, shaft, load, converter, impulse, created, error [J].
+pub type Audit = [f64; 10];
 
 /// Events with the names of their elements.
 pub fn events_of(run: &Trajectory<f64>) -> Vec<Event> {
     let events = run.events.iter();
-    events.map(|e| (e.time, run.elements[e.element].clone(), kind_name(e.kind))).collect()
+    events
+        .map(|e| (e.time, run.elements[e.element].clone(), kind_name(e.kind), e.energy))
+        .collect()
 }
 
 /// The audit in the order of its type.
-pub fn as_tuple(a: EnergyAudit) -> Audit {
-    (a.source, a.stored, a.friction, a.gear_loss, a.shaft, a.load, a.converter, a.created, a.error)
+pub fn as_array(a: EnergyAudit) -> Audit {
+    let heat = [a.friction, a.gear_loss, a.shaft, a.load, a.converter, a.impulse];
+    let [friction, gear_loss, shaft, load, converter, impulse] = heat;
+    let (created, error) = (a.created, a.error);
+    [a.source, a.stored, friction, gear_loss, shaft, load, converter, impulse, created, error]
 }
 
 fn kind_name(kind: EventKind) -> &'static str {
@@ -27,5 +32,6 @@ fn kind_name(kind: EventKind) -> &'static str {
         EventKind::Reverse => "reverse",
         EventKind::ClutchFilled => "fill",
         EventKind::ClutchVented => "vent",
+        EventKind::Impulse => "impulse",
     }
 }

@@ -237,19 +237,24 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class Event:
-    """A change of friction mode: `kind` is lock, break_away, reverse, fill or vent."""
+    """A change of friction mode: `kind` is lock, break_away, reverse, fill, vent or impulse.
+
+    An impulse at the start of a run loses `energy` [J] in its element; the energy of other kinds is 0.
+    """
 
     time: float
     element: str
     kind: str
+    energy: float = 0.0
 
 
 @dataclass(frozen=True)
 class EnergyAudit:
     """Work over the run [J]: source = stored + friction + gear_loss + shaft + load +
-    converter + error.
+    converter + impulse + error.
 
-    `gear_loss` is negative where the `paper` law creates energy; `created` is the sum of those
+    `impulse` is lost where the start of the run stops elements or sets speeds at once; the events
+    of this kind have its parts. `gear_loss` is negative where the `paper` law creates energy; `created` is the sum of those
     negative parts, as a positive number.
     """
 
@@ -260,6 +265,7 @@ class EnergyAudit:
     shaft: float
     load: float
     converter: float
+    impulse: float
     created: float
     error: float
 
@@ -445,7 +451,7 @@ def _build_trajectory(
     model: DualClutch,
     time: FloatArray,
     columns: Iterable[FloatArray],
-    outcome: tuple[list[tuple[float, str, str]], str, EnergyAudit | None],
+    outcome: tuple[list[tuple[float, str, str, float]], str, EnergyAudit | None],
 ) -> Trajectory:
     events, status, audit = outcome
     engine, output, wheel, twist, shaft, *friction = columns

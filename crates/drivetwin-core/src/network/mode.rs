@@ -357,6 +357,12 @@ impl<T: Number> Network<T> {
 }
 
 impl<T: Number> Mode<T> {
+    /// Torque of a row at rest over the basis; none for other rows.
+    pub fn holding_torque(&self, row: RowId) -> Option<&[T]> {
+        let position = self.stuck.iter().position(|&stuck| stuck == row)?;
+        Some(self.stuck_torque.row(position))
+    }
+
     /// Torque entering each lossy gear at its driving side, losses × basis: the multipliers of their
     /// constraints from the balance of the dependent nodes, `D_depᵀ λ = (f - I ω')_dep`, and at rest
     /// the loss torque on top. Computed when first asked for.

@@ -266,7 +266,8 @@ impl<T: Number> NonlinearTorque<T> {
                 let linear = per_twist * s[k] + per_rate * r[k];
                 if k == 0 { linear + constant } else { linear }
             }
-            (law, branch) => unreachable!("branch {branch:?} does not belong to {law:?}"),
+            // A branch of another law: the run ends with status `not finite`.
+            _ => T::of(f64::NAN),
         };
     }
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! Work that is shared out among threads.
 
+use crate::solver::{asks, token, with_token};
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, TryLockError};
+use std::time::Duration;
 use std::{process, thread};
 
 /// Threads that wait for the next work, with the memory that they have come to.
@@ -24,7 +26,7 @@ where
 {
     let threads = number(threads);
     let others = threads.min(items.len()).saturating_sub(1);
-    let items = Mutex::new(items);
+    let (items, token) = (Mutex::new(items), token());
     let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
     let take = || {
         while let Some(item) = next() {
@@ -34,12 +36,63 @@ where
     // Helpers that cannot be had are done without.
     match (others > 0).then(|| helpers(threads - 1)).flatten() {
         Some(pool) => pool.in_place_scope(|scope| {
-            (0..others).for_each(|_| scope.spawn(|_| take()));
+            let helping = Helping::new(others);
+            for _ in 0..others {
+                let end = helping.start();
+                let (take, token) = (&take, &token);
+                scope.spawn(move |_| {
+                    let _end = end;
+                    with_token(token, take);
+                });
+            }
             take();
+            helping.wait();
         }),
         None => take(),
     }
 }
+
+/// Number of helpers that are at work.
+#[derive(Clone)]
+struct Helping(Arc<(Mutex<usize>, Condvar)>);
+
+impl Helping {
+    fn new(count: usize) -> Self {
+        Self(Arc::new((Mutex::new(count), Condvar::new())))
+    }
+
+    /// Give a helper what ends its work when it is dropped, also by a panic.
+    fn start(&self) -> HelperEnd {
+        HelperEnd(self.clone())
+    }
+
+    /// Wait until all helpers have ended, and ask meanwhile whether they are to.
+    fn wait(&self) {
+        let (count, ended) = &*self.0;
+        let mut left = count.lock().unwrap_or_else(PoisonError::into_inner);
+        while *left > 0 {
+            left = ended
+                .wait_timeout(left, WAIT)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
+            asks();
+        }
+    }
+}
+
+/// End of the work of a helper.
+struct HelperEnd(Helping);
+
+impl Drop for HelperEnd {
+    fn drop(&mut self) {
+        let (count, ended) = &*self.0.0;
+        *count.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
+        ended.notify_all();
+    }
+}
+
+/// Time between two questions while others work.
+const WAIT: Duration = Duration::from_millis(20);
 
 fn number(threads: usize) -> usize {
     if threads == 0 { thread::available_parallelism().map_or(1, usize::from) } else { threads }

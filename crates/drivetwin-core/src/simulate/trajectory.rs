@@ -78,11 +78,10 @@ impl Target {
         friction: impl Fn(usize) -> Vec<f64>,
     ) -> Vec<f64> {
         let mut row = vec![0.0; network.basis()];
-        let target = if let Self::Angle(node) = self { Self::Speed(node) } else { self };
-        match Column::of(network, target) {
+        match Column::of(network, self) {
             Column::Linear(terms) => terms.iter().for_each(|&(position, c)| row[position] += c),
             Column::Friction(j) => row = friction(j),
-            Column::Angle(..) => unreachable!("an angle counts as its rate"),
+            Column::Angle(rate, _) => row[..rate.len()].copy_from_slice(&rate),
         }
         row
     }
@@ -305,7 +304,8 @@ pub(super) fn output_terms<'c, T: Number>(
 ) -> Cow<'c, [(usize, T)]> {
     match column {
         Column::Linear(terms) => Cow::Borrowed(terms),
-        Column::Angle(..) => unreachable!("angles need the motion between samples"),
+        // Angles need the motion between samples: plans with them pass none.
+        Column::Angle(..) => Cow::Borrowed(&[]),
         Column::Friction(j) => Cow::Owned(match state.rows[*j] {
             FrictionState::Open => Vec::new(),
             FrictionState::Sticking => terms(holding_row(state, *j)),
@@ -372,8 +372,7 @@ pub(super) fn value<T: Number>(column: &Column<T>, state: &HybridState<'_, T>, b
 
 /// Torque of a stuck element over the basis.
 fn holding_row<'r, T: Number>(state: &'r HybridState<'_, T>, j: usize) -> &'r [T] {
-    let position = state.mode.stuck.iter().position(|&s| s == RowId::Friction(j));
-    state.mode.stuck_torque.row(position.expect("a stuck element belongs to the mode"))
+    state.mode.holding_torque(RowId::Friction(j)).unwrap_or(&[])
 }
 
 /// Angle turned within the first `h` seconds of the present step.

@@ -11,6 +11,7 @@ use crate::solver::hybrid::event_search::earliest;
 use crate::solver::hybrid::stall::{Stall, StallDetector, underflows};
 use crate::solver::hybrid::state::HybridState;
 use crate::solver::inputs::Inputs;
+use crate::solver::interrupt::is_interrupted;
 use crate::solver::settings::{Settings, Step};
 use crate::solver::single::SampleSink;
 use crate::solver::status::Status;
@@ -81,12 +82,15 @@ impl<'a, T: Real> Integrator<'a, T> {
     /// Advance to the next input sample or event; `None` at the end of the inputs. Where the settings
     /// allow it, whole samples without events are passed first and handed to `sink`.
     pub fn advance(&mut self, sink: &mut impl SampleSink<T>) -> Result<Option<Step<T>>, Status> {
+        if is_interrupted() {
+            return Err(Status::Interrupted { time: self.state.time() });
+        }
         self.change_mode()?;
         if !self.enter_segment()? {
             return Ok(None);
         }
         if self.settings.exponential_steps {
-            self.run_fixed_steps(sink);
+            self.run_fixed_steps(sink)?;
             if self.is_at_end() {
                 return Ok(None);
             }

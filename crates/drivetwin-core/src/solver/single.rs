@@ -13,7 +13,9 @@ use crate::solver::exponential::samples::{
 };
 use crate::solver::inputs::SampleRange;
 use crate::solver::integrator::Integrator;
+use crate::solver::interrupt::is_interrupted;
 use crate::solver::simd::{Kernel, dispatch_simd};
+use crate::solver::status::Status;
 
 /// Consumer of the samples that fixed steps pass in one mode.
 pub trait SampleSink<T: Real> {
@@ -31,18 +33,26 @@ pub trait SampleSink<T: Real> {
 const SAMPLES_PER_CHECK: usize = 16;
 
 impl<T: Real> Integrator<'_, T> {
-    /// Advance over as many whole samples as possible.
-    pub(crate) fn run_fixed_steps(&mut self, sink: &mut impl SampleSink<T>) {
+    /// Advance over as many whole samples as possible, for as long as nobody interrupts.
+    pub(crate) fn run_fixed_steps(&mut self, sink: &mut impl SampleSink<T>) -> Result<(), Status> {
         let mut passed = false;
         while let Some((plan, steps)) = self.plan_fixed_steps() {
             passed = true;
-            if !self.run_block(&plan, steps, sink) || self.is_at_end() {
+            let whole = self.run_block(&plan, steps, sink);
+            if self.is_at_end() {
+                return Ok(());
+            }
+            if is_interrupted() {
+                return Err(Status::Interrupted { time: self.state.time() });
+            }
+            if !whole {
                 break;
             }
         }
-        if passed && !self.is_at_end() {
+        if passed {
             self.load_inputs();
         }
+        Ok(())
     }
 
     /// Pass samples of equal length; false where a guard could fall before their end.
@@ -138,7 +148,7 @@ impl<T: Real, S: SampleSink<T>, const N: usize, const A: usize> FixedStepRun<'_,
         let mut state = StepState { x, carry, guards };
         let mut trail = SampleBuffer::in_columns(std::mem::take(&mut run.trail), A);
         let mut whole = true;
-        while count > 0 && whole {
+        while count > 0 && whole && !is_interrupted() {
             let range = SampleRange { first: run.segment, count: count.min(BLOCK) };
             let (steps, to) = (FixedSteps { range, h }, &mut trail);
             // Samples with derivatives are expensive, so guards are evaluated after each.

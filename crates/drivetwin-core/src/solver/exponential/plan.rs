@@ -158,12 +158,11 @@ impl<T: Number> HybridState<'_, T> {
                     } else {
                         T::zero_()
                     };
-                    let position = self.mode.stuck.iter().position(|&s| s == RowId::Friction(j));
-                    let position = position.expect("a stuck element belongs to the mode");
-                    let torque = self.mode.stuck_torque.row(position);
                     let mut limit = load.map(|v| v * mu);
                     limit.offset += if row.one_way { TORQUE_ATOL } else { 0.0 };
-                    operators.guard_torque(self.network, active, torque, limit, !row.one_way);
+                    if let Some(torque) = self.mode.holding_torque(RowId::Friction(j)) {
+                        operators.guard_torque(self.network, active, torque, limit, !row.one_way);
+                    }
                 }
                 FrictionState::Slipping { sign } if !active.contains(&j) => {
                     let speed: Vec<T> = row.slip.iter().map(|&c| c * sign).collect();

@@ -200,9 +200,8 @@ fn larger<T: Number>([a, b]: [Series<T>; 2]) -> Series<T> {
 }
 
 fn holding_torque<T: Number>(state: &HybridState<'_, T>, row: RowId) -> Series<T> {
-    let position = state.mode.stuck.iter().position(|&s| s == row);
-    let position = position.expect("what is at rest belongs to the mode");
-    state.expansion.form(state.network, state.mode.stuck_torque.row(position))
+    let torque = state.mode.holding_torque(row);
+    torque.map_or([T::zero_(); TERMS], |row| state.expansion.form(state.network, row))
 }
 
 /// Sum of the torques that elements at rest hold [N·m]: what they balance leaves round-off in others.

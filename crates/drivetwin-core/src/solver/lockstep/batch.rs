@@ -17,6 +17,7 @@ use crate::solver::hybrid::event_search::earliest_per_lane;
 use crate::solver::hybrid::stall::{StallDetector, underflows};
 use crate::solver::hybrid::state::HybridState;
 use crate::solver::inputs::Inputs;
+use crate::solver::interrupt::is_interrupted;
 use crate::solver::lane_mask::{lane_mask, lanes_in};
 use crate::solver::lockstep::fixed_step::FixedStepPass;
 use crate::solver::lockstep::lane::{LANES, LaneRun, LaneSink, LaneStatus, Lanes};
@@ -68,7 +69,7 @@ pub fn run_lockstep<'a>(
         LockstepBatch { state, propagators, settings, lanes, events, columns, own_inputs };
     all.evict(diverged_mask);
     all.decide(all.open(), |state| state.engage_initial(locked));
-    while all.open() != 0 {
+    while all.open() != 0 && !is_interrupted() {
         all.advance(record);
         all.change();
     }
@@ -210,10 +211,9 @@ impl LockstepBatch<'_> {
         };
         let Self { state, lanes, columns, .. } = self;
         let passage = FixedStepPass { state, lanes, active: &plan.active, h, columns };
-        let arrived = match &plan.operators {
-            SizedPropagator::Four(operators) => passage.pass(operators, record),
-            _ => unreachable!("more states are of one run"),
-        };
+        // More states are of one run.
+        let SizedPropagator::Four(operators) = &plan.operators else { return false };
+        let arrived = passage.pass(operators, record);
         lanes_in(arrived).for_each(|run| self.update_lane_status(run));
         true
     }
