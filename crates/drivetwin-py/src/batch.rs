@@ -66,9 +66,8 @@ pub fn simulate_batch<'py>(
     let measured = rows_of(&wanted.0);
     let keep = keep_of(&wanted.1, &measured)?;
     let values = values.as_slice_mut()?;
-    let batch = call(py, || {
-        dual_clutch_batch(&model, &plans, &names, sets, keep, threads, values)
-    })?;
+    let batch =
+        call(py, || dual_clutch_batch(&model, &plans, &names, sets, keep, threads, values))?;
     let batch = batch.map_err(|e| refused(&e))?;
     Ok(ends(py, batch))
 }

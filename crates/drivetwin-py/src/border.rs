@@ -15,8 +15,7 @@ thread_local! {
 /// Call the core with the interpreter released. Signals of Python are handled meanwhile: where a handler
 /// raises, runs end and its exception is raised. A panic raises `SimulationError`.
 pub fn call<R: Send>(py: Python<'_>, work: impl FnOnce() -> R + Send) -> PyResult<R> {
-    let result =
-        py.detach(|| catch_unwind(AssertUnwindSafe(|| with_interrupt(has_raised, work))));
+    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| with_interrupt(has_raised, work))));
     if let Some(error) = RAISED.take() {
         return Err(error);
     }

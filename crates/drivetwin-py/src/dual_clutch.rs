@@ -86,10 +86,9 @@ pub fn sensitivities<'py>(
     let (tolerance, parameters) = options;
     let names: Vec<&str> = parameters.iter().map(String::as_str).collect();
     let settings = Settings { tolerance, ..Settings::default() };
-    let found = call(py, || {
-        dual_clutch_sensitivities(&model, &signals, &start, grid, settings, &names)
-    })?
-    .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let found =
+        call(py, || dual_clutch_sensitivities(&model, &signals, &start, grid, settings, &names))?
+            .map_err(|e| PyValueError::new_err(e.to_string()))?;
     // Handed over as they are, the memory of the core.
     let handed = |slopes: Vec<f64>| {
         let parameters = slopes.len() / grid.len();

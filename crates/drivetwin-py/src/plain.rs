@@ -12,9 +12,7 @@ pub type Audit = [f64; 10];
 /// Events with the names of their elements.
 pub fn events_of(run: &Trajectory<f64>) -> Vec<Event> {
     let events = run.events.iter();
-    events
-        .map(|e| (e.time, run.elements[e.element].clone(), kind_name(e.kind), e.energy))
-        .collect()
+    events.map(|e| (e.time, run.elements[e.element].clone(), kind_name(e.kind), e.energy)).collect()
 }
 
 /// The audit in the order of its type.

@@ -66,11 +66,7 @@ struct Pushing<T> {
 
 impl<T: Number> Network<T> {
     /// Impulse that meets a demand; it acts through lossy gears as torques do in the states of `key`.
-    pub fn impulse(
-        &self,
-        key: ModeKey,
-        demand: Demand<'_, T>,
-    ) -> Result<Impulse<T>, ImpulseFault> {
+    pub fn impulse(&self, key: ModeKey, demand: Demand<'_, T>) -> Result<Impulse<T>, ImpulseFault> {
         let motion = self.motion_of(key).ok_or(ImpulseFault::Undetermined)?;
         let mut rows = self.blocking(&motion, demand)?;
         let excess = self.excess(&rows, demand.speeds, demand.prescribed);
@@ -121,8 +117,7 @@ impl<T: Number> Network<T> {
             return Ok(rows);
         }
         let excess = self.excess(&rows, demand.speeds, demand.prescribed);
-        let change =
-            self.hold(motion, &rows).stop(&excess).ok_or(ImpulseFault::Undetermined)?;
+        let change = self.hold(motion, &rows).stop(&excess).ok_or(ImpulseFault::Undetermined)?;
         let speeds = demand.speeds[..self.speeds()].iter().enumerate();
         let mut pushing = Pushing {
             rows: Vec::new(),
@@ -150,7 +145,8 @@ impl<T: Number> Network<T> {
             let slip = form(self.slip_of(row), &pushing.speeds).re();
             let least = worst.map_or(T::Values::zero_(), |(slip, _)| slip);
             if self.slips(row, &pushing.speeds, OVERRUN_RTOL)
-                && slip.decide_with(least, |slip, least| slip > least) {
+                && slip.decide_with(least, |slip, least| slip > least)
+            {
                 worst = Some((slip, row));
             }
         }
@@ -249,14 +245,15 @@ impl<T: Number> Pushing<T> {
         let size = |m: &T| m.re().magnitude();
         let largest = multipliers.iter().fold(T::Values::zero_(), |l, m| size(m).larger(l));
         let mut first: Option<(T, usize)> = None;
-        for (place, ((_, impulse), &rate)) in self.rows.iter().zip(&multipliers[locked..]).enumerate()
+        for (place, ((_, impulse), &rate)) in
+            self.rows.iter().zip(&multipliers[locked..]).enumerate()
         {
-            let falls = rate
-                .re()
-                .decide_with(largest, |rate, largest| rate < -MULTIPLIER_RTOL * largest);
+            let falls =
+                rate.re().decide_with(largest, |rate, largest| rate < -MULTIPLIER_RTOL * largest);
             let at = -*impulse / rate;
-            let earlier = first
-                .is_none_or(|(before, _)| at.re().decide_with(before.re(), |at, before| at < before));
+            let earlier = first.is_none_or(|(before, _)| {
+                at.re().decide_with(before.re(), |at, before| at < before)
+            });
             if falls && earlier {
                 first = Some((at, place));
             }
@@ -275,7 +272,10 @@ impl<T: Number> Pushing<T> {
 }
 
 /// Return true if the row of `own` is independent of the rows held.
-fn is_independent<T: Number>(hold: &ConstraintSolver<'_, T>, own: &ConstraintSolver<'_, T>) -> bool {
+fn is_independent<T: Number>(
+    hold: &ConstraintSolver<'_, T>,
+    own: &ConstraintSolver<'_, T>,
+) -> bool {
     let (held, width) = (hold.rows.rows, hold.rows.cols);
     let mut all = Matrix::zeros(held + 1, width);
     for i in 0..held {

@@ -129,7 +129,8 @@ impl EnergyBalance {
         a.source += state.starting_impulse.source.re();
         a.impulse = state.starting_impulse.lost.re();
         a.stored = stored_energy(state.network, &state.x) - self.start;
-        let taken = a.stored + a.friction + a.gear_loss + a.shaft + a.load + a.converter + a.impulse;
+        let taken =
+            a.stored + a.friction + a.gear_loss + a.shaft + a.load + a.converter + a.impulse;
         a.error = a.source - taken;
         self.audit
     }

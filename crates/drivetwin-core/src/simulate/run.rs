@@ -78,11 +78,13 @@ impl<T: Real> Plan<T> {
         // Between samples, the motion is available from the expansion only.
         let motion = |target: &Target| matches!(target, Target::Angle(_));
         let sprint = settings.exponential_steps && !audit && !targets.iter().any(motion);
-        let sampled = |(_, signal): &(_, _)| matches!(signal, Signal::Samples { .. });
+        let sampled =
+            |(_, signal): &(_, _)| !T::DERIVATIVES || matches!(signal, Signal::Samples { .. });
         let fine = sprint && supports_fixed_step(network) && signals.iter().all(sampled);
         let span = (grid[0], grid[grid.len() - 1]);
         let inputs = join(network, signals, span, if fine { grid } else { &[] })?;
-        let inputs = if fine { divided(network, inputs) } else { inputs };
+        let slips = !network.channels.is_empty();
+        let inputs = if fine && slips { divided(network, inputs) } else { inputs };
         let points = inputs.points(grid);
         let settings = Settings { exponential_steps: sprint && points.is_some(), ..settings };
         let (grid, outputs) = (grid.to_vec(), outputs.to_vec());

@@ -71,10 +71,7 @@ impl Helping {
         let (count, ended) = &*self.0;
         let mut left = count.lock().unwrap_or_else(PoisonError::into_inner);
         while *left > 0 {
-            left = ended
-                .wait_timeout(left, WAIT)
-                .unwrap_or_else(PoisonError::into_inner)
-                .0;
+            left = ended.wait_timeout(left, WAIT).unwrap_or_else(PoisonError::into_inner).0;
             asks();
         }
     }

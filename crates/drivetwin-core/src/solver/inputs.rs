@@ -41,12 +41,14 @@ impl<'a, T: Real> Signal<'a, T> {
 #[derive(Clone, Debug)]
 pub struct Inputs<T> {
     knots: Vec<f64>,
-    /// Value at the start of a segment and rate within it, segments × inputs; unused for sines. At least one
+    /// Value at the start of a segment and rate within it, of sines at its start, segments × inputs. At least one
     /// of each segment, which constant loads refer to where there are no inputs.
     lines: Vec<[f64; 2]>,
     /// Derivatives of the delays: numbers of value zero.
     shifts: Vec<T>,
     sines: Vec<Option<Sine<T>>>,
+    /// The sines without derivatives; empty where there are none.
+    waves: Vec<Option<Wave>>,
     /// Number of segments of equal length from each segment on.
     equal: Vec<u32>,
     /// See [`usual_lengths`].
@@ -62,6 +64,17 @@ pub struct SampleRange {
     pub first: usize,
     /// Number of samples.
     pub count: usize,
+}
+
+/// A sine as operators take it, by its value and its rate at the start of a segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wave {
+    /// Angular frequency, rad/s.
+    pub omega: f64,
+    /// Mean.
+    pub offset: f64,
+    /// Amplitude.
+    pub amplitude: f64,
 }
 
 /// Fewest segments of equal length that make operators worth while.
@@ -118,8 +131,13 @@ impl<T: Real> Inputs<T> {
         let width = signals.len().max(1);
         let mut lines = vec![[0.0; 2]; (knots.len() - 1) * width];
         for (input, (_, signal)) in signals.iter().enumerate() {
-            let Signal::Samples { times, values, delay } = *signal else { continue };
             let to = lines[input..].iter_mut().step_by(width);
+            let Signal::Samples { times, values, delay } = *signal else {
+                if let Some(sine) = &sines[input] {
+                    fill_sine(to, &knots, sine);
+                }
+                continue;
+            };
             fill(to, &knots, jumps.is_empty(), times, values, delay.re());
         }
         Ok(Self::of_lines(knots, lines, shifts, sines))
@@ -133,8 +151,13 @@ impl<T: Real> Inputs<T> {
     ) -> Self {
         let equal = equal_lengths(&knots);
         let usual = usual_lengths(&knots, &equal);
+        let waves = if sines.iter().any(Option::is_some) {
+            sines.iter().map(|sine| sine.as_ref().map(wave)).collect()
+        } else {
+            Vec::new()
+        };
         let extremes = extremes(&knots, &lines, shifts.len().max(1));
-        Self { knots, lines, shifts, sines, equal, usual, extremes }
+        Self { knots, lines, shifts, sines, waves, equal, usual, extremes }
     }
 
     /// Divide segments: one of length l [s] becomes `parts(l)`.
@@ -142,7 +165,7 @@ impl<T: Real> Inputs<T> {
         let parts: Vec<usize> =
             self.knots.windows(2).map(|span| parts(span[1] - span[0])).collect();
         let count: usize = parts.iter().sum();
-        if count == parts.len() {
+        if count == parts.len() || !self.is_sampled() {
             return self;
         }
         let mut knots = Vec::with_capacity(count + 1);
@@ -168,7 +191,7 @@ impl<T: Real> Inputs<T> {
     /// segments of it are so frequent that operators pay.
     pub fn usual_length(&self, i: usize, most: f64) -> Option<f64> {
         let h = self.usual[i];
-        (self.is_sampled() && h > 0.0 && h <= most).then_some(h)
+        (self.has_samples() && h > 0.0 && h <= most).then_some(h)
     }
 
     /// Number of segments between knots.
@@ -205,6 +228,9 @@ impl<T: Real> Inputs<T> {
         if i < self.segments() {
             return self.line(i, input)[0];
         }
+        if let Some(sine) = &self.sines[input] {
+            return sine_series(sine, T::of(self.knot(i)))[0];
+        }
         let [start, rate] = self.line(i - 1, input);
         start + rate * (self.knot(i) - self.knot(i - 1))
     }
@@ -212,6 +238,17 @@ impl<T: Real> Inputs<T> {
     /// Return true if all inputs are linear within every segment.
     pub fn is_sampled(&self) -> bool {
         self.sines.iter().all(Option::is_none)
+    }
+
+    /// Return true if values and rates at the knots describe all inputs: sines too, but for their
+    /// derivatives.
+    pub fn has_samples(&self) -> bool {
+        self.is_sampled() || !T::DERIVATIVES
+    }
+
+    /// The inputs that are sines; empty where there are none.
+    pub fn waves(&self) -> &[Option<Wave>] {
+        &self.waves
     }
 
     /// For every knot the number of its point of an increasing grid [s], or [`NO_POINT`]; of a jump the knot
@@ -251,6 +288,9 @@ impl<T: Real> Inputs<T> {
     pub fn bounds(&self, input: usize, samples: SampleRange) -> [f64; 2] {
         let SampleRange { first, count } = samples;
         let stretches = first / STRETCH..=(first + count.max(1) - 1) / STRETCH;
+        if let Some(Some(Wave { offset, amplitude, .. })) = self.waves.get(input) {
+            return [offset - amplitude.abs(), offset + amplitude.abs()];
+        }
         stretches.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], stretch| {
             let [least, largest] = self.extremes[stretch * self.width() + input];
             [low.min(least), high.max(largest)]
@@ -348,6 +388,22 @@ fn equal_lengths(knots: &[f64]) -> Vec<u32> {
         }
     }
     equal
+}
+
+fn wave<T: Real>(&(offset, amplitude, omega, _): &Sine<T>) -> Wave {
+    Wave { omega, offset: offset.re(), amplitude: amplitude.re() }
+}
+
+/// Values and rates of a sine at the start of all segments.
+fn fill_sine<'l, T: Real>(
+    lines: impl Iterator<Item = &'l mut [f64; 2]>,
+    knots: &[f64],
+    sine: &Sine<T>,
+) {
+    for (line, &t) in lines.zip(knots) {
+        let series = sine_series(sine, T::of(t));
+        *line = [series[0].re(), series[1].re()];
+    }
 }
 
 /// Taylor coefficients of a sine about `t`.

@@ -57,7 +57,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             propagators,
             inputs,
             uses_fixed_step: settings.exponential_steps
-                && inputs.is_sampled()
+                && inputs.has_samples()
                 && supports_fixed_step(state.network),
             settings,
             state,

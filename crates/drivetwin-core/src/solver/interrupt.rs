@@ -109,13 +109,16 @@ mod tests {
 
     #[test]
     fn threads_that_help_see_the_answer_and_do_not_ask() {
-        with_interrupt(|| true, || {
-            let token = token();
-            let helper = || with_token(&token, asks);
-            assert!(!std::thread::scope(|scope| scope.spawn(helper).join().unwrap()));
-            std::thread::sleep(2 * PERIOD);
-            assert!(asks());
-            assert!(std::thread::scope(|scope| scope.spawn(helper).join().unwrap()));
-        });
+        with_interrupt(
+            || true,
+            || {
+                let token = token();
+                let helper = || with_token(&token, asks);
+                assert!(!std::thread::scope(|scope| scope.spawn(helper).join().unwrap()));
+                std::thread::sleep(2 * PERIOD);
+                assert!(asks());
+                assert!(std::thread::scope(|scope| scope.spawn(helper).join().unwrap()));
+            },
+        );
     }
 }

@@ -7,7 +7,7 @@ use crate::number::Real;
 use crate::solver::exponential::fixed_step::{FixedSteps, step_samples};
 use crate::solver::exponential::guards::StepState;
 use crate::solver::exponential::plan::StepPlan;
-use crate::solver::exponential::propagator::{Propagator, SizedPropagator};
+use crate::solver::exponential::propagator::{MAX_STATES, Propagator, SizedPropagator};
 use crate::solver::exponential::samples::{
     BLOCK, ChannelState, DelayedInputs, InputSource, SampleBuffer, Samples, SharedInputs, room,
 };
@@ -72,7 +72,16 @@ impl<T: Real> Integrator<'_, T> {
             SizedPropagator::Many(operators) if !T::DERIVATIVES => {
                 self.pass(operators, active, steps, sink)
             }
-            SizedPropagator::Twelve(_) | SizedPropagator::Many(_) => false,
+            SizedPropagator::Most(operators) if !T::DERIVATIVES => {
+                dispatch_simd(FixedStepRun::<_, _, MAX_STATES, 0> {
+                    run: self,
+                    operators,
+                    active,
+                    steps,
+                    sink,
+                })
+            }
+            _ => false,
         }
     }
 
@@ -82,7 +91,7 @@ impl<T: Real> Integrator<'_, T> {
         let (from, _) = self.inputs.span(self.segment);
         let h = self.inputs.usual_length(self.segment, self.settings.max_step)?;
         let plan = (self.state.t.re() == from)
-            .then(|| self.state.plan_steps(&mut self.propagators, h))
+            .then(|| self.state.plan_steps(&mut self.propagators, self.inputs.waves(), h))
             .flatten()?;
         let range =
             SampleRange { first: self.segment, count: self.inputs.equal_from(self.segment) };

@@ -41,9 +41,9 @@ fn coefficients<T: Number>(all: &mut [T::Values; MAX_SERIES + 2], h: f64, reach:
     MAX_SERIES
 }
 
-/// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, and
-/// `k! S_(k+1) e` the response to a force `e t^k`. The highest by its series, the lower ones by
-/// `S_(k-1) = I h^(k-1)/(k-1)! + A S_k`.
+/// `S_k = Σ_i A^i h^(i+k) / (i+k)!` for k = 0 .. CUBIC: S_0 is the transition matrix, of which the identity
+/// is left out, and `k! S_(k+1) e` the response to a force `e t^k`. The highest by its series, the lower ones
+/// by `S_(k-1) = I h^(k-1)/(k-1)! + A S_k`.
 #[inline(always)]
 pub fn phi_functions<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
@@ -67,9 +67,79 @@ pub fn phi_functions<T: Number, const F: bool, const N: usize>(
     for k in (0..FORCING_DEGREE).rev() {
         let (lower, higher) = all.split_at_mut(k + 1);
         multiply::<T, F, N>(a, &higher[0], &mut lower[k]);
-        add_to_diagonal(&mut lower[k], T::of(weights[k]));
+        if k > 0 {
+            add_to_diagonal(&mut lower[k], T::of(weights[k]));
+        }
     }
 }
+
+/// Double the step `h` [s] of [`phi_functions`]. Without the identity the transition of slow modes keeps its
+/// digits over any number of doublings (scaling and squaring).
+#[inline(always)]
+pub fn double_phi_functions<T: Number, const F: bool, const N: usize>(
+    all: &mut PhiFunctions<T, N>,
+    h: f64,
+) {
+    let mut product = [[T::zero_(); N]; N];
+    for k in (0..=FORCING_DEGREE).rev() {
+        multiply::<T, F, N>(&all[0], &all[k], &mut product);
+        let mut weight = 1.0;
+        for i in 0..N {
+            for j in 0..unrolled::<T, N>() {
+                product[i][j] += all[k][i][j] + all[k][i][j];
+            }
+        }
+        for lower in (1..k).rev() {
+            weight *= h / (k - lower) as f64;
+            for i in 0..N {
+                for j in 0..unrolled::<T, N>() {
+                    product[i][j] = all[lower][i][j].fma_times::<F>(weight, product[i][j]);
+                }
+            }
+        }
+        all[k] = product;
+    }
+}
+
+/// Response of the state at the end of a step to a force `e cos ωt` and to `e sin(ωt)/ω`.
+#[derive(Clone, Copy, Debug)]
+pub struct WaveResponse<T, const N: usize> {
+    /// Angular frequency, rad/s.
+    omega: f64,
+    /// To the cosine and to the sine.
+    pub parts: [[T; N]; 2],
+}
+
+impl<T: Number, const N: usize> WaveResponse<T, N> {
+    /// For a step over which the wave turns by at most [`MAX_WAVE_ANGLE`].
+    pub fn of<const F: bool>(s: &PhiFunctions<T, N>, force: &[T; N], omega: f64) -> Self {
+        let mut parts = [[T::zero_(); N]; 2];
+        for k in 0..2 {
+            let first = apply::<T, F, N>(&s[1 + k], force);
+            let third = apply::<T, F, N>(&s[3 + k], force);
+            for i in 0..N {
+                parts[k][i] = first[i] - third[i] * (omega * omega);
+            }
+        }
+        Self { omega, parts }
+    }
+
+    /// Double the step `h` [s]; `s` are those of the single step.
+    pub fn double<const F: bool>(&mut self, s: &PhiFunctions<T, N>, h: f64) {
+        let [cosine, sine] = self.parts;
+        let (sin, cos) = (self.omega * h).sin_cos();
+        let sin_over = if self.omega == 0.0 { h } else { sin / self.omega };
+        let moved = [apply::<T, F, N>(&s[0], &cosine), apply::<T, F, N>(&s[0], &sine)];
+        for i in 0..N {
+            let (c, q) = (cosine[i], sine[i]);
+            self.parts[0][i] = moved[0][i] + c * (1.0 + cos) - q * (self.omega * sin);
+            self.parts[1][i] = moved[1][i] + q * (1.0 + cos) + c * sin_over;
+        }
+    }
+}
+
+/// Angle of a wave over a step up to which three terms of its series are exact to round-off, rad.
+pub const MAX_WAVE_ANGLE: f64 = 1e-3;
 
 /// `Σ c_i A^i` over whole threes of coefficients, by Horner's rule over the cube: less than half as many
 /// products of matrices as over A (Paterson and Stockmeyer 1973).
@@ -97,7 +167,7 @@ fn polynomial<T: Number, const F: bool, const N: usize>(
 }
 
 #[inline(always)]
-fn add_to_diagonal<T: Number, const N: usize>(a: &mut Square<T, N>, value: T) {
+pub fn add_to_diagonal<T: Number, const N: usize>(a: &mut Square<T, N>, value: T) {
     for i in 0..N {
         a[i][i] += value;
     }

@@ -6,12 +6,13 @@ use crate::network::smooth_law::{AffineForm, MAX_INPUTS, SmoothLaw, normal_load}
 use crate::network::{Branch, GearState, Network, NonlinearTorque, RowId};
 use crate::number::{KernelFloat, Number};
 use crate::solver::exponential::propagator::{
-    MAX_ACTIVE, MAX_GUARDS, MAX_STATES, Propagator, SizedPropagator,
+    Bound, MANY, MAX_ACTIVE, MAX_GUARDS, MAX_STATES, Propagator, SampleGuard, SizedPropagator,
 };
 use crate::solver::exponential::propagator_cache::PropagatorCache;
 use crate::solver::exponential::propagator_cache::PropagatorKey;
 use crate::solver::hybrid::event::FrictionState;
 use crate::solver::hybrid::state::HybridState;
+use crate::solver::inputs::Wave;
 use crate::solver::tolerances::TORQUE_ATOL;
 use std::sync::Arc;
 
@@ -38,6 +39,15 @@ pub fn supports_fixed_step<T: Number>(network: &Network<T>) -> bool {
         && network.channels.iter().all(smooth)
 }
 
+/// Things that operators are built for, beside the mode.
+#[derive(Clone, Copy)]
+struct Given<'g, T> {
+    active: &'g [usize],
+    laws: &'g [SmoothLaw<T>],
+    waves: &'g [Option<Wave>],
+    h: f64,
+}
+
 /// Propagator and active channels of fixed steps.
 pub(crate) struct StepPlan<T> {
     /// Operators of the present mode.
@@ -51,6 +61,7 @@ impl<T: Number> HybridState<'_, T> {
     pub(crate) fn plan_steps(
         &mut self,
         propagators: &mut PropagatorCache<T>,
+        waves: &[Option<Wave>],
         h: f64,
     ) -> Option<StepPlan<T>> {
         if !self.is_simple() {
@@ -58,7 +69,7 @@ impl<T: Number> HybridState<'_, T> {
         }
         let on = |j: &usize| self.branches[*j] != Branch::Off;
         let active: Vec<usize> = (0..self.branches.len()).filter(on).collect();
-        let operators = self.operators(propagators, &active, h)?;
+        let operators = self.operators(propagators, &active, waves, h)?;
         Some(StepPlan { operators, active })
     }
 
@@ -67,36 +78,43 @@ impl<T: Number> HybridState<'_, T> {
         &mut self,
         propagators: &mut PropagatorCache<T>,
         active: &[usize],
+        waves: &[Option<Wave>],
         h: f64,
     ) -> Option<SizedPropagator<T>> {
         if active.len() > MAX_ACTIVE {
             return None;
         }
-        let key = self.key(active, h);
+        let key = self.key(active, waves, h);
         if let Some(known) = propagators.entries.get(&key) {
             return known.clone();
         }
         let laws = active
             .iter()
             .map(|&j| SmoothLaw::from_channel(&self.network.channels[j], self.branches[j]));
-        let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| match self.network.states() {
-            0..=4 => self.build::<4>(active, &laws, h).map(|o| SizedPropagator::Four(Arc::new(o))),
-            5..=8 if T::RUNS == 1 => {
-                self.build::<8>(active, &laws, h).map(|o| SizedPropagator::Eight(Arc::new(o)))
+        let built = laws.collect::<Option<Vec<_>>>().and_then(|laws| {
+            let given = Given { active, laws: &laws, waves, h };
+            match self.network.states() {
+                0..=4 => self.build::<4>(given).map(|o| SizedPropagator::Four(Arc::new(o))),
+                5..=8 if T::RUNS == 1 => {
+                    self.build::<8>(given).map(|o| SizedPropagator::Eight(Arc::new(o)))
+                }
+                9..=12 if max_states::<T>() == MAX_STATES => {
+                    self.build::<12>(given).map(|o| SizedPropagator::Twelve(Arc::new(o)))
+                }
+                13..=MANY if max_states::<T>() == MAX_STATES => {
+                    self.build::<MANY>(given).map(|o| SizedPropagator::Many(Arc::new(o)))
+                }
+                ..=MAX_STATES if max_states::<T>() == MAX_STATES && active.is_empty() => {
+                    self.build::<MAX_STATES>(given).map(|o| SizedPropagator::Most(Arc::new(o)))
+                }
+                _ => None,
             }
-            9..=12 if max_states::<T>() == MAX_STATES => {
-                self.build::<12>(active, &laws, h).map(|o| SizedPropagator::Twelve(Arc::new(o)))
-            }
-            13..=MAX_STATES if max_states::<T>() == MAX_STATES => self
-                .build::<MAX_STATES>(active, &laws, h)
-                .map(|o| SizedPropagator::Many(Arc::new(o))),
-            _ => None,
         });
         propagators.entries.insert(key, built.clone());
         built
     }
 
-    fn key(&self, active: &[usize], h: f64) -> PropagatorKey {
+    fn key(&self, active: &[usize], waves: &[Option<Wave>], h: f64) -> PropagatorKey {
         let mut branches = [0; 3];
         let mut pieces = [0; MAX_ACTIVE];
         for (slot, &j) in active.iter().enumerate() {
@@ -110,7 +128,15 @@ impl<T: Number> HybridState<'_, T> {
             branches[2] |= u64::from(self.pressed[j]) << j;
             branches[2] |= u64::from(matches!(row, FrictionState::Slipping { .. })) << (32 + j);
         }
-        PropagatorKey { mode: self.mode.key, branches, pieces, step: (h * 1e12).round() as u64 }
+        let bits = |wave: &Option<Wave>| wave.map(|w| [w.omega.to_bits(), w.offset.to_bits()]);
+        let waves = waves.iter().map(bits).collect();
+        PropagatorKey {
+            mode: self.mode.key,
+            branches,
+            pieces,
+            waves,
+            step: (h * 1e12).round() as u64,
+        }
     }
 
     /// Return true if fixed steps cover the present mode.
@@ -125,16 +151,17 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Build operators that watch all guards of the present mode.
-    fn build<const N: usize>(
-        &self,
-        active: &[usize],
-        laws: &[SmoothLaw<T>],
-        h: f64,
-    ) -> Option<Propagator<T, N>> {
-        let mut operators = Propagator::build(self.network, &self.mode, active, laws, h)?;
+    fn build<const N: usize>(&self, given: Given<'_, T>) -> Option<Propagator<T, N>> {
+        let Given { active, laws, waves, h } = given;
+        let mut operators = Propagator::build(self.network, &self.mode, active, laws, waves, h)?;
         self.guard_frictions(active, h, &mut operators);
         self.guard_gears(active, h, &mut operators);
-        (operators.guards.len() <= MAX_GUARDS).then_some(operators)
+        let bounded = |guard: &SampleGuard<T, N>| matches!(guard.bound, Bound::Within { .. });
+        let waves = waves.iter().any(Option::is_some);
+        let unwatched = operators.guards.is_empty() && operators.loads.is_empty();
+        let watched = !operators.is_stiff || !operators.guards.iter().any(bounded);
+        let sound = watched && (!waves || (unwatched && active.is_empty()));
+        (sound && operators.guards.len() <= MAX_GUARDS).then_some(operators)
     }
 
     fn guard_frictions<const N: usize>(

@@ -10,8 +10,10 @@ use crate::network::smooth_law::{AffineForm, SmoothLaw};
 use crate::network::{Mode, Network};
 use crate::number::{KernelFloat, Number, Values};
 use crate::solver::exponential::phi::{
-    FORCING_DEGREE, N_BASIS, apply, dot, forcing_response, phi_functions, unrolled,
+    FORCING_DEGREE, MAX_WAVE_ANGLE, N_BASIS, PhiFunctions, WaveResponse, add_to_diagonal, apply,
+    dot, double_phi_functions, forcing_response, phi_functions, unrolled,
 };
+use crate::solver::inputs::Wave;
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::tolerances::{
     MAX_SPECTRAL_STEP_LINEAR, MAX_SPECTRAL_STEP_SLIPPING, MIN_CHORD_DEVIATION_OF_RISE,
@@ -30,6 +32,8 @@ pub const MAX_GUARDS: usize = 12;
 pub struct Propagator<L, const N: usize> {
     /// Number of states.
     pub states: usize,
+    /// True if the motion is too fast for chords to bound torques within a sample.
+    pub is_stiff: bool,
     /// Largest deviation of a watched torque from its chord within a sample, relative to its rise and to
     /// its size.
     pub chord_deviation: [L; 2],
@@ -143,9 +147,10 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         mode: &Mode<T>,
         active: &[usize],
         laws: &[SmoothLaw<T>],
+        waves: &[Option<Wave>],
         h: f64,
     ) -> Option<Self> {
-        dispatch_simd(BuildKernel { network, mode, active, laws, h })
+        dispatch_simd(BuildKernel { network, mode, active, laws, waves, h })
     }
 
     /// Add the active channel number `slot`.
@@ -156,7 +161,7 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         kernel: &BuildKernel<'_, T, N>,
         forcing_response: &[[[T; N]; N_BASIS]],
     ) {
-        let BuildKernel { network, mode, active, laws, h } = *kernel;
+        let BuildKernel { network, mode, active, laws, h, .. } = *kernel;
         let law = laws[slot];
         let mut argument = [T::zero_(); N];
         for (to, &c) in argument.iter_mut().zip(&network.channels[active[slot]].arguments[0]) {
@@ -257,21 +262,52 @@ struct BuildKernel<'b, T, const N: usize> {
     mode: &'b Mode<T>,
     active: &'b [usize],
     laws: &'b [SmoothLaw<T>],
+    waves: &'b [Option<Wave>],
     h: f64,
 }
+
+impl<T: Number, const N: usize> BuildKernel<'_, T, N> {
+    /// Responses to the inputs that are waves, at the first step.
+    fn responses_to_waves<const F: bool>(
+        &self,
+        s: &PhiFunctions<T, N>,
+    ) -> Vec<Option<WaveResponse<T, N>>> {
+        let response = |(input, wave): (usize, &Option<Wave>)| {
+            let force = forcing(self.mode, self.network.first_input() + input);
+            wave.map(|wave| WaveResponse::of::<F>(s, &force, wave.omega))
+        };
+        self.waves.iter().enumerate().map(response).collect()
+    }
+}
+
+/// Number of doublings of the first step whose series is summed directly.
+fn doublings(reach: f64, waves: &[Option<Wave>], h: f64) -> i32 {
+    let waves = waves.iter().flatten().map(|wave| wave.omega.abs() * h / MAX_WAVE_ANGLE);
+    let own = if reach > MAX_SPECTRAL_STEP_LINEAR { reach } else { 0.0 };
+    let turns = waves.fold(own, f64::max);
+    if turns > 1.0 { turns.log2().ceil().min(MAX_DOUBLINGS) as i32 } else { 0 }
+}
+
+/// Most doublings; more than between the fastest and the slowest motion that numbers can tell apart.
+const MAX_DOUBLINGS: f64 = 100.0;
 
 impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
     type Output = Option<Propagator<T, N>>;
 
     #[inline(always)]
     fn run<const F: bool>(self) -> Option<Propagator<T, N>> {
-        let Self { network, mode, active, laws, h } = self;
+        let Self { network, mode, active, laws, waves, h } = self;
         let reach = mode.spectral_radius * h;
-        let longest =
-            if active.is_empty() { MAX_SPECTRAL_STEP_LINEAR } else { MAX_SPECTRAL_STEP_SLIPPING };
+        let longest = match active.is_empty() {
+            true if T::RUNS == 1 => f64::INFINITY,
+            true => MAX_SPECTRAL_STEP_LINEAR,
+            false => MAX_SPECTRAL_STEP_SLIPPING,
+        };
         if reach.re().decide(|reach| reach > longest) {
             return None;
         }
+        let doublings = if T::RUNS == 1 { doublings(reach.re().run_value(0), waves, h) } else { 0 };
+        let first = h * 0.5_f64.powi(doublings);
         // Plain loops: the body of a closure would be compiled apart, for the least of all processors.
         let n = network.states();
         let mut a = [[T::zero_(); N]; N];
@@ -279,7 +315,15 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
             a[i][..n].copy_from_slice(&mode.derivative.row(i)[..n]);
         }
         let mut s = [[[T::zero_(); N]; N]; FORCING_DEGREE + 1];
-        phi_functions::<T, F, N>(&a, h, reach, &mut s);
+        phi_functions::<T, F, N>(&a, first, reach * (first / h), &mut s);
+        let mut responses_to_waves = self.responses_to_waves::<F>(&s);
+        let mut length = first;
+        for _ in 0..doublings {
+            responses_to_waves.iter_mut().flatten().for_each(|wave| wave.double::<F>(&s, length));
+            double_phi_functions::<T, F, N>(&mut s, length);
+            length *= 2.0;
+        }
+        add_to_diagonal(&mut s[0], T::of(1.0));
         let mut operators = Propagator::empty(n, reach);
         operators.inputs.reserve_exact(network.mechanism.inputs.len());
         operators.channels.reserve_exact(active.len());
@@ -292,7 +336,15 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
         for input in 0..network.mechanism.inputs.len() {
             if network.is_driven_by(input) {
                 let force = forcing(mode, network.first_input() + input);
-                let step = [apply::<T, F, N>(&s[1], &force), apply::<T, F, N>(&s[2], &force)];
+                let mut step = [apply::<T, F, N>(&s[1], &force), apply::<T, F, N>(&s[2], &force)];
+                if let Some(Some(wave)) = responses_to_waves.get(input) {
+                    // The offset is there throughout, and the wave is what the input is off it.
+                    let offset = waves[input].map_or(0.0, |wave| wave.offset);
+                    for i in 0..N {
+                        operators.constant[i] += (step[0][i] - wave.parts[0][i]) * offset;
+                    }
+                    step = wave.parts;
+                }
                 operators.inputs.push(InputMap::new(input, step));
             }
         }
@@ -353,6 +405,7 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         .map(T::promote);
         Self {
             states: n,
+            is_stiff: reach.decide(|reach| reach > MAX_SPECTRAL_STEP_LINEAR),
             chord_deviation,
             signs: [none; MAX_ACTIVE],
             transition: [[none; N]; N],
@@ -468,9 +521,13 @@ pub(crate) enum SizedPropagator<T> {
     Eight(Arc<Propagator<T, 8>>),
     /// Up to 12; of plain numbers only.
     Twelve(Arc<Propagator<T, 12>>),
-    /// Up to [`MAX_STATES`]; likewise.
-    Many(Arc<Propagator<T, MAX_STATES>>),
+    /// Up to [`MANY`]; likewise.
+    Many(Arc<Propagator<T, MANY>>),
+    /// Up to [`MAX_STATES`]; likewise, and in linear modes only.
+    Most(Arc<Propagator<T, MAX_STATES>>),
 }
 
+/// Most states of a network of plain numbers that is marched in modes with slipping elements.
+pub(crate) const MANY: usize = 24;
 /// Most states of a network of plain numbers that is marched.
-pub(crate) const MAX_STATES: usize = 24;
+pub(crate) const MAX_STATES: usize = 48;

@@ -12,6 +12,8 @@ pub(crate) struct PropagatorKey {
     /// Bits of the active channels, of their directions, and of what is watched or pressed.
     pub branches: [u64; 3],
     pub pieces: [u8; MAX_ACTIVE],
+    /// Bits of angular frequency and offset of the inputs that are waves.
+    pub waves: Vec<Option<[u64; 2]>>,
     /// Step length, ps: times that differ by round-off share their operators.
     pub step: u64,
 }

@@ -11,8 +11,8 @@ use crate::solver::hybrid::zero_crossing::first_zero_crossing;
 use crate::solver::lane_mask::lanes_in;
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::tolerances::{
-    ACCELERATION_ATOL, BOUND_RTOL, FORCED_SLIP_RTOL, GRAZING_RTOL, RELEASE_RATE_RTOL, SUM_RTOL, TORQUE_ATOL,
-    sum_and_scale,
+    ACCELERATION_ATOL, BOUND_RTOL, FORCED_SLIP_RTOL, GRAZING_RTOL, RELEASE_RATE_RTOL, SUM_RTOL,
+    TORQUE_ATOL, sum_and_scale,
 };
 
 /// The earliest fall within `h` [s], refined so that the time carries derivatives, and whether it

@@ -196,7 +196,7 @@ impl LockstepBatch<'_> {
         };
         let h = self.lanes[0].inputs.usual_length(first, self.settings.max_step);
         let (plan, diverged_mask) =
-            with_consensus(self.open(), || self.state.plan_steps(&mut self.propagators, h?));
+            with_consensus(self.open(), || self.state.plan_steps(&mut self.propagators, &[], h?));
         if diverged_mask != 0 {
             self.evict(diverged_mask);
             return true;
