@@ -440,7 +440,8 @@ fn a_start_locks_as_a_clutch_that_is_strong_beyond_measure_does() {
             simulate_by(how, &network, &strong, &start, &grid(1.0, 2), &outputs)
         };
         let (locked, slipping) = (begun(&["C"]), begun(&[]));
-        assert_eq!((locked.events.len(), slipping.events.len()), (0, 1));
+        assert!(locked.events.iter().all(|event| event.kind == EventKind::Impulse));
+        assert_eq!(slipping.events.len(), 1);
         for (locked, slipping) in locked.columns.iter().zip(&slipping.columns) {
             assert!((locked[0] - slipping[1]).abs() < 1e-9, "{} {}", locked[0], slipping[1]);
         }

@@ -4,6 +4,7 @@
 use super::constraints::{Coordinates, coordinates};
 use super::error::CompileError;
 use super::linalg::{Matrix, independent_rows, is_nothing, solve};
+use super::massless::Followers;
 use super::mode::{ModeKey, Motion};
 use super::nonlinear_torque::{NonlinearTorque, TorqueLaw};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
@@ -83,7 +84,7 @@ pub struct Network<T> {
     pub inertia: Matrix<T>,
     /// Kinetic energy over the independent speeds, `½ vᵀ M v`.
     pub mass: Matrix<T>,
-    /// Rates of twist over the independent speeds, springs × speeds.
+    /// Rates of twist over the independent speeds, or with followers over the basis; springs × terms.
     pub twist_rates: Matrix<T>,
     /// Friction elements; element j is channel j.
     pub frictions: Vec<FrictionElement<T>>,
@@ -100,6 +101,8 @@ pub struct Network<T> {
     /// Node torques of everything but rigid couplings and stuck friction, over the basis: nodes ×
     /// basis.
     pub node_torques: Matrix<T>,
+    /// Members without mass between compliances, where there are any.
+    pub followers: Option<Followers<T>>,
     /// Matrices shared by all modes if no gear loss depends on its state.
     pub(super) motion: Option<Motion<T>>,
 }
@@ -118,10 +121,9 @@ impl<T: Number> Network<T> {
             return Err(CompileError::TooManyRows { count, limit: MAX_ROWS });
         }
         let coordinates = coordinates(&mechanism)?;
-        let lags = mechanism.forces.iter().filter(|force| force.lag.is_some()).count();
         let empty = Matrix::zeros(0, 0);
         let mut network = Self {
-            states: coordinates.independent.len() + mechanism.springs.len() + lags,
+            states: 0,
             inertia: node_inertia(&mechanism),
             mass: empty.clone(),
             twist_rates: empty.clone(),
@@ -134,12 +136,15 @@ impl<T: Number> Network<T> {
             channels: Vec::new(),
             applied_torques: Vec::new(),
             lags: Vec::new(),
+            followers: None,
             motion: None,
         };
+        network.count_states();
         network.set_mass();
         if network.give_mass_between_frictions() {
             network.set_mass();
         }
+        network.eliminate_massless()?;
         network.refuse_massless()?;
         network.add_rows();
         network.refuse_prescribed_twice()?;
@@ -194,7 +199,10 @@ impl<T: Number> Network<T> {
     /// True if an input is itself a torque or the target of a lagging torque, not only a pressure.
     pub fn is_driven_by(&self, input: usize) -> bool {
         let position = self.first_input() + input;
-        self.lags.iter().any(|lag| lag.target == position)
+        let turns =
+            |i: usize| self.twist_rates.row(i).get(position).is_some_and(|&rate| !is_nothing(rate));
+        (0..self.twist_rates.rows).any(turns)
+            || self.lags.iter().any(|lag| lag.target == position)
             || (0..self.node_torques.rows).any(|i| !is_nothing(self.node_torques[(i, position)]))
     }
 
@@ -204,6 +212,24 @@ impl<T: Number> Network<T> {
         (0..n.cols)
             .map(|j| row.iter().fold(T::zero_(), |sum, &(node, c)| sum + c * n[(node, j)]))
             .collect()
+    }
+
+    /// A linear form over nodes, expressed over the basis as far as it has terms.
+    pub fn over_basis(&self, row: &[(usize, T)]) -> Vec<T> {
+        let mut form = self.over_speeds(row);
+        if let Some(Followers { speeds, .. }) = &self.followers {
+            form.resize(speeds.cols, T::zero_());
+            for &(node, c) in row {
+                form.iter_mut().zip(speeds.row(node)).for_each(|(sum, &v)| *sum += c * v);
+            }
+        }
+        form
+    }
+
+    /// Return true if the speed of a node is no state: it follows from the balance of torques.
+    pub fn is_follower(&self, node: usize) -> bool {
+        let followers = self.followers.as_ref();
+        followers.is_some_and(|f| f.speeds.row(node).iter().any(|&v| !is_nothing(v)))
     }
 
     /// Normal load of friction element `j` as `gain (basis[input] - p0)`: input, gain, p0.
@@ -218,7 +244,12 @@ impl<T: Number> Network<T> {
         self.over_speeds(&[(node, T::of(1.0))])
     }
 
-    fn set_mass(&mut self) {
+    pub(super) fn count_states(&mut self) {
+        let lags = self.mechanism.forces.iter().filter(|force| force.lag.is_some()).count();
+        self.states = self.speeds() + self.mechanism.springs.len() + lags;
+    }
+
+    pub(super) fn set_mass(&mut self) {
         let n = &self.coordinates.speeds;
         self.mass = n.transposed().times(&self.inertia).times(n);
     }
@@ -271,9 +302,10 @@ impl<T: Number> Network<T> {
 
     /// Everything that is a linear form over the speeds: twists, slips, gears, prescribed speeds.
     fn add_rows(&mut self) {
-        self.twist_rates = Matrix::zeros(self.mechanism.springs.len(), self.speeds());
+        let width = self.followers.as_ref().map_or(self.speeds(), |f| f.speeds.cols);
+        self.twist_rates = Matrix::zeros(self.mechanism.springs.len(), width);
         for i in 0..self.mechanism.springs.len() {
-            let rate = self.over_speeds(&self.mechanism.springs[i].row);
+            let rate = self.over_basis(&self.mechanism.springs[i].row);
             self.twist_rates.row_mut(i).copy_from_slice(&rate);
         }
         for f in &self.mechanism.frictions {

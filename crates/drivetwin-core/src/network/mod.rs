@@ -17,6 +17,7 @@ mod constraints;
 mod error;
 mod impulse;
 pub mod linalg;
+mod massless;
 pub mod mobility;
 mod mode;
 pub mod nonlinear_torque;

@@ -63,7 +63,7 @@ impl EnergyBalance {
 
     fn add_powers<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
         let network = run.state.network;
-        let n = &network.coordinates.speeds;
+        let speed = |node| form(&network.over_basis(&[(node, T::of(1.0))]), basis);
         let audit = &mut self.audit;
         for (j, row) in network.frictions.iter().enumerate() {
             let torque = basis[network.first_channel() + j];
@@ -71,14 +71,15 @@ impl EnergyBalance {
         }
         for force in &network.mechanism.forces {
             if let ForceLaw::Constant(torque) = force.law {
-                audit.load -= (torque * form(n.row(force.node), basis)).re() * width;
+                audit.load -= (torque * speed(force.node)).re() * width;
             }
         }
         for drive in &network.applied_torques {
-            let speed = drive.nodes.iter().fold(T::zero_(), |sum, &(node, direction)| {
-                sum + direction * form(n.row(node), basis)
-            });
-            let work = (basis[drive.basis] * speed).re() * width;
+            let along = drive
+                .nodes
+                .iter()
+                .fold(T::zero_(), |sum, &(node, direction)| sum + direction * speed(node));
+            let work = (basis[drive.basis] * along).re() * width;
             match drive.account {
                 Some(Account::Source) => audit.source += work,
                 Some(Account::Load) => audit.load -= work,

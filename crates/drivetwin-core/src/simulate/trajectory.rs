@@ -91,7 +91,7 @@ impl Target {
 pub(super) enum Column<T> {
     /// Linear form over the basis: position and coefficient of its terms.
     Linear(Vec<(usize, T)>),
-    /// Speed of a node over the independent speeds, and the angle at the start of the present step.
+    /// Speed of a node over the basis, and the angle at the start of the present step.
     Angle(Vec<T>, T),
     /// Torque of a friction element.
     Friction(usize),
@@ -319,7 +319,7 @@ pub(super) fn output_terms<'c, T: Number>(
 impl<T: Number> Column<T> {
     /// Return the column of a target.
     pub fn of(network: &Network<T>, target: Target) -> Self {
-        let speed = |node| network.over_speeds(&[(node, T::of(1.0))]);
+        let speed = |node| network.over_basis(&[(node, T::of(1.0))]);
         match target {
             Target::Speed(node) => Self::Linear(terms(&speed(node))),
             Target::Angle(node) => Self::Angle(speed(node), T::zero_()),
@@ -340,8 +340,8 @@ fn shaft_torque<T: Number>(network: &Network<T>, i: usize) -> Column<T> {
     match network.mechanism.springs[i].law {
         SpringLaw::Linear { stiffness, damping } => {
             let mut row: Vec<T> = network.twist_rates.row(i).iter().map(|&c| c * damping).collect();
-            row.resize(network.states(), T::zero_());
-            row[network.speeds() + i] = stiffness;
+            row.resize(row.len().max(network.states()), T::zero_());
+            row[network.speeds() + i] += stiffness;
             Column::Linear(terms(&row))
         }
         SpringLaw::Regions { .. } => {
@@ -377,8 +377,9 @@ fn holding_row<'r, T: Number>(state: &'r HybridState<'_, T>, j: usize) -> &'r [T
 
 /// Angle turned within the first `h` seconds of the present step.
 fn integral<T: Real>(state: &HybridState<'_, T>, row: &[T], h: T) -> T {
-    let mut sum = T::zero_();
-    for (&c, series) in row.iter().zip(&state.expansion.states) {
+    let mut sum = row.get(state.network.one()).map_or(T::zero_(), |&c| c * h);
+    let given = state.expansion.inputs.iter();
+    for (&c, series) in row.iter().zip(state.expansion.states.iter().chain(given)) {
         if !is_zero(c) {
             let mut value = T::zero_();
             for k in (0..=state.expansion.order).rev() {
