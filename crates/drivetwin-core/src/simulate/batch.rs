@@ -245,7 +245,7 @@ impl Work<'_> {
         };
         let alike = lane_mask(runs.iter().map(alike));
         let (prepared, parting) = with_consensus(alike, || self.sets.compile_runs::<Lanes>(&runs));
-        let Ok((network, State { x, locked })) = prepared else { return };
+        let Ok((network, State { x, locked, .. })) = prepared else { return };
         if plan.check(&network).is_err() {
             return;
         }

@@ -100,9 +100,22 @@ impl<T: Real> Plan<T> {
     fn integrator<'r>(
         &'r self,
         known: SolverCache<'r, T>,
-        start: &State<T>,
+        x: Vec<T>,
+        locked: &[usize],
     ) -> Result<Integrator<'r, T>, Status> {
-        Integrator::start(known, &self.inputs, self.settings, start.x.clone(), &start.locked)
+        Integrator::start(known, &self.inputs, self.settings, x, locked)
+    }
+
+    /// State at the start, with the prescribed speeds that it is left to.
+    fn begin(&self, network: &Network<T>, start: &State<T>) -> Vec<T> {
+        let mut x = start.x.clone();
+        for (k, &(_, input)) in network.prescribed.iter().enumerate() {
+            let speed = self.inputs.start_value(input);
+            for i in 0..start.driven.rows {
+                x[i] += start.driven[(i, k)] * speed;
+            }
+        }
+        x
     }
 
     /// One run. If it fails on the way it ends with its status, and with NaN from there on.
@@ -121,10 +134,11 @@ impl<T: Real> Plan<T> {
         let mut events = Vec::new();
         let (mut balance, mut grazing) = (None, None);
         let mut integrate = || -> Result<(), Status> {
-            let mut run =
-                self.integrator(std::mem::replace(known, SolverCache::new(network)), start)?;
+            let x = self.begin(network, start);
+            let cache = std::mem::replace(known, SolverCache::new(network));
+            let mut run = self.integrator(cache, x.clone(), &start.locked)?;
             let outcome = if self.audit {
-                let mut auditor = EnergyBalance::new(network, &start.x);
+                let mut auditor = EnergyBalance::new(network, &x);
                 let outcome =
                     recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
                 balance = Some(auditor.close(&run.state));

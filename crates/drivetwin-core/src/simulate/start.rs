@@ -3,12 +3,13 @@
 
 use crate::model::Name;
 use crate::network::Network;
-use crate::network::linalg::{Matrix, independent_rows, solve};
+use crate::network::linalg::{Matrix, independent_rows, is_nothing, least_norm, solve};
 use crate::network::nonlinear_torque::form;
 use crate::number::{Number, Values};
 use thiserror::Error;
 
-/// Speeds of nodes, twists of shafts, and the elements that start without slip.
+/// Speeds of nodes, twists of shafts, and the elements that start without slip. Gears, elements without slip
+/// and prescribed speeds determine what the stated speeds leave open.
 #[derive(Clone, Debug, Default)]
 pub struct Start<T> {
     /// Node and its speed, rad/s.
@@ -26,6 +27,9 @@ pub struct State<T> {
     pub x: Vec<T>,
     /// Indices of the friction elements without slip.
     pub locked: Vec<usize>,
+    /// Change of the independent speeds per prescribed speed, speeds × prescribed speeds: the start leaves some
+    /// to these.
+    pub driven: Matrix<T>,
 }
 
 /// Reason why a start does not define a state.
@@ -48,10 +52,14 @@ pub enum StartError {
         name: String,
     },
     /// Too few speeds.
-    #[error("the start leaves speeds undetermined: state the speed of one of {free} as well")]
+    #[error(
+        "the start leaves speeds undetermined: state the speed of {} as well, or lock an element \
+         that determines it",
+        missing.join(" and of ")
+    )]
     Undetermined {
-        /// Nodes whose speeds are not implied.
-        free: String,
+        /// Nodes whose speeds, stated as well, determine all.
+        missing: Vec<String>,
     },
     /// A one-way clutch would slip in the direction that it blocks.
     #[error("{element} starts with a slip of {slip} rad/s in the direction that it blocks")]
@@ -62,10 +70,16 @@ pub enum StartError {
         slip: f64,
     },
     /// Speeds that contradict the rigid couplings.
-    #[error("the start speed {stated} rad/s of {node:?} contradicts the others: {implied} rad/s")]
+    #[error(
+        "the start speed {stated} rad/s of {node:?} contradicts {}, with which gears make it \
+         {implied} rad/s; leave one of them out",
+        others.join(" and ")
+    )]
     Contradiction {
         /// Node.
         node: String,
+        /// Other nodes with stated speeds that determine this one.
+        others: Vec<String>,
         /// As stated.
         stated: f64,
         /// As the other speeds imply.
@@ -102,10 +116,12 @@ pub(super) fn state_of<T: Number>(
     if let Some((name, _)) = speeds.iter().chain(twists).find(infinite) {
         return Err(StartError::NotFinite { name: (*name).to_owned() });
     }
-    let mut x = speeds_of(network, speeds)?;
+    let (mut x, driven) = speeds_of(network, speeds, &indices)?;
     for (j, friction) in network.frictions.iter().enumerate().filter(|(_, f)| f.one_way) {
         let slip = form(&friction.slip, &x).re();
-        if slip.decide(|slip| slip > 1e-9) && !indices.contains(&j) {
+        let moves = |k: usize| (0..driven.rows).any(|i| !is_nothing(driven[(i, k)]));
+        let stated = !(0..driven.cols).any(moves);
+        if stated && slip.decide(|slip| slip > 1e-9) && !indices.contains(&j) {
             let slip = slip.leading();
             return Err(StartError::Overrun { element: friction.element.to_string(), slip });
         }
@@ -116,7 +132,7 @@ pub(super) fn state_of<T: Number>(
         x[network.speeds() + find("shaft", name, springs.clone())?] = twist;
     }
     settle(network, &mut x);
-    Ok(State { x, locked: indices })
+    Ok(State { x, locked: indices, driven })
 }
 
 /// Bring the twists on members without mass and dampers into balance.
@@ -132,41 +148,85 @@ fn settle<T: Number>(network: &Network<T>, x: &mut [T]) {
     }
 }
 
-/// The independent speeds, from speeds of nodes.
+/// The independent speeds, from speeds of nodes, locked elements and prescribed speeds in this order, and
+/// their change per prescribed speed.
 fn speeds_of<T: Number>(
     network: &Network<T>,
     speeds: &Stated<'_, T>,
-) -> Result<Vec<T>, StartError> {
+    locked: &[usize],
+) -> Result<(Vec<T>, Matrix<T>), StartError> {
     let nodes = &network.mechanism.nodes;
     let n = &network.coordinates.speeds;
-    let rows = speeds.iter().map(|(name, _)| find("node", name, nodes.iter()));
-    let stated = n.select_rows(&rows.collect::<Result<Vec<_>, _>>()?);
-    let mut values = Matrix::zeros(speeds.len(), 1);
-    for (i, &(_, speed)) in speeds.iter().enumerate() {
-        values[(i, 0)] = speed;
-    }
-    let keep = independent_rows(&stated);
-    let undetermined = || {
-        let free = network.coordinates.independent.iter().map(|&i| nodes[i].as_str());
-        StartError::Undetermined { free: free.collect::<Vec<_>>().join(", ") }
-    };
-    if keep.len() < network.speeds() {
-        return Err(undetermined());
-    }
-    let v = solve(stated.select_rows(&keep), values.select_rows(&keep));
-    let v = v.map_err(|_| undetermined())?;
-    let mut x = Vec::with_capacity(network.states());
-    x.extend((0..v.rows).map(|i| v[(i, 0)]));
-    for (i, &(name, speed)) in speeds.iter().enumerate() {
-        let (stated, implied) = (speed.re(), form(stated.row(i), &x).re());
-        let contradicts =
-            |stated: f64, implied: f64| (stated - implied).abs() > 1e-6 * (1.0 + stated.abs());
-        if stated.decide_with(implied, contradicts) {
-            let (stated, implied) = (stated.leading(), implied.leading());
-            return Err(StartError::Contradiction { node: name.to_owned(), stated, implied });
+    let mut stated = Vec::with_capacity(speeds.len());
+    for &(name, speed) in speeds {
+        let node = find("node", name, nodes.iter())?;
+        // The speed of a follower is no state.
+        if !network.is_follower(node) {
+            stated.push((name, n.row(node), speed));
         }
     }
-    Ok(x)
+    let given = stated.iter().map(|(_, row, _)| *row);
+    let locked = locked.iter().map(|&j| &network.frictions[j].slip[..]);
+    let prescribed = network.prescribed.iter().map(|(speed, _)| &speed[..]);
+    let first_prescribed = stated.len() + locked.len();
+    let rows: Vec<&[T]> = given.chain(locked).chain(prescribed).collect();
+    let all = matrix(&rows, network.speeds());
+    let keep = independent_rows(&all);
+    if keep.len() < network.speeds() {
+        return Err(StartError::Undetermined { missing: missing(network, &rows) });
+    }
+    let count = network.prescribed.len();
+    let mut values = Matrix::zeros(rows.len(), 1 + count);
+    for (i, (_, _, speed)) in stated.iter().enumerate() {
+        values[(i, 0)] = *speed;
+    }
+    (0..count).for_each(|k| values[(first_prescribed + k, 1 + k)] = T::of(1.0));
+    let v = solve(all.select_rows(&keep), values.select_rows(&keep));
+    let v = v.map_err(|_| StartError::Undetermined { missing: missing(network, &rows) })?;
+    let mut x = Vec::with_capacity(network.states());
+    x.extend((0..v.rows).map(|i| v[(i, 0)]));
+    for &(name, row, speed) in &stated {
+        let (stated_speed, implied) = (speed.re(), form(row, &x).re());
+        let contradicts =
+            |stated: f64, implied: f64| (stated - implied).abs() > 1e-6 * (1.0 + stated.abs());
+        if stated_speed.decide_with(implied, contradicts) {
+            return Err(StartError::Contradiction {
+                node: name.to_owned(),
+                others: determining(&stated, &keep, row),
+                stated: stated_speed.leading(),
+                implied: implied.leading(),
+            });
+        }
+    }
+    Ok((x, v.select_columns(&(1..=count).collect::<Vec<_>>())))
+}
+
+fn matrix<T: Number>(rows: &[&[T]], width: usize) -> Matrix<T> {
+    let mut all = Matrix::zeros(rows.len(), width);
+    for (i, row) in rows.iter().enumerate() {
+        all.row_mut(i).copy_from_slice(row);
+    }
+    all
+}
+
+/// Nodes whose speeds determine all together with rows over the speeds.
+fn missing<T: Number>(network: &Network<T>, rows: &[&[T]]) -> Vec<String> {
+    let nodes = &network.coordinates.independent;
+    let mut all = rows.to_vec();
+    all.extend(nodes.iter().map(|&node| network.coordinates.speeds.row(node)));
+    let kept = independent_rows(&matrix(&all, network.speeds())).into_iter();
+    let names = kept.filter_map(|row| nodes.get(row.checked_sub(rows.len())?));
+    names.map(|&node| network.mechanism.nodes[node].to_string()).collect()
+}
+
+/// Of the nodes with stated speeds that were kept, those that a row is a combination of.
+fn determining<T: Number>(stated: &[(&str, &[T], T)], keep: &[usize], row: &[T]) -> Vec<String> {
+    let kept: Vec<_> = keep.iter().filter_map(|&i| stated.get(i)).collect();
+    let rows: Vec<&[T]> = kept.iter().map(|(_, row, _)| *row).collect();
+    let target = matrix(&[row], row.len()).transposed();
+    let weights = least_norm(&matrix(&rows, row.len()).transposed(), &target);
+    let counts = |i: &usize| weights[(*i, 0)].re().decide(|weight| weight.abs() > 1e-9);
+    (0..kept.len()).filter(counts).map(|i| format!("that of {:?}", kept[i].0)).collect()
 }
 
 /// Index of a name among the known ones.

@@ -235,6 +235,14 @@ impl<T: Real> Inputs<T> {
         start + rate * (self.knot(i) - self.knot(i - 1))
     }
 
+    /// Value of an input at the start.
+    pub fn start_value(&self, input: usize) -> T {
+        match &self.sines[input] {
+            Some(sine) => sine_series(sine, T::of(self.knot(0)))[0],
+            None => self.line(0, input)[0],
+        }
+    }
+
     /// Return true if all inputs are linear within every segment.
     pub fn is_sampled(&self) -> bool {
         self.sines.iter().all(Option::is_none)
