@@ -4,7 +4,7 @@
 
 use super::constraints::{Coordinates, force_map};
 use super::linalg::{Matrix, independent_rows, least_norm, solve};
-use crate::number::Number;
+use crate::number::{Number, Values};
 
 /// Motion under held speeds: `A a + B τ = f`, `G a = g`, without `g` zero.
 ///
@@ -90,8 +90,7 @@ impl<T: Number> ConstraintSolver<'_, T> {
         f: &Matrix<T>,
         g: Option<&Matrix<T>>,
     ) -> Option<(Coordinates<T>, Matrix<T>)> {
-        let all: Vec<usize> = (0..self.inertia.rows).collect();
-        let left = Coordinates::under(self.rows.select_rows(kept), &all)?;
+        let left = Coordinates::under(self.rows.select_rows(kept), &self.lightest_first())?;
         let forces = match &self.acting {
             Some(_) => force_map(self.acting(kept).transposed(), &left)?.transposed(),
             None => left.speeds.transposed(),
@@ -111,6 +110,24 @@ impl<T: Number> ConstraintSolver<'_, T> {
             acceleration.subtract_from_row(speed, given.row(i), T::of(-1.0));
         }
         Some((left, acceleration))
+    }
+
+    /// Speeds by their inertia: those of light members follow, as they lose fewer digits of the momentum.
+    fn lightest_first(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.inertia.rows).collect();
+        let heavier = |i: usize, j: usize| {
+            let [i, j] = [i, j].map(|k| self.inertia[(k, k)].re().magnitude());
+            i.decide_with(j, |i, j| i > j)
+        };
+        for end in 1..order.len() {
+            for i in (1..=end).rev() {
+                if !heavier(order[i - 1], order[i]) {
+                    break;
+                }
+                order.swap(i - 1, i);
+            }
+        }
+        order
     }
 
     /// Of some speeds, the force that the torques take away: `f - A a`.

@@ -105,7 +105,8 @@ impl<'a, T: Real> Integrator<'a, T> {
         let remaining = (-state.t + end).re();
         let wish = remaining.min(self.settings.max_step);
         let h = state.expand(1, wish, self.settings.accuracy(self.uses_fixed_step));
-        if underflows(h, end) && h < remaining {
+        let lost = underflows(h, end) || (h < wish && self.progress.shorten().is_err());
+        if lost && h < remaining {
             return Err(Status::StepTooSmall { time: state.time() });
         }
         let event = match self.progress.is_stalled() {

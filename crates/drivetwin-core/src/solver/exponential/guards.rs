@@ -161,6 +161,18 @@ impl<L: KernelFloat, const N: usize> Propagator<L, N> {
                 }
                 [speed, value]
             }
+            Bound::Rising { limit, side, third, inputs } => {
+                let AffineForm { input: of, gain, offset } = limit;
+                let limit = input(*of).multiply_add::<F>(gain.values(), offset.values());
+                let mut rise = third.constant.values();
+                for (drive, c) in self.inputs.iter().zip(inputs) {
+                    rise = input(drive.input).multiply_add::<F>(c.values(), rise);
+                }
+                for i in 0..self.columns() {
+                    rise = third.state[i].values().fma::<F>(x[i].values(), rise);
+                }
+                [side.values().fma::<F>(value, limit), rise]
+            }
         }
     }
 
@@ -199,6 +211,19 @@ impl<L: KernelFloat, const N: usize> Propagator<L, N> {
                 self.add_states::<F, W>(&mut speeds, row, trail, from);
                 [speeds, values]
             }
+            Bound::Rising { limit, side, third, inputs } => {
+                let mut margins = [limit.offset.values(); W];
+                add::<L, V, F, W>(&mut margins, limit.gain, &ends(limit.input));
+                for k in 0..W {
+                    margins[k] = side.values().fma::<F>(values[k], margins[k]);
+                }
+                let mut rises = [third.constant.values(); W];
+                for (drive, c) in self.inputs.iter().zip(inputs) {
+                    add::<L, V, F, W>(&mut rises, *c, &ends(drive.input));
+                }
+                self.add_states::<F, W>(&mut rises, &third.state, trail, from);
+                [margins, rises]
+            }
         }
     }
 
@@ -226,7 +251,9 @@ impl<L: KernelFloat, const N: usize> Propagator<L, N> {
     /// one; one that is bounded in one sign only (a freewheel's, power through a gear) is taken to be like
     /// that, which it need not be: its release at the crest of a swing within one sample can be passed by.
     /// The magnitude of a speed near zero is not a usable scale. Its bound, to fourth order, is the
-    /// smallest Bernstein coefficient of the cubic through its values and rates.
+    /// smallest Bernstein coefficient of the cubic through its values and rates. Torques of a stiff motion are
+    /// bounded likewise: a fast motion that has not decayed shows in the rates. What inputs and limits add
+    /// to a torque at once has no rate here; it rises by a third of its rise until the inner coefficients.
     #[inline(always)]
     fn may_cross<const F: bool, const W: usize>(
         &self,
@@ -238,16 +265,23 @@ impl<L: KernelFloat, const N: usize> Propagator<L, N> {
         let [mut margin, mut value] = *before;
         for k in 0..W {
             let (margin_after, value_after) = (after[0][k], after[1][k]);
-            let left = if let Bound::Within { .. } = self.guards[place].bound {
-                let rise = (value_after - value).magnitude();
-                let size = value.magnitude().larger(value_after.magnitude());
-                let chord_deviation = self.chord_deviation[0]
-                    .values()
-                    .fma::<F>(rise, self.chord_deviation[1].values() * size);
-                margin.smaller(margin_after) - chord_deviation
-            } else {
+            let corners = || {
                 let corners = (margin + value).smaller(margin_after - value_after);
                 corners.smaller(margin).smaller(margin_after)
+            };
+            let left = match self.guards[place].bound {
+                Bound::Within { .. } => {
+                    let rise = (value_after - value).magnitude();
+                    let size = value.magnitude().larger(value_after.magnitude());
+                    let chord_deviation = self.chord_deviation[0]
+                        .values()
+                        .fma::<F>(rise, self.chord_deviation[1].values() * size);
+                    margin.smaller(margin_after) - chord_deviation
+                }
+                Bound::Above(_) => corners(),
+                Bound::Rising { .. } => {
+                    corners() - (margin_after - margin).magnitude().times(1.0 / 3.0)
+                }
             };
             fallen[k] = fallen[k].either_negative(left);
             (margin, value) = (margin_after, value_after);

@@ -6,7 +6,7 @@ use crate::network::smooth_law::{AffineForm, MAX_INPUTS, SmoothLaw, normal_load}
 use crate::network::{Branch, GearState, Network, NonlinearTorque, RowId};
 use crate::number::{KernelFloat, Number};
 use crate::solver::exponential::propagator::{
-    Bound, MANY, MAX_ACTIVE, MAX_GUARDS, MAX_STATES, Propagator, SampleGuard, SizedPropagator,
+    MANY, MAX_ACTIVE, MAX_STATES, Propagator, SizedPropagator, Watched,
 };
 use crate::solver::exponential::propagator_cache::PropagatorCache;
 use crate::solver::exponential::propagator_cache::PropagatorKey;
@@ -156,12 +156,14 @@ impl<T: Number> HybridState<'_, T> {
         let mut operators = Propagator::build(self.network, &self.mode, active, laws, waves, h)?;
         self.guard_frictions(active, h, &mut operators);
         self.guard_gears(active, h, &mut operators);
-        let bounded = |guard: &SampleGuard<T, N>| matches!(guard.bound, Bound::Within { .. });
         let waves = waves.iter().any(Option::is_some);
         let unwatched = operators.guards.is_empty() && operators.loads.is_empty();
-        let watched = !operators.is_stiff || !operators.guards.iter().any(bounded);
-        let sound = watched && (!waves || (unwatched && active.is_empty()));
-        (sound && operators.guards.len() <= MAX_GUARDS).then_some(operators)
+        let sound = !waves || (unwatched && active.is_empty());
+        (sound && !operators.is_overfull).then_some(operators)
+    }
+
+    fn watched<'w>(&'w self, active: &'w [usize], row: &'w [T], h: f64) -> Watched<'w, T> {
+        Watched { network: self.network, mode: &self.mode, active, row, h }
     }
 
     fn guard_frictions<const N: usize>(
@@ -188,7 +190,11 @@ impl<T: Number> HybridState<'_, T> {
                     let mut limit = load.map(|v| v * mu);
                     limit.offset += if row.one_way { TORQUE_ATOL } else { 0.0 };
                     if let Some(torque) = self.mode.holding_torque(RowId::Friction(j)) {
-                        operators.guard_torque(self.network, active, torque, limit, !row.one_way);
+                        operators.guard_torque(
+                            &self.watched(active, torque, h),
+                            limit,
+                            !row.one_way,
+                        );
                     }
                 }
                 FrictionState::Slipping { sign } if !active.contains(&j) => {
@@ -215,7 +221,7 @@ impl<T: Number> HybridState<'_, T> {
             let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
             let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
             let limit = constant(-gear.loss.threshold() * side + TORQUE_ATOL);
-            operators.guard_torque(self.network, active, &power, limit, false);
+            operators.guard_torque(&self.watched(active, &power, h), limit, false);
             let speed = scaled(&gear.speed, sign);
             operators.guard_speed(self.network, &self.mode, active, &speed, h);
         }

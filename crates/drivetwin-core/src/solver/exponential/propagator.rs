@@ -6,7 +6,7 @@
 //! every channel there and its rate are linear in x, u, u', a. Channels count in their direction of
 //! motion: `τ = sign · φ` over `m = sign · unit · s`.
 
-use crate::network::smooth_law::{AffineForm, SmoothLaw};
+use crate::network::smooth_law::{AffineForm, MAX_INPUTS, SmoothLaw};
 use crate::network::{Mode, Network};
 use crate::number::{KernelFloat, Number, Values};
 use crate::solver::exponential::phi::{
@@ -34,6 +34,8 @@ pub struct Propagator<L, const N: usize> {
     pub states: usize,
     /// True if the motion is too fast for chords to bound torques within a sample.
     pub is_stiff: bool,
+    /// True if there is more to be watched than there is room for.
+    pub is_overfull: bool,
     /// Largest deviation of a watched torque from its chord within a sample, relative to its rise and to
     /// its size.
     pub chord_deviation: [L; 2],
@@ -137,6 +139,17 @@ pub enum Bound<L, const N: usize> {
     },
     /// A speed over the states stays above zero.
     Above([L; N]),
+    /// `limit(u) + side · form` stays above zero in a motion of any speed.
+    Rising {
+        /// The limit.
+        limit: AffineForm<L>,
+        /// 1 or -1.
+        side: L,
+        /// What `side · form` rises by in a third of a sample at the rate of the states, over these.
+        third: Form<L, N>,
+        /// The same over the inputs that act on the state.
+        inputs: [L; MAX_INPUTS],
+    },
 }
 
 impl<T: Number, const N: usize> Propagator<T, N> {
@@ -216,16 +229,31 @@ impl<T: Number, const N: usize> Propagator<T, N> {
     }
 
     /// Watch a torque over the basis (x, u, 1, φ), bounded in both signs or only the negative one.
-    pub fn guard_torque(
-        &mut self,
-        network: &Network<T>,
-        active: &[usize],
-        row: &[T],
-        limit: AffineForm<T>,
-        both: bool,
-    ) {
-        let side = T::of(if both { 1.0 } else { -1.0 });
-        self.watch(network, active, row, Bound::Within { limit, side });
+    pub fn guard_torque(&mut self, watched: &Watched<'_, T>, limit: AffineForm<T>, both: bool) {
+        let Watched { network, active, row, .. } = *watched;
+        if !self.is_stiff {
+            let side = T::of(if both { 1.0 } else { -1.0 });
+            self.watch(network, active, row, Bound::Within { limit, side });
+            return;
+        }
+        for sign in if both { &[1.0, -1.0][..] } else { &[1.0] } {
+            self.watch(network, active, row, self.rising(watched, limit, *sign));
+        }
+    }
+
+    fn rising(&self, watched: &Watched<'_, T>, limit: AffineForm<T>, side: f64) -> Bound<T, N> {
+        let Watched { network, mode, active, row, h } = *watched;
+        let mut states = [T::zero_(); N];
+        for (to, &c) in states.iter_mut().zip(row).take(network.states()) {
+            *to = c * side;
+        }
+        let third = over_basis::<T, false, N>(network, mode, &states, h / 3.0);
+        let mut inputs = [T::zero_(); MAX_INPUTS];
+        for (to, drive) in inputs.iter_mut().zip(&self.inputs) {
+            *to = third[network.first_input() + drive.input];
+        }
+        let third = Form::over(network, active, &[T::of(1.0); MAX_ACTIVE], &third);
+        Bound::Rising { limit, side: T::of(side), third, inputs }
     }
 
     /// Watch a speed over the states, which must stay above zero, over samples of length `h` [s].
@@ -247,6 +275,10 @@ impl<T: Number, const N: usize> Propagator<T, N> {
 
     fn watch(&mut self, network: &Network<T>, active: &[usize], row: &[T], bound: Bound<T, N>) {
         let place = self.guards.len();
+        if place >= MAX_GUARDS {
+            self.is_overfull = true;
+            return;
+        }
         for drive in &mut self.inputs {
             drive.guards[place] =
                 row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
@@ -405,6 +437,7 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         .map(T::promote);
         Self {
             states: n,
+            is_overfull: false,
             is_stiff: reach.decide(|reach| reach > MAX_SPECTRAL_STEP_LINEAR),
             chord_deviation,
             signs: [none; MAX_ACTIVE],
@@ -510,6 +543,17 @@ fn over_basis<T: Number, const F: bool, const N: usize>(
         *entry *= scale;
     }
     out
+}
+
+/// A torque to be watched over samples of length `h` [s] in a mode with the channels `active`.
+#[derive(Clone, Copy)]
+pub struct Watched<'w, T> {
+    pub network: &'w Network<T>,
+    pub mode: &'w Mode<T>,
+    pub active: &'w [usize],
+    /// Torque over the basis.
+    pub row: &'w [T],
+    pub h: f64,
 }
 
 /// Operators for the number of states at hand.

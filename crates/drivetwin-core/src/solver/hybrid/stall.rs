@@ -12,6 +12,9 @@ const PROGRESS_WINDOW: usize = 1000;
 /// Steps over which a run must advance by at least [`MIN_ADVANCE_OF_STEPS`].
 const STEP_WINDOW: usize = 10_000;
 
+/// Steps of a run that the motion itself ends, neither an event nor a sample; some seconds of work.
+const MAX_STEPS: usize = 2_000_000;
+
 /// Counters of the advance of a run over its last steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StallDetector {
@@ -21,6 +24,8 @@ pub(crate) struct StallDetector {
     events: Window,
     /// Present window of steps.
     steps: Window,
+    /// Steps so far that the motion ended.
+    shortened: usize,
 }
 
 /// Events or steps over which the advance of a run is measured.
@@ -55,7 +60,13 @@ pub(crate) fn underflows(h: f64, end: f64) -> bool {
 impl StallDetector {
     /// Create the detector of a run that starts at `time` [s].
     pub fn from(time: f64) -> Self {
-        Self { stalled: 0, events: Window::from(time), steps: Window::from(time) }
+        Self { stalled: 0, events: Window::from(time), steps: Window::from(time), shortened: 0 }
+    }
+
+    /// Count a step that the motion ended; a run that is too stiff for steps has too many of them.
+    pub fn shorten(&mut self) -> Result<(), Stall> {
+        self.shortened += 1;
+        if self.shortened > MAX_STEPS { Err(Stall::TooSmall) } else { Ok(()) }
     }
 
     /// Return true if events at one instant do not end.
