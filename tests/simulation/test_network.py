@@ -119,7 +119,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
     "contradictory start": (
         [inertia("a"), gear("g", "a", "b", 2.0)],
         Start({"a": 1.0, "b": 1.0}),
-        'the start speed 1 rad/s of "b" contradicts the others: 0.5 rad/s',
+        'the start speed 1 rad/s of "b" contradicts that of "a", .* make it 0.5 rad/s',
     ),
     "unknown node": (PAIR, Start({"a": 0.0, "q": 0.0}), 'node "q" is unknown; known are a, b'),
     "unknown element": (

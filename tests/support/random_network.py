@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Random networks with one-way clutches, prescribed speeds, starting locks and inertias of any size."""
+"""Random networks: one-way clutches, prescribed speeds, starting locks, inertias of any size."""
 
 from __future__ import annotations
 
@@ -43,6 +43,15 @@ def draw_network(seed: int) -> RandomNetwork:
     return _Draw(np.random.default_rng(seed)).network()
 
 
+def draw_plain_network(seed: int) -> RandomNetwork:
+    """Draw a network that another program solves easily.
+
+    Inertias between 0.05 and 5 kg m^2, torques, dampened shafts, clutches of constant friction and
+    one-way clutches.
+    """
+    return _Draw(np.random.default_rng(seed)).plain_network()
+
+
 class _Draw:
     """Elements and inputs drawn one after the other."""
 
@@ -71,6 +80,42 @@ class _Draw:
         slipping = [e["name"] for e in self.elements if e["type"] in ("clutch", "one_way_clutch")]
         locked = tuple(name for name in slipping if rng.random() < 0.3)
         return RandomNetwork(self.elements, self.inputs, self.speeds, locked)
+
+    def plain_network(self) -> RandomNetwork:
+        """Draw a network for another program."""
+        rng = self.rng
+        self.times = np.linspace(0.0, SECONDS, 5)
+        for node in self.nodes:
+            self.add("inertia", node=node, inertia=float(rng.uniform(0.05, 5.0)))
+        self.one_way()
+        for draw in rng.choice(4, size=int(rng.integers(1, 6))):
+            [self.one_way, self.plain_clutch, self.plain_spring, self.plain_torque][draw]()
+        slipping = [e["name"] for e in self.elements if e["type"] in ("clutch", "one_way_clutch")]
+        locked = tuple(name for name in slipping if rng.random() < 0.2)
+        for element in self.elements:
+            element.pop("clutch", None)
+        needed = {e.get("pressure") or e.get("input") for e in self.elements}
+        inputs = {name: one for name, one in self.inputs.items() if name in needed}
+        return RandomNetwork(self.elements, inputs, self.speeds, locked)
+
+    def plain_clutch(self) -> None:
+        """Add a clutch of constant friction, μ = 0.1."""
+        a, b = self.flanges()
+        pressure = self.input(f"P {len(self.elements)}", self.rng.uniform(0.0, 500.0, 5))
+        law = {"friction": {"slip": [0.0], "mu": [0.1]}, "gain": 1.0, "p0": 0.0, "peak": 1.0}
+        self.add("clutch", a=a, b=b, **law, pressure=pressure, drum_inertia=0.0)
+
+    def plain_spring(self) -> None:
+        """Add a damped shaft."""
+        a, b = self.flanges()
+        self.add(
+            "spring_damper", a=a, b=b, stiffness=float(self.rng.uniform(50.0, 500.0)), damping=2.0
+        )
+
+    def plain_torque(self) -> None:
+        """Add a torque source."""
+        name = self.input(f"T {len(self.elements)}", self.rng.uniform(-50.0, 50.0, 5))
+        self.add("torque", node=str(self.rng.choice(self.nodes)), input=name)
 
     def add(self, kind: str, **fields: object) -> None:
         """Add an element, named by its type and number."""
@@ -119,7 +164,7 @@ class _Draw:
         )
 
     def one_way(self) -> None:
-        """Add a one-way clutch, mostly free to slip as it starts, at times with a clutch beside it."""
+        """Add a one-way clutch, mostly free to slip as it starts, at times beside a clutch."""
         a, b = self.flanges()
         slip = self.speeds.get(a, 0.0) - self.speeds.get(b, 0.0)
         if slip > 0.0 and self.rng.random() < 0.95:

@@ -239,7 +239,7 @@ class Accuracy:
 class Event:
     """A change of friction mode: `kind` is lock, break_away, reverse, fill, vent or impulse.
 
-    An impulse at the start of a run loses `energy` [J] in its element; the energy of other kinds is 0.
+    An impulse at the start of a run loses `energy` [J] in its element; other kinds lose none.
     """
 
     time: float
@@ -254,8 +254,8 @@ class EnergyAudit:
     converter + impulse + error.
 
     `impulse` is lost where the start of the run stops elements or sets speeds at once; the events
-    of this kind have its parts. `gear_loss` is negative where the `paper` law creates energy; `created` is the sum of those
-    negative parts, as a positive number.
+    of this kind have its parts. `gear_loss` is negative where the `paper` law creates energy;
+    `created` is the sum of those negative parts, as a positive number.
     """
 
     source: float

@@ -68,7 +68,9 @@ impl<T: Number> Network<T> {
     /// Impulse that meets a demand; it acts through lossy gears as torques do in the states of `key`.
     pub fn impulse(&self, key: ModeKey, demand: Demand<'_, T>) -> Result<Impulse<T>, ImpulseFault> {
         let motion = self.motion_of(key).ok_or(ImpulseFault::Undetermined)?;
-        let mut rows = self.blocking(&motion, demand)?;
+        let all = (0..self.frictions.len()).map(RowId::Friction);
+        let one_way: Vec<RowId> = all.filter(|&row| self.is_one_way(row)).collect();
+        let mut rows = self.blocking(&motion, demand, &one_way, OVERRUN_RTOL)?;
         let excess = self.excess(&rows, demand.speeds, demand.prescribed);
         let change = self.hold(&motion, &rows).stop(&excess).ok_or(ImpulseFault::Undetermined)?;
         let after: Vec<T> = (0..self.speeds()).map(|i| demand.speeds[i] + change[(i, 0)]).collect();
@@ -95,23 +97,37 @@ impl<T: Number> Network<T> {
         excess
     }
 
+    /// Refuse prescribed accelerations [rad/s²] that one of the one-way clutches at rest blocks, whatever
+    /// gives way; `rtol` is relative to the largest acceleration and 1 rad/s².
+    pub fn check_forced(
+        &self,
+        one_way: &[RowId],
+        prescribed: &[T],
+        rtol: f64,
+    ) -> Result<(), ImpulseFault> {
+        let Some(motion) = self.motion_of(ModeKey::default()) else { return Ok(()) };
+        let speeds = vec![T::zero_(); self.speeds()];
+        let demand = Demand { rows: &[], speeds: &speeds, prescribed };
+        self.blocking(&motion, demand, one_way, rtol).map(drop)
+    }
+
     /// Elements that together hold the speed of a row: of the rows `among` and of the prescribed speeds those
     /// that the row is a combination of.
-    pub fn holders_of(&self, row: RowId, among: &[RowId]) -> Vec<String> {
+    fn holders_of(&self, row: RowId, among: &[RowId]) -> Vec<String> {
         let Some(motion) = self.motion_of(ModeKey::default()) else { return Vec::new() };
         let response = self.response(&self.hold(&motion, among), &self.hold(&motion, &[row]));
         response.map_or(Vec::new(), |(_, multipliers)| self.named(among, &multipliers))
     }
 
-    /// The rows of a demand and the one-way clutches that block: the dual active-set method of Goldfarb and
+    /// The rows of a demand and those of the one-way clutches that block: the dual active-set method of Goldfarb and
     /// Idnani (1983), which takes in the most violated condition and releases those whose impulse would pull.
     fn blocking(
         &self,
         motion: &Motion<T>,
         demand: Demand<'_, T>,
+        one_way: &[RowId],
+        rtol: f64,
     ) -> Result<Vec<RowId>, ImpulseFault> {
-        let all = (0..self.frictions.len()).map(RowId::Friction);
-        let one_way: Vec<RowId> = all.filter(|row| self.is_one_way(*row)).collect();
         let mut rows = demand.rows.to_vec();
         if one_way.is_empty() {
             return Ok(rows);
@@ -124,7 +140,7 @@ impl<T: Number> Network<T> {
             speeds: speeds.map(|(i, &v)| v + change[(i, 0)]).collect(),
         };
         let mut left = 4 * (one_way.len() + 1) * (one_way.len() + 1);
-        while let Some(row) = self.most_overrun(&one_way, &pushing) {
+        while let Some(row) = self.most_overrun(one_way, &pushing, rtol) {
             if demand.rows.contains(&row) {
                 let firm = one_way.iter().filter(|other| **other != row).copied();
                 let firm: Vec<RowId> = firm.filter(|other| demand.rows.contains(other)).collect();
@@ -139,12 +155,12 @@ impl<T: Number> Network<T> {
     }
 
     /// The one-way clutch with the largest slip in its blocked direction.
-    fn most_overrun(&self, one_way: &[RowId], pushing: &Pushing<T>) -> Option<RowId> {
+    fn most_overrun(&self, one_way: &[RowId], pushing: &Pushing<T>, rtol: f64) -> Option<RowId> {
         let mut worst: Option<(T::Values, RowId)> = None;
         for &row in one_way.iter().filter(|row| pushing.rows.iter().all(|(p, _)| p != *row)) {
             let slip = form(self.slip_of(row), &pushing.speeds).re();
             let least = worst.map_or(T::Values::zero_(), |(slip, _)| slip);
-            if self.slips(row, &pushing.speeds, OVERRUN_RTOL)
+            if self.slips(row, &pushing.speeds, rtol)
                 && slip.decide_with(least, |slip, least| slip > least)
             {
                 worst = Some((slip, row));

@@ -134,7 +134,10 @@ impl Sets<'_> {
         let width = self.parameters.len();
         for (i, name) in self.parameters.iter().enumerate() {
             let value = T::from_lanes(|place| self.sets[of(place) * width + i]);
-            *place(&mut model, &mut start, name).expect("names that were checked") = value;
+            // Unknown names have been refused.
+            if let Some(place) = place(&mut model, &mut start, name) {
+                *place = value;
+            }
         }
         (model, start)
     }
@@ -193,7 +196,8 @@ impl Work<'_> {
         self.run_all(&mut jobs);
         let mut result = Batch::default();
         for job in jobs {
-            result.outcomes.push(job.outcome.expect("every job is done in the end"));
+            let interrupted = Outcome::Refused(SimulateError::Interrupted);
+            result.outcomes.push(job.outcome.unwrap_or(interrupted));
             result.events.push(job.events.len() as u32);
             result.last_lock.push(last_lock(&job.events).unwrap_or(f64::NAN));
         }

@@ -93,7 +93,8 @@ pub fn dual_clutch_batch_sensitivities(
     let mut passes = Vec::new();
     passes.resize_with(sets.count(), || None);
     share_out(threads, passes.iter_mut().enumerate(), |(i, pass)| *pass = Some(run(i)));
-    let passes = passes.into_iter().map(|pass| pass.expect("every run is done")).collect();
+    let interrupted = || Err(SimulateError::Interrupted);
+    let passes = passes.into_iter().map(|pass| pass.unwrap_or_else(interrupted)).collect();
     Ok(collect_runs(passes, keep.size(outputs.len(), grid.len()), by.len()))
 }
 

@@ -30,6 +30,9 @@ pub enum SimulateError {
         "a gear of the driveline is self-locking: its efficiency leaves the motion undetermined"
     )]
     Undetermined,
+    /// The caller asked for the end before the run had begun.
+    #[error("interrupted")]
+    Interrupted,
     /// The grid.
     #[error("the time grid must be finite and increase, with at least two points (point {index})")]
     Grid {

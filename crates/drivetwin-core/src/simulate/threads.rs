@@ -17,7 +17,7 @@ struct Helpers {
 
 static HELPERS: Mutex<Vec<Helpers>> = Mutex::new(Vec::new());
 
-/// Do `work` to every item, on so many threads at most (0: as many as there are processors). The calling
+/// Do `work` to every item, or to fewer where the call is interrupted, on so many threads at most (0: as many as there are processors). The calling
 /// one is among them: it stays where it runs, and the scheduler sees at once that the others belong
 /// elsewhere, which it would take milliseconds to find out of threads that are all woken.
 pub(super) fn share_out<I>(threads: usize, items: I, work: impl Fn(I::Item) + Sync)
@@ -29,7 +29,9 @@ where
     let (items, token) = (Mutex::new(items), token());
     let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
     let take = || {
-        while let Some(item) = next() {
+        while !asks()
+            && let Some(item) = next()
+        {
             work(item);
         }
     };

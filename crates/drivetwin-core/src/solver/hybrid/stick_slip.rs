@@ -4,7 +4,7 @@
 
 use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::nonlinear_torque::form;
-use crate::network::{Branch, GearState, Mode, ModeKey, RowId};
+use crate::network::{Branch, GearState, ImpulseFault, Mode, ModeKey, RowId};
 use crate::number::{Number, Values, evaluate};
 use crate::solver::hybrid::active_set::ActiveSet;
 use crate::solver::hybrid::event::{FrictionState, signum_nonneg};
@@ -37,14 +37,14 @@ impl<T: Number> HybridState<'_, T> {
     pub(crate) fn decide(&mut self, overloaded: Option<(RowId, f64)>) -> Result<(), Status> {
         self.evaluate_at_t_plus();
         let candidates = self.at_zero_speed();
+        self.check_forced(&candidates)?;
         let mut trial = self.assignment();
         match overloaded {
             // After an overload, rows that have just moved off or are at their capacity keep that state.
-            Some((row, sign)) => {
-                self.refuse_blocked(row, sign, &candidates)?;
+            Some((row, sign)) if !self.is_blocked(row, sign) => {
                 self.release(&mut trial, row, sign, &candidates);
             }
-            None => candidates.iter().for_each(|&row| trial.rest(row)),
+            _ => candidates.iter().for_each(|&row| trial.rest(row)),
         }
         let mut visited: Vec<ActiveSet> = Vec::new();
         loop {
@@ -63,7 +63,9 @@ impl<T: Number> HybridState<'_, T> {
                 }
                 return Ok(());
             };
-            if visited.contains(&trial) || visited.len() > MAX_TRIALS {
+            let blocked =
+                matches!(fault, Violation::TorqueBound(row, sign) if self.is_blocked(row, sign));
+            if blocked || visited.contains(&trial) || visited.len() > MAX_TRIALS {
                 if self.enumerate_active_sets(&candidates, None) {
                     return Ok(());
                 }
@@ -75,7 +77,6 @@ impl<T: Number> HybridState<'_, T> {
             visited.push(trial.clone());
             match fault {
                 Violation::TorqueBound(row, sign) => {
-                    self.refuse_blocked(row, sign, &candidates)?;
                     self.release(&mut trial, row, sign, &candidates);
                 }
                 Violation::SlipDirection(row) => {
@@ -222,17 +223,28 @@ impl<T: Number> HybridState<'_, T> {
         }
     }
 
-    /// Refuse to release a one-way clutch in its blocked direction, which only prescribed speeds can demand.
-    fn refuse_blocked(&self, row: RowId, sign: f64, candidates: &[RowId]) -> Result<(), Status> {
-        if sign < 0.0 || !self.network.is_one_way(row) {
+    /// Return true if a row cannot be released in a direction: prescribed speeds can ask for it where another
+    /// row gives way to them.
+    fn is_blocked(&self, row: RowId, sign: f64) -> bool {
+        sign > 0.0 && self.network.is_one_way(row)
+    }
+
+    /// Refuse prescribed speeds that a one-way clutch at rest blocks, whatever gives way.
+    fn check_forced(&self, candidates: &[RowId]) -> Result<(), Status> {
+        let network = self.network;
+        let one_way = candidates.iter().copied().filter(|&row| network.is_one_way(row));
+        let one_way: Vec<RowId> = one_way.collect();
+        if network.prescribed.is_empty() || one_way.is_empty() {
             return Ok(());
         }
-        let others = candidates.iter().copied();
-        let firm: Vec<RowId> =
-            others.filter(|&other| other != row && self.network.is_one_way(other)).collect();
-        let with = self.network.holders_of(row, &firm);
-        let element = self.network.element_of(row).to_owned();
-        Err(Status::Blocked { time: self.time(), element, with })
+        let inputs = &self.inputs_plus;
+        let rates: Vec<T> = network.prescribed.iter().map(|&(_, input)| inputs[input][1]).collect();
+        match network.check_forced(&one_way, &rates, FORCED_ACCELERATION_RTOL) {
+            Err(ImpulseFault::Conflict { element, with }) => {
+                Err(Status::Blocked { time: self.time(), element, with })
+            }
+            _ => Ok(()),
+        }
     }
 
     fn assignment(&self) -> ActiveSet {

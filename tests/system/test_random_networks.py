@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: MIT
+"""Random networks: every run ends, no one-way clutch overruns, the energy balance closes."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize
+
+from drivetwin.errors import InputError
+from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.network import NetworkRun, Output, Start, simulate
+from tests.support.random_network import (
+    SECONDS,
+    RandomNetwork,
+    draw_network,
+    draw_plain_network,
+)
+
+GRID: FloatArray = np.linspace(0.0, SECONDS, 101)
+OVERRUN = 1e-9
+"""Largest slip of a one-way clutch in its blocked direction, relative to the largest speed."""
+BALANCE = 1e-8
+"""Largest error of the energy balance, relative to the largest energy of the run."""
+LONGEST = 10.0
+"""Processor time of a run [s]."""
+AGREEMENT = 5e-3
+"""Distance to the regularised solution, relative to the largest speed."""
+
+
+def run(network: RandomNetwork, *, audit: bool) -> NetworkRun | None:
+    """Simulate; None where the start is refused."""
+    slips: list[Output] = [("slip", name) for name in network.one_way_clutches]
+    speeds: list[Output] = [("speed", node) for node in network.speeds]
+    inputs = {name: Signal(*samples) for name, samples in network.inputs.items()}
+    start = Start(network.speeds, locked=network.locked)
+    try:
+        return simulate(network.elements, inputs, start, GRID, [*slips, *speeds], audit=audit)
+    except InputError as error:
+        if "in the direction that it blocks" not in str(error):
+            raise
+        return None
+
+
+def check(network: RandomNetwork, done: NetworkRun, seed: int) -> None:
+    """Compare a run with what holds for all."""
+    columns = {key: column[np.isfinite(column)] for key, column in done.columns.items()}
+    speeds = {name: c for (kind, name), c in columns.items() if kind == "speed" and c.size}
+    stated = max(abs(v) for v in network.speeds.values())
+    fastest = max([stated, *(float(np.abs(c).max()) for c in speeds.values())])
+    for (kind, name), column in columns.items():
+        overrun = float(column.max()) if kind == "slip" and column.size else 0.0
+        assert overrun <= OVERRUN * fastest, f"seed {seed}: {name} overruns by {overrun} rad/s"
+    if done.status != "completed" or done.audit is None:
+        return
+    audit = done.audit
+    kinetic = sum(0.5 * network.inertias[n] * float((c**2).max()) for n, c in speeds.items())
+    work = [audit.source, audit.stored, audit.friction, audit.load, audit.shaft, audit.impulse]
+    size = max([kinetic, *map(abs, work)])
+    assert abs(audit.error) <= BALANCE * size, f"seed {seed}: {audit}"
+    lost = sum(event.energy for event in done.events if event.kind == "impulse")
+    assert lost == pytest.approx(audit.impulse, rel=1e-9, abs=1e-12 * size), f"seed {seed}"
+
+
+def survey(seeds: range) -> dict[str, int]:
+    """Run the networks of seeds with and without energy balance; count the outcomes."""
+    outcomes: dict[str, int] = {}
+    for seed in seeds:
+        network = draw_network(seed)
+        for audit in (True, False):
+            began = time.process_time()
+            done = run(network, audit=audit)
+            assert time.process_time() - began < LONGEST, f"seed {seed} takes too long"
+            outcome = "refused" if done is None else done.status.split(" at ")[0]
+            outcomes[outcome] = outcomes.get(outcome, 0) + 1
+            if done is not None:
+                check(network, done, seed)
+    return outcomes
+
+
+def test_random_networks_end_without_overrun_and_close_their_balance() -> None:
+    outcomes = survey(range(200))
+    assert outcomes["completed"] > 350, outcomes
+
+
+@pytest.mark.exhaustive
+@pytest.mark.timeout(20_000)
+@pytest.mark.parametrize("block", range(20))
+def test_many_random_networks(block: int) -> None:
+    survey(range(1000 * block, 1000 * (block + 1)))
+
+
+def test_runs_do_not_depend_on_threads_or_repetition() -> None:
+    networks = [draw_network(seed) for seed in range(300, 340)]
+
+    def once(network: RandomNetwork) -> tuple[object, ...]:
+        done = run(network, audit=False)
+        if done is None:
+            return ()
+        return (done.status, done.events, *(column.tobytes() for column in done.columns.values()))
+
+    alone = [once(network) for network in networks]
+    assert alone == [once(network) for network in networks]
+    with ThreadPoolExecutor(2) as pool:
+        assert alone == list(pool.map(once, networks))
+
+
+def regularised(network: RandomNetwork) -> FloatArray:
+    """Speeds (nodes, n) of a plain network with steep laws in place of locks and stops."""
+    nodes = list(network.speeds)
+    inertia = np.array([network.inertias[node] for node in nodes])
+    rows = {e["name"]: _row(e, nodes) for e in network.elements if "a" in e}
+    springs = [e for e in network.elements if e["type"] == "spring_damper"]
+
+    def torques(t: float, speeds: FloatArray, twists: FloatArray) -> FloatArray:
+        total = np.zeros(len(nodes))
+        for e in network.elements:
+            if e["type"] == "torque":
+                total[nodes.index(e["node"])] += np.interp(t, *network.inputs[e["input"]])
+            elif e["type"] == "clutch":
+                slip = rows[e["name"]] @ speeds
+                capacity = 0.1 * np.interp(t, *network.inputs[e["pressure"]])
+                total -= rows[e["name"]] * capacity * np.clip(slip / 1e-3, -1.0, 1.0)
+            elif e["type"] == "one_way_clutch":
+                total -= rows[e["name"]] * 1e5 * max(0.0, float(rows[e["name"]] @ speeds))
+        for e, twist in zip(springs, twists, strict=True):
+            rate = rows[e["name"]] @ speeds
+            total -= rows[e["name"]] * (e["stiffness"] * twist + e["damping"] * rate)
+        return total
+
+    def slope(t: float, state: FloatArray) -> FloatArray:
+        speeds, twists = state[: len(nodes)], state[len(nodes) :]
+        rates = np.array([rows[e["name"]] @ speeds for e in springs])
+        return np.concatenate([torques(t, speeds, twists) / inertia, rates])
+
+    start = np.concatenate([_project(network, nodes, inertia, rows), np.zeros(len(springs))])
+    pieces = []
+    for begin, end in zip(GRID[:-1:25], GRID[25::25], strict=True):
+        inside = GRID[(begin <= GRID) & (end >= GRID)]
+        solved = solve_ivp(
+            slope, (begin, end), start, "LSODA", inside, rtol=1e-6, atol=1e-7, max_step=2e-3
+        )
+        start = solved.y[:, -1]
+        pieces.append(solved.y[: len(nodes), :-1])
+    return np.concatenate([*pieces, start[: len(nodes), None]], axis=1)
+
+
+def _row(element: dict[str, object], nodes: list[str]) -> FloatArray:
+    row = np.zeros(len(nodes))
+    for flange, sign in (("a", 1.0), ("b", -1.0)):
+        if element[flange] != "ground":
+            row[nodes.index(str(element[flange]))] += sign
+    return row
+
+
+def _project(
+    network: RandomNetwork, nodes: list[str], inertia: FloatArray, rows: dict[str, FloatArray]
+) -> FloatArray:
+    """Nearest speeds, by kinetic energy, with locked elements at rest and no overrun."""
+    stated = np.array([network.speeds[node] for node in nodes])
+    conditions = [{"type": "eq", "fun": lambda v, r=rows[name]: r @ v} for name in network.locked]
+    conditions += [
+        {"type": "ineq", "fun": lambda v, r=rows[name]: -(r @ v)}
+        for name in network.one_way_clutches
+        if name not in network.locked
+    ]
+    found = minimize(
+        lambda v: 0.5 * inertia @ (v - stated) ** 2,
+        stated,
+        jac=lambda v: inertia * (v - stated),
+        method="SLSQP",
+        constraints=conditions,
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def compare(seed: int) -> None:
+    """Compare a plain network with its regularised solution."""
+    network = draw_plain_network(seed)
+    done = run(network, audit=True)
+    if done is None:
+        return
+    assert done.status == "completed", f"seed {seed}: {done.status}"
+    check(network, done, seed)
+    ours = np.array([done.columns["speed", node] for node in network.speeds])
+    distance = float(np.abs(ours - regularised(network)).max())
+    assert distance <= AGREEMENT * max(1.0, float(np.abs(ours).max())), f"seed {seed}: {distance}"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_plain_networks_agree_with_a_regularised_solution(seed: int) -> None:
+    compare(seed)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.timeout(20_000)
+def test_many_plain_networks_agree_with_a_regularised_solution() -> None:
+    for seed in range(200):
+        compare(seed)
