@@ -71,8 +71,16 @@ class _Draw:
         for node in self.nodes:
             exponent = rng.uniform(-1.5, 1.0) if narrow else rng.uniform(-9.0, 8.0)
             self.add("inertia", node=node, inertia=10.0**exponent)
-        draws = [self.one_way, self.clutch, self.spring, self.gear, self.load, self.torque]
-        weights = np.array([0.3, 0.3, 0.1, 0.08, 0.1, 0.12])
+        draws = [
+            self.one_way,
+            self.clutch,
+            self.spring,
+            self.massless,
+            self.gear,
+            self.load,
+            self.torque,
+        ]
+        weights = np.array([0.3, 0.28, 0.08, 0.04, 0.08, 0.1, 0.12])
         for _ in range(int(rng.integers(1, 8))):
             draws[int(rng.choice(len(draws), p=weights))]()
         if rng.random() < 0.25:
@@ -178,7 +186,17 @@ class _Draw:
 
     def spring(self) -> None:
         """Add a shaft."""
+        self.shaft(*self.flanges())
+
+    def massless(self) -> None:
+        """Add a node without inertia between two shafts."""
         a, b = self.flanges()
+        middle = f"m{len(self.elements)}"
+        self.shaft(a, middle)
+        self.shaft(middle, b)
+
+    def shaft(self, a: str, b: str) -> None:
+        """Add a shaft between two nodes."""
         stiffness = 10.0 ** self.rng.uniform(1.0, 5.0)
         damping = float(self.rng.choice([0.0, 1e-4])) * stiffness
         self.add("spring_damper", a=a, b=b, stiffness=stiffness, damping=damping)

@@ -133,4 +133,4 @@ def to_plain(one: Scenario) -> tuple[list[tuple[str, FloatArray, FloatArray, flo
     inputs = {"engine torque": one.engine_torque, **one.pressures}
     start = one.start
     state = (start.engine_speed, start.output_speed, start.wheel_speed, start.twist, ["B2"])
-    return [(name, s.time, s.value, s.delay) for name, s in inputs.items()], state
+    return [(name, s.time, s.values, s.delay) for name, s in inputs.items()], state

@@ -60,7 +60,9 @@ def check(network: RandomNetwork, done: NetworkRun, seed: int) -> None:
     audit = done.audit
     kinetic = sum(0.5 * network.inertias[n] * float((c**2).max()) for n, c in speeds.items())
     work = [audit.source, audit.stored, audit.friction, audit.load, audit.shaft, audit.impulse]
-    size = max([kinetic, *map(abs, work)])
+    # Loads that drive and loads that brake cancel in their account.
+    pull = sum(e["constant"] for e in network.elements if e["type"] == "road_load")
+    size = max([kinetic, pull * fastest * SECONDS, *map(abs, work)])
     assert abs(audit.error) <= BALANCE * size, f"seed {seed}: {audit}"
     lost = sum(event.energy for event in done.events if event.kind == "impulse")
     assert lost == pytest.approx(audit.impulse, rel=1e-9, abs=1e-12 * size), f"seed {seed}"

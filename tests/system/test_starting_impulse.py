@@ -113,7 +113,7 @@ def test_a_prescribed_speed_against_a_one_way_clutch_is_refused_by_name(
 ) -> None:
     elements = [inertia("a"), one_way("F", "a", "ground"), driven("a")]
     done = run(elements, {"a": 0.0}, locked, w=ramp(5.0, 5.0))
-    assert done.status.startswith("F blocks at 0.000000000 s the motion that D prescribe")
+    assert done.status.startswith("F blocks at 0.000000000 s the motion that comes from D")
     assert not np.isfinite(done.columns["slip", "F"]).any()
 
 
@@ -139,7 +139,7 @@ def test_a_prescribed_speed_that_turns_against_a_one_way_clutch_ends_the_run(
 
 def test_a_strong_one_way_clutch_makes_the_weaker_clutch_slip() -> None:
     elements = [inertia("a"), inertia("b"), clutch("C", "a", "b"), one_way("F", "b", "ground")]
-    done = run([*elements, driven("a")], {"a": -5.0, "b": -5.0}, w=ramp(-5.0, 5.0), pressure=1e3)
+    done = run([*elements, driven("a")], {"a": -5.0, "b": -5.0}, w=ramp(-5.0, 5.0), pressure=2e4)
     assert done.status == "completed"
     assert done.columns["slip", "F"].max() <= 1e-9 * 5.0
     assert done.columns["speed", "b"][-1] == pytest.approx(0.0, abs=1e-9)

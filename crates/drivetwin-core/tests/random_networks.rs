@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //! Random drivelines under random pressures: every run ends, with a status where it fails; what is
-//! locked does not slip; no capacity is exceeded; the energy balance closes.
+//! locked does not slip; no one-way clutch overruns; no capacity is exceeded; the energy balance closes.
 //!
 //! `PROPTEST_CASES=10000 cargo test --release -p drivetwin-core --test random_networks` is the long
 //! form.
@@ -218,7 +218,7 @@ fn renamed(mut element: Element<f64>, name: Name) -> Element<f64> {
     element
 }
 
-/// The run of a case over so many points: slips and torques of its clutches.
+/// The run of a case over so many points: slips and torques of its clutches, slips of its one-way clutches.
 fn simulate(
     case: &Case,
     points: usize,
@@ -231,11 +231,14 @@ fn simulate(
     for (name, c) in names.iter().zip(&case.clutches) {
         signals.push((name, Signal::samples(&times, &c.pressure)));
     }
+    let one_way = case.others.iter().enumerate();
+    let one_way = one_way.filter(|(_, other)| matches!(other, RandomElement::OneWay(..)));
     let outputs: Vec<Output> = (0..case.clutches.len())
         .flat_map(|i| {
             let name = format!("clutch {i}");
             [Output::Slip(name.clone()), Output::FrictionTorque(name)]
         })
+        .chain(one_way.map(|(i, _)| Output::Slip(format!("element {i}"))))
         .collect();
     let start = Start {
         speeds: (0..4).map(|i| (NODES[i].to_owned(), case.speeds[i])).collect(),
@@ -256,6 +259,11 @@ fn check(case: &Case, trajectory: &Trajectory<f64>) {
     for column in &trajectory.columns {
         assert_eq!(column.len(), SAMPLES);
         assert!(!complete || column.iter().all(|v| v.is_finite()), "NaN without a status");
+    }
+    let slips = trajectory.columns.iter().flatten().filter(|v| v.is_finite());
+    let largest = slips.fold(50.0, |largest: f64, v| largest.max(v.abs()));
+    for overrun in &trajectory.columns[2 * case.clutches.len()..] {
+        assert!(overrun.iter().all(|&slip| slip.is_nan() || slip <= 1e-9 * largest), "{overrun:?}");
     }
     for (i, c) in case.clutches.iter().enumerate() {
         let (slip, torque) = (&trajectory.columns[2 * i], &trajectory.columns[2 * i + 1]);

@@ -27,7 +27,6 @@ mod spectral_radius;
 pub mod statics;
 
 pub use compile::{FrictionElement, LossyGear, Network};
-pub(crate) use constraint_forces::ConstraintSolver;
 pub use error::CompileError;
 pub use impulse::{Demand, Impulse, ImpulseFault};
 pub use mode::{GearBounds, GearState, Mode, ModeKey, RowId};

@@ -18,6 +18,12 @@ const CALLS: u32 = 8;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Token(Option<Arc<AtomicBool>>);
 
+impl Token {
+    fn is_raised(&self) -> bool {
+        self.0.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+}
+
 /// Question of the calling thread.
 #[derive(Clone, Copy)]
 struct Question {
@@ -71,7 +77,7 @@ pub(crate) fn with_token<R>(token: &Token, work: impl FnOnce() -> R) -> R {
 pub(crate) fn is_interrupted() -> bool {
     let calls = CALLED.get().wrapping_add(1);
     CALLED.set(calls);
-    calls.is_multiple_of(CALLS) && asks()
+    if calls.is_multiple_of(CALLS) { asks() } else { TOKEN.with_borrow(Token::is_raised) }
 }
 
 /// Ask now, where the last question is old enough.
@@ -79,7 +85,7 @@ pub(crate) fn asks() -> bool {
     TOKEN.with_borrow(|token| {
         let Some(flag) = &token.0 else { return false };
         if let Some(Question { ask, last }) = QUESTION.get()
-            && !flag.load(Ordering::Relaxed)
+            && !token.is_raised()
             && last.elapsed() >= PERIOD
         {
             QUESTION.set(Some(Question { ask, last: Instant::now() }));
@@ -87,7 +93,7 @@ pub(crate) fn asks() -> bool {
                 flag.store(true, Ordering::Relaxed);
             }
         }
-        flag.load(Ordering::Relaxed)
+        token.is_raised()
     })
 }
 
@@ -102,7 +108,7 @@ mod tests {
             std::thread::sleep(2 * PERIOD);
             (0..CALLS).any(|_| is_interrupted())
         };
-        assert!(with_interrupt(|| true, asked));
+        assert!(with_interrupt(|| true, || asked() && is_interrupted()));
         assert!(!with_interrupt(|| false, asked));
         assert!(!asked());
     }

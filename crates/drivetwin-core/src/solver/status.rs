@@ -78,8 +78,8 @@ impl fmt::Display for Status {
             }
             Self::Blocked { time, element, with } => write!(
                 f,
-                "{element} blocks at {time:.9} s the motion that {} prescribe; reverse {element} \
-                 or change that speed",
+                "{element} blocks at {time:.9} s the motion that comes from {}; reverse {element}, \
+                 change the prescribed speed or release a lock",
                 with.join(", ")
             ),
             Self::Undetermined { time, members } => write!(

@@ -13,7 +13,7 @@ const PROGRESS_WINDOW: usize = 1000;
 const STEP_WINDOW: usize = 10_000;
 
 /// Steps of a run that the motion itself ends, neither an event nor a sample; some seconds of work.
-const MAX_STEPS: usize = 2_000_000;
+const MAX_STEPS: usize = 1_000_000;
 
 /// Counters of the advance of a run over its last steps.
 #[derive(Clone, Copy, Debug)]
