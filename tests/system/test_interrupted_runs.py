@@ -88,7 +88,8 @@ def run_long_sensitivities() -> None:
     torque = Signal(times, 1400.0 + 100.0 * np.sin(times))
     pressures = {"B2": Signal(times, np.full(times.size, 1e6)), "B3": Signal(times, 0.0 * times)}
     by = ["eta", "J1", "k_o", "c_o", "J_v", "load.constant", "B2.P0", "B3.P0", "B2.mu_c", "B3.mu_c"]
-    simulate_sensitivities(MODEL, torque, pressures, START, times, [*by, *by, *by])
+    hour: FloatArray = np.linspace(0.0, 3600.0, 11)
+    simulate_sensitivities(MODEL, torque, pressures, START, hour, [*by, *by, *by])
 
 
 CALLS: dict[str, Callable[[], object]] = {

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import null_space
 from scipy.optimize import minimize
 
 from drivetwin.errors import InputError
@@ -164,21 +165,20 @@ def _project(
 ) -> FloatArray:
     """Nearest speeds, by kinetic energy, with locked elements at rest and no overrun."""
     stated = np.array([network.speeds[node] for node in nodes])
-    conditions = [{"type": "eq", "fun": lambda v, r=rows[name]: r @ v} for name in network.locked]
-    conditions += [
-        {"type": "ineq", "fun": lambda v, r=rows[name]: -(r @ v)}
-        for name in network.one_way_clutches
-        if name not in network.locked
-    ]
+    held = [rows[name] for name in network.locked]
+    free = null_space(np.array(held)) if held else np.eye(len(nodes))
+    stops = [rows[name] @ free for name in network.one_way_clutches if name not in network.locked]
+    if free.shape[1] == 0:
+        return np.zeros(len(nodes))
     found = minimize(
-        lambda v: 0.5 * inertia @ (v - stated) ** 2,
-        stated,
-        jac=lambda v: inertia * (v - stated),
+        lambda y: 0.5 * inertia @ (free @ y - stated) ** 2,
+        free.T @ stated,
+        jac=lambda y: free.T @ (inertia * (free @ y - stated)),
         method="SLSQP",
-        constraints=conditions,
+        constraints=[{"type": "ineq", "fun": lambda y, row=row: -(row @ y)} for row in stops],
         options={"ftol": 1e-14, "maxiter": 500},
     )
-    return np.asarray(found.x, dtype=np.float64)
+    return np.asarray(free @ found.x, dtype=np.float64)
 
 
 def compare(seed: int) -> None:

@@ -105,7 +105,7 @@ impl<'a, T: Real> Integrator<'a, T> {
         let remaining = (-state.t + end).re();
         let wish = remaining.min(self.settings.max_step);
         let h = state.expand(1, wish, self.settings.accuracy(self.uses_fixed_step));
-        let lost = underflows(h, end) || (h < wish && self.progress.shorten().is_err());
+        let lost = underflows(h, end) || (h < wish && !self.progress.shorten(state.time()));
         if lost && h < remaining {
             return Err(Status::StepTooSmall { time: state.time() });
         }

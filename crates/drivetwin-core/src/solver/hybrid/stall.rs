@@ -12,8 +12,10 @@ const PROGRESS_WINDOW: usize = 1000;
 /// Steps over which a run must advance by at least [`MIN_ADVANCE_OF_STEPS`].
 const STEP_WINDOW: usize = 10_000;
 
-/// Steps of a run that the motion itself ends, neither an event nor a sample; some seconds of work.
-const MAX_STEPS: usize = 1_000_000;
+/// Steps of a run that the motion itself ends, neither an event nor a sample: some seconds of work.
+const MAX_STEPS: usize = 300_000;
+/// The same for every second of the run.
+const MAX_STEPS_PER_SECOND: f64 = 1000.0;
 
 /// Counters of the advance of a run over its last steps.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +28,8 @@ pub(crate) struct StallDetector {
     steps: Window,
     /// Steps so far that the motion ended.
     shortened: usize,
+    /// Start of the run, s.
+    start: f64,
 }
 
 /// Events or steps over which the advance of a run is measured.
@@ -60,13 +64,21 @@ pub(crate) fn underflows(h: f64, end: f64) -> bool {
 impl StallDetector {
     /// Create the detector of a run that starts at `time` [s].
     pub fn from(time: f64) -> Self {
-        Self { stalled: 0, events: Window::from(time), steps: Window::from(time), shortened: 0 }
+        Self {
+            stalled: 0,
+            events: Window::from(time),
+            steps: Window::from(time),
+            shortened: 0,
+            start: time,
+        }
     }
 
-    /// Count a step that the motion ended; a run that is too stiff for steps has too many of them.
-    pub fn shorten(&mut self) -> Result<(), Stall> {
+    /// Count a step from `time` [s] on that the motion ended. Return false if the run has too many of them:
+    /// it is too stiff for steps.
+    pub fn shorten(&mut self, time: f64) -> bool {
         self.shortened += 1;
-        if self.shortened > MAX_STEPS { Err(Stall::TooSmall) } else { Ok(()) }
+        let most = (time - self.start) * MAX_STEPS_PER_SECOND;
+        self.shortened < MAX_STEPS + most as usize
     }
 
     /// Return true if events at one instant do not end.
