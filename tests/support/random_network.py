@@ -147,7 +147,8 @@ class _Draw:
         """Draw torques over the samples [N m]."""
         size = 10.0 ** self.rng.uniform(-2.0, 4.0)
         whole = self.rng.choice([-1.0, 0.0, 0.0, 1.0], self.times.size)
-        return size * np.where(self.rng.random() < 0.5, whole, self.rng.normal(size=whole.size))
+        torques = np.where(self.rng.random() < 0.5, whole, self.rng.normal(size=whole.size))
+        return np.asarray(size * torques, dtype=np.float64)
 
     def friction(self) -> dict[str, Any]:
         """Draw a friction law: constant, falling, or a table."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
-from scipy.optimize import minimize
+from scipy.optimize import LinearConstraint, minimize
 
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
@@ -171,11 +171,11 @@ def _project(
     if free.shape[1] == 0:
         return np.zeros(len(nodes))
     found = minimize(
-        lambda y: 0.5 * inertia @ (free @ y - stated) ** 2,
+        lambda y: 0.5 * float(inertia @ (free @ y - stated) ** 2),
         free.T @ stated,
         jac=lambda y: free.T @ (inertia * (free @ y - stated)),
         method="SLSQP",
-        constraints=[{"type": "ineq", "fun": lambda y, row=row: -(row @ y)} for row in stops],
+        constraints=[LinearConstraint(row[None, :], -np.inf, 0.0) for row in stops],
         options={"ftol": 1e-14, "maxiter": 500},
     )
     return np.asarray(free @ found.x, dtype=np.float64)

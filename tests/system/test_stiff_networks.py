@@ -7,6 +7,7 @@ import itertools
 import math
 import time
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ def shaft(a: str, b: str, stiffness: float = 1e5, damping: float = 10.0) -> Elem
     return {"type": "spring_damper", "name": f"shaft {a} {b}", "a": a, "b": b, **law}
 
 
-def torque(node: str) -> Element:
+def torque(node: str) -> dict[str, Any]:
     return {"type": "torque", "name": f"T {node}", "node": node, "input": "T"}
 
 
