@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! From the stated mechanism to matrices in minimal coordinates.
 
-use super::constraints::{Coordinates, coordinates};
+use super::constraints::{Coordinates, Followers, coordinates};
 use super::error::CompileError;
 use super::linalg::{Matrix, independent_rows, is_nothing, solve};
-use super::massless::Followers;
 use super::mode::{ModeKey, Motion};
 use super::nonlinear_torque::{NonlinearTorque, TorqueLaw};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};

@@ -17,6 +17,15 @@ pub struct Coordinates<T> {
     pub speeds: Matrix<T>,
 }
 
+/// Speeds and twists that members without mass follow.
+#[derive(Clone, Debug)]
+pub struct Followers<T> {
+    /// What node speeds have beside the independent ones, nodes × basis without channels.
+    pub speeds: Matrix<T>,
+    /// Twists in balance, springs × (twists, 1), where a member has springs only.
+    pub twists: Option<Matrix<T>>,
+}
+
 impl<T: Number> Coordinates<T> {
     /// Coordinates under `C ω = 0`; of the nodes the first in `order` are made dependent. `None` where rows of C
     /// depend on each other.

@@ -5,19 +5,11 @@
 //! one the sum of spring torques stays the same, and its rate gives the speed (index 2).
 
 use super::compile::Network;
+use super::constraints::Followers;
 use super::error::CompileError;
 use super::linalg::{Matrix, is_nothing, solve};
 use crate::model::mechanism::{ForceLaw, Row, SpringLaw};
 use crate::number::Number;
-
-/// Speeds and twists that members without mass follow.
-#[derive(Clone, Debug)]
-pub struct Followers<T> {
-    /// What node speeds have beside the independent ones, nodes × basis without channels.
-    pub speeds: Matrix<T>,
-    /// Twists in balance, springs × (twists, 1), where a member has springs only.
-    pub twists: Option<Matrix<T>>,
-}
 
 /// Balance of the members without mass, before they are taken out of the coordinates.
 struct Balance<'n, T> {

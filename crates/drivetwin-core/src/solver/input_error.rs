@@ -69,3 +69,39 @@ pub enum InputError {
         end: f64,
     },
 }
+
+/// Refuse values that are no signal.
+pub(super) fn check_values(name: &str, times: &[f64], values: &[f64]) -> Result<(), InputError> {
+    if times.len() != values.len() || times.len() < 2 {
+        let (name, times, values) = (name.to_owned(), times.len(), values.len());
+        return Err(InputError::Length { name, times, values });
+    }
+    match values.iter().position(|v| !v.is_finite()) {
+        Some(index) => Err(InputError::Value { name: name.to_owned(), index }),
+        None => Ok(()),
+    }
+}
+
+/// Refuse times that do not increase or do not cover the run.
+pub(super) fn check_times(
+    name: &str,
+    times: &[f64],
+    start: f64,
+    end: f64,
+) -> Result<(), InputError> {
+    let ordered = |i: usize| {
+        times[i].is_finite()
+            && (i == 0 || times[i] >= times[i - 1])
+            && (i < 2 || times[i] > times[i - 2])
+    };
+    let name = name.to_owned();
+    if let Some(index) = (0..times.len()).find(|&i| !ordered(i)) {
+        return Err(InputError::Time { name, index });
+    }
+    let (from, to) = (times[0], times[times.len() - 1]);
+    let slack = 1e-9 * (1.0 + to.abs());
+    if start < from - slack || end > to + slack || start.is_nan() || end.is_nan() {
+        return Err(InputError::Span { name, from, to, start, end });
+    }
+    Ok(())
+}

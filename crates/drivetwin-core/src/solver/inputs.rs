@@ -2,7 +2,8 @@
 //! Inputs over time, linear between samples.
 
 use crate::number::{Real, Series};
-use crate::solver::input_error::InputError;
+use crate::solver::input_error::{InputError, check_times, check_values};
+use crate::solver::sine::{Sine, Wave, fill_sine, sine_series, wave};
 
 /// Time history of one input.
 #[derive(Clone, Copy, Debug)]
@@ -66,17 +67,6 @@ pub struct SampleRange {
     pub count: usize,
 }
 
-/// A sine as operators take it, by its value and its rate at the start of a segment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wave {
-    /// Angular frequency, rad/s.
-    pub omega: f64,
-    /// Mean.
-    pub offset: f64,
-    /// Amplitude.
-    pub amplitude: f64,
-}
-
 /// Fewest segments of equal length that make operators worth while.
 const WORTH_WHILE: usize = 8;
 
@@ -85,9 +75,6 @@ const STRETCH: usize = 64;
 
 /// Point number of a knot outside the grid.
 pub const NO_POINT: usize = usize::MAX;
-
-/// Offset, amplitude, angular frequency [rad/s], phase [rad].
-type Sine<T> = (T, T, f64, f64);
 
 impl<T: Real> Inputs<T> {
     /// Join named signals, in the order the network numbers its inputs, over the span
@@ -398,73 +385,9 @@ fn equal_lengths(knots: &[f64]) -> Vec<u32> {
     equal
 }
 
-fn wave<T: Real>(&(offset, amplitude, omega, _): &Sine<T>) -> Wave {
-    Wave { omega, offset: offset.re(), amplitude: amplitude.re() }
-}
-
-/// Values and rates of a sine at the start of all segments.
-fn fill_sine<'l, T: Real>(
-    lines: impl Iterator<Item = &'l mut [f64; 2]>,
-    knots: &[f64],
-    sine: &Sine<T>,
-) {
-    for (line, &t) in lines.zip(knots) {
-        let series = sine_series(sine, T::of(t));
-        *line = [series[0].re(), series[1].re()];
-    }
-}
-
-/// Taylor coefficients of a sine about `t`.
-fn sine_series<T: Real>(&(offset, amplitude, omega, phase): &Sine<T>, t: T) -> Series<T> {
-    let angle = t * omega + phase;
-    let (sin, cos) = (angle.sin(), angle.cos());
-    let mut factor = amplitude;
-    std::array::from_fn(|k| {
-        if k > 0 {
-            factor *= omega / k as f64;
-        }
-        match k % 4 {
-            0 if k == 0 => offset + factor * sin,
-            0 => factor * sin,
-            1 => factor * cos,
-            2 => -factor * sin,
-            _ => -factor * cos,
-        }
-    })
-}
-
 /// True if a raster, times [s] and delay [s], equals the `known` raster.
 fn is_raster(known: Option<(&[f64], f64)>, times: &[f64], delay: f64) -> bool {
     known.is_some_and(|(others, d)| d == delay && (std::ptr::eq(others, times) || others == times))
-}
-
-fn check_values(name: &str, times: &[f64], values: &[f64]) -> Result<(), InputError> {
-    if times.len() != values.len() || times.len() < 2 {
-        let (name, times, values) = (name.to_owned(), times.len(), values.len());
-        return Err(InputError::Length { name, times, values });
-    }
-    match values.iter().position(|v| !v.is_finite()) {
-        Some(index) => Err(InputError::Value { name: name.to_owned(), index }),
-        None => Ok(()),
-    }
-}
-
-fn check_times(name: &str, times: &[f64], start: f64, end: f64) -> Result<(), InputError> {
-    let ordered = |i: usize| {
-        times[i].is_finite()
-            && (i == 0 || times[i] >= times[i - 1])
-            && (i < 2 || times[i] > times[i - 2])
-    };
-    let name = name.to_owned();
-    if let Some(index) = (0..times.len()).find(|&i| !ordered(i)) {
-        return Err(InputError::Time { name, index });
-    }
-    let (from, to) = (times[0], times[times.len() - 1]);
-    let slack = 1e-9 * (1.0 + to.abs());
-    if start < from - slack || end > to + slack || start.is_nan() || end.is_nan() {
-        return Err(InputError::Span { name, from, to, start, end });
-    }
-    Ok(())
 }
 
 /// Grid points and sample times of all signals within the span [s], sorted, with whether they are of the

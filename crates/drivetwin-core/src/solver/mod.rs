@@ -19,6 +19,7 @@ mod lane_mask;
 mod lockstep;
 mod settings;
 mod simd;
+mod sine;
 mod single;
 mod status;
 mod tolerances;

@@ -2,6 +2,7 @@
 //! Exponential integrator: whole input samples of one mode by exact propagators.
 
 pub(crate) mod fixed_step;
+pub(crate) mod guard_plan;
 pub(crate) mod guards;
 pub(crate) mod phi;
 pub(crate) mod plan;

@@ -6,7 +6,8 @@
 //! Matrices are written in place: of several runs side by side they are large, and copied where returned.
 
 use crate::number::{KernelFloat, Number, Values};
-use crate::solver::tolerances::SERIES_RTOL;
+use crate::solver::sine::Wave;
+use crate::solver::tolerances::{MAX_SPECTRAL_STEP_LINEAR, SERIES_RTOL};
 
 /// A square matrix by rows.
 type Square<T, const N: usize> = [[T; N]; N];
@@ -100,6 +101,17 @@ pub fn double_phi_functions<T: Number, const F: bool, const N: usize>(
         all[k] = product;
     }
 }
+
+/// Number of doublings of the first step whose series is summed directly.
+pub fn doublings(reach: f64, waves: &[Option<Wave>], h: f64) -> i32 {
+    let waves = waves.iter().flatten().map(|wave| wave.omega.abs() * h / MAX_WAVE_ANGLE);
+    let own = if reach > MAX_SPECTRAL_STEP_LINEAR { reach } else { 0.0 };
+    let turns = waves.fold(own, f64::max);
+    if turns > 1.0 { turns.log2().ceil().min(MAX_DOUBLINGS) as i32 } else { 0 }
+}
+
+/// Most doublings; more than between the fastest and the slowest motion that numbers can tell apart.
+const MAX_DOUBLINGS: f64 = 100.0;
 
 /// Response of the state at the end of a step to a force `e cos ωt` and to `e sin(ωt)/ω`.
 #[derive(Clone, Copy, Debug)]

@@ -5,14 +5,15 @@ use crate::network::nonlinear_torque::TorqueLaw;
 use crate::network::smooth_law::{AffineForm, MAX_INPUTS, SmoothLaw, normal_load};
 use crate::network::{Branch, GearState, Network, NonlinearTorque, RowId};
 use crate::number::{KernelFloat, Number};
+use crate::solver::exponential::guard_plan::TorqueGuard;
 use crate::solver::exponential::propagator::{
-    MANY, MAX_ACTIVE, MAX_STATES, Propagator, SizedPropagator, Watched,
+    MANY, MAX_ACTIVE, MAX_STATES, Propagator, SizedPropagator,
 };
 use crate::solver::exponential::propagator_cache::PropagatorCache;
 use crate::solver::exponential::propagator_cache::PropagatorKey;
 use crate::solver::hybrid::event::FrictionState;
 use crate::solver::hybrid::state::HybridState;
-use crate::solver::inputs::Wave;
+use crate::solver::sine::Wave;
 use crate::solver::tolerances::TORQUE_ATOL;
 use std::sync::Arc;
 
@@ -162,8 +163,8 @@ impl<T: Number> HybridState<'_, T> {
         (sound && !operators.is_overfull).then_some(operators)
     }
 
-    fn watched<'w>(&'w self, active: &'w [usize], row: &'w [T], h: f64) -> Watched<'w, T> {
-        Watched { network: self.network, mode: &self.mode, active, row, h }
+    fn torque_guard<'w>(&'w self, active: &'w [usize], row: &'w [T], h: f64) -> TorqueGuard<'w, T> {
+        TorqueGuard { network: self.network, mode: &self.mode, active, row, h }
     }
 
     fn guard_frictions<const N: usize>(
@@ -191,7 +192,7 @@ impl<T: Number> HybridState<'_, T> {
                     limit.offset += if row.one_way { TORQUE_ATOL } else { 0.0 };
                     if let Some(torque) = self.mode.holding_torque(RowId::Friction(j)) {
                         operators.guard_torque(
-                            &self.watched(active, torque, h),
+                            &self.torque_guard(active, torque, h),
                             limit,
                             !row.one_way,
                         );
@@ -221,7 +222,7 @@ impl<T: Number> HybridState<'_, T> {
             let scaled = |row: &[T], by: f64| row.iter().map(|&c| c * by).collect::<Vec<T>>();
             let power = scaled(self.mode.gear_torque(self.network).row(i), sign * side);
             let limit = constant(-gear.loss.threshold() * side + TORQUE_ATOL);
-            operators.guard_torque(&self.watched(active, &power, h), limit, false);
+            operators.guard_torque(&self.torque_guard(active, &power, h), limit, false);
             let speed = scaled(&gear.speed, sign);
             operators.guard_speed(self.network, &self.mode, active, &speed, h);
         }

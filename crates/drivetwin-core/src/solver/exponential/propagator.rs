@@ -10,11 +10,11 @@ use crate::network::smooth_law::{AffineForm, MAX_INPUTS, SmoothLaw};
 use crate::network::{Mode, Network};
 use crate::number::{KernelFloat, Number, Values};
 use crate::solver::exponential::phi::{
-    FORCING_DEGREE, MAX_WAVE_ANGLE, N_BASIS, PhiFunctions, WaveResponse, add_to_diagonal, apply,
-    dot, double_phi_functions, forcing_response, phi_functions, unrolled,
+    FORCING_DEGREE, N_BASIS, PhiFunctions, WaveResponse, add_to_diagonal, apply, dot,
+    double_phi_functions, doublings, forcing_response, phi_functions, unrolled,
 };
-use crate::solver::inputs::Wave;
 use crate::solver::simd::{Kernel, dispatch_simd};
+use crate::solver::sine::Wave;
 use crate::solver::tolerances::{
     MAX_SPECTRAL_STEP_LINEAR, MAX_SPECTRAL_STEP_SLIPPING, MIN_CHORD_DEVIATION_OF_RISE,
     MIN_CHORD_DEVIATION_OF_SIZE,
@@ -227,65 +227,6 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         form.cubics = over_moments::<T, F, N>(row, forcing_response);
         form
     }
-
-    /// Watch a torque over the basis (x, u, 1, φ), bounded in both signs or only the negative one.
-    pub fn guard_torque(&mut self, watched: &Watched<'_, T>, limit: AffineForm<T>, both: bool) {
-        let Watched { network, active, row, .. } = *watched;
-        if !self.is_stiff {
-            let side = T::of(if both { 1.0 } else { -1.0 });
-            self.watch(network, active, row, Bound::Within { limit, side });
-            return;
-        }
-        for sign in if both { &[1.0, -1.0][..] } else { &[1.0] } {
-            self.watch(network, active, row, self.rising(watched, limit, *sign));
-        }
-    }
-
-    fn rising(&self, watched: &Watched<'_, T>, limit: AffineForm<T>, side: f64) -> Bound<T, N> {
-        let Watched { network, mode, active, row, h } = *watched;
-        let mut states = [T::zero_(); N];
-        for (to, &c) in states.iter_mut().zip(row).take(network.states()) {
-            *to = c * side;
-        }
-        let third = over_basis::<T, false, N>(network, mode, &states, h / 3.0);
-        let mut inputs = [T::zero_(); MAX_INPUTS];
-        for (to, drive) in inputs.iter_mut().zip(&self.inputs) {
-            *to = third[network.first_input() + drive.input];
-        }
-        let third = Form::over(network, active, &[T::of(1.0); MAX_ACTIVE], &third);
-        Bound::Rising { limit, side: T::of(side), third, inputs }
-    }
-
-    /// Watch a speed over the states, which must stay above zero, over samples of length `h` [s].
-    pub fn guard_speed(
-        &mut self,
-        network: &Network<T>,
-        mode: &Mode<T>,
-        active: &[usize],
-        row: &[T],
-        h: f64,
-    ) {
-        let mut speed = [T::zero_(); N];
-        for (to, &c) in speed.iter_mut().zip(row).take(network.states()) {
-            *to = c;
-        }
-        let third = over_basis::<T, false, N>(network, mode, &speed, h / 3.0);
-        self.watch(network, active, &third, Bound::Above(speed));
-    }
-
-    fn watch(&mut self, network: &Network<T>, active: &[usize], row: &[T], bound: Bound<T, N>) {
-        let place = self.guards.len();
-        if place >= MAX_GUARDS {
-            self.is_overfull = true;
-            return;
-        }
-        for drive in &mut self.inputs {
-            drive.guards[place] =
-                row.get(network.first_input() + drive.input).map_or(T::zero_(), |&c| c);
-        }
-        let form = Form::over(network, active, &[T::of(1.0); MAX_ACTIVE], row);
-        self.guards.push(SampleGuard { form, bound });
-    }
 }
 
 /// [`Propagator::build`], to be dispatched.
@@ -311,17 +252,6 @@ impl<T: Number, const N: usize> BuildKernel<'_, T, N> {
         self.waves.iter().enumerate().map(response).collect()
     }
 }
-
-/// Number of doublings of the first step whose series is summed directly.
-fn doublings(reach: f64, waves: &[Option<Wave>], h: f64) -> i32 {
-    let waves = waves.iter().flatten().map(|wave| wave.omega.abs() * h / MAX_WAVE_ANGLE);
-    let own = if reach > MAX_SPECTRAL_STEP_LINEAR { reach } else { 0.0 };
-    let turns = waves.fold(own, f64::max);
-    if turns > 1.0 { turns.log2().ceil().min(MAX_DOUBLINGS) as i32 } else { 0 }
-}
-
-/// Most doublings; more than between the fastest and the slowest motion that numbers can tell apart.
-const MAX_DOUBLINGS: f64 = 100.0;
 
 impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
     type Output = Option<Propagator<T, N>>;
@@ -505,7 +435,12 @@ impl<L: KernelFloat, const N: usize> Form<L, N> {
 
 impl<T: Number, const N: usize> Form<T, N> {
     /// Of a row over the basis or over the states alone.
-    fn over(network: &Network<T>, active: &[usize], signs: &[T; MAX_ACTIVE], row: &[T]) -> Self {
+    pub(super) fn over(
+        network: &Network<T>,
+        active: &[usize],
+        signs: &[T; MAX_ACTIVE],
+        row: &[T],
+    ) -> Self {
         let at = |position: usize| row.get(position).map_or(T::zero_(), |&c| c);
         let state = |i: usize| if i < network.states() { at(i) } else { T::zero_() };
         let mut channels = [T::zero_(); MAX_ACTIVE];
@@ -526,7 +461,7 @@ impl<L: Copy, const N: usize> Propagator<L, N> {
 
 /// A form over the states, differentiated and scaled: over the basis.
 #[inline(always)]
-fn over_basis<T: Number, const F: bool, const N: usize>(
+pub(super) fn over_basis<T: Number, const F: bool, const N: usize>(
     network: &Network<T>,
     mode: &Mode<T>,
     row: &[T; N],
@@ -543,17 +478,6 @@ fn over_basis<T: Number, const F: bool, const N: usize>(
         *entry *= scale;
     }
     out
-}
-
-/// A torque to be watched over samples of length `h` [s] in a mode with the channels `active`.
-#[derive(Clone, Copy)]
-pub struct Watched<'w, T> {
-    pub network: &'w Network<T>,
-    pub mode: &'w Mode<T>,
-    pub active: &'w [usize],
-    /// Torque over the basis.
-    pub row: &'w [T],
-    pub h: f64,
 }
 
 /// Operators for the number of states at hand.

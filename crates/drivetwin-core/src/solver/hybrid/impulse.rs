@@ -8,7 +8,7 @@ use crate::number::{Number, Values};
 use crate::solver::hybrid::event::{Event, EventKind, FrictionState};
 use crate::solver::hybrid::state::{HybridState, self_locking};
 use crate::solver::status::Status;
-use crate::solver::tolerances::START_SPEED_RTOL;
+use crate::solver::tolerances::{FORCED_ACCELERATION_RTOL, START_SPEED_RTOL};
 
 /// Energy of an impulse, J.
 #[derive(Clone, Copy, Debug)]
@@ -134,6 +134,30 @@ impl<T: Number> HybridState<'_, T> {
             energy: lost * (size(share) / all),
         };
         shares.iter().filter(counts).map(event).collect()
+    }
+
+    /// Return true if a row cannot be released in a direction: prescribed speeds can ask for it where another
+    /// row gives way to them.
+    pub(super) fn is_blocked(&self, row: RowId, sign: f64) -> bool {
+        sign > 0.0 && self.network.is_one_way(row)
+    }
+
+    /// Refuse prescribed speeds that a one-way clutch at rest blocks, whatever gives way.
+    pub(super) fn check_forced(&self, candidates: &[RowId]) -> Result<(), Status> {
+        let network = self.network;
+        let one_way = candidates.iter().copied().filter(|&row| network.is_one_way(row));
+        let one_way: Vec<RowId> = one_way.collect();
+        if network.prescribed.is_empty() || one_way.is_empty() {
+            return Ok(());
+        }
+        let inputs = &self.inputs_plus;
+        let rates: Vec<T> = network.prescribed.iter().map(|&(_, input)| inputs[input][1]).collect();
+        match network.check_forced(&one_way, &rates, FORCED_ACCELERATION_RTOL) {
+            Err(ImpulseFault::Conflict { element, with }) => {
+                Err(Status::Blocked { time: self.time(), element, with })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Set prescribed speeds and remove the round-off speed of everything at rest and of `more`,

@@ -4,7 +4,7 @@
 
 use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::nonlinear_torque::form;
-use crate::network::{Branch, GearState, ImpulseFault, Mode, ModeKey, RowId};
+use crate::network::{Branch, GearState, Mode, ModeKey, RowId};
 use crate::number::{Number, Values, evaluate};
 use crate::solver::hybrid::active_set::ActiveSet;
 use crate::solver::hybrid::event::{FrictionState, signum_nonneg};
@@ -220,30 +220,6 @@ impl<T: Number> HybridState<'_, T> {
         basis.extend((0..self.network.channels.len()).map(|i| self.channel_plus(i)));
         for (i, ahead) in self.x_plus.iter_mut().enumerate() {
             *ahead += form(self.mode.derivative.row(i), &basis) * moment;
-        }
-    }
-
-    /// Return true if a row cannot be released in a direction: prescribed speeds can ask for it where another
-    /// row gives way to them.
-    fn is_blocked(&self, row: RowId, sign: f64) -> bool {
-        sign > 0.0 && self.network.is_one_way(row)
-    }
-
-    /// Refuse prescribed speeds that a one-way clutch at rest blocks, whatever gives way.
-    fn check_forced(&self, candidates: &[RowId]) -> Result<(), Status> {
-        let network = self.network;
-        let one_way = candidates.iter().copied().filter(|&row| network.is_one_way(row));
-        let one_way: Vec<RowId> = one_way.collect();
-        if network.prescribed.is_empty() || one_way.is_empty() {
-            return Ok(());
-        }
-        let inputs = &self.inputs_plus;
-        let rates: Vec<T> = network.prescribed.iter().map(|&(_, input)| inputs[input][1]).collect();
-        match network.check_forced(&one_way, &rates, FORCED_ACCELERATION_RTOL) {
-            Err(ImpulseFault::Conflict { element, with }) => {
-                Err(Status::Blocked { time: self.time(), element, with })
-            }
-            _ => Ok(()),
         }
     }
 
