@@ -32,9 +32,9 @@ pub const MAX_GUARDS: usize = 12;
 pub struct Propagator<L, const N: usize> {
     /// Number of states.
     pub states: usize,
-    /// True if the motion is too fast for chords to bound torques within a sample.
+    /// True if chords do not bound torques within a sample: the motion is too fast.
     pub is_stiff: bool,
-    /// True if there is more to be watched than there is room for.
+    /// True if there are more guards than there is room for.
     pub is_overfull: bool,
     /// Largest deviation of a watched torque from its chord within a sample, relative to its rise and to
     /// its size.
@@ -270,7 +270,6 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
         }
         let doublings = if T::RUNS == 1 { doublings(reach.re().run_value(0), waves, h) } else { 0 };
         let first = h * 0.5_f64.powi(doublings);
-        // Plain loops: the body of a closure would be compiled apart, for the least of all processors.
         let n = network.states();
         let mut a = [[T::zero_(); N]; N];
         for i in 0..n {
