@@ -7,7 +7,8 @@ use crate::number::Real;
 use crate::solver::exponential::fixed_step::{FixedSteps, step_samples};
 use crate::solver::exponential::guards::StepState;
 use crate::solver::exponential::plan::StepPlan;
-use crate::solver::exponential::propagator::{MAX_STATES, Propagator, SizedPropagator};
+use crate::solver::exponential::propagator::Propagator;
+use crate::solver::exponential::propagator_cache::{MAX_STATES, SizedPropagator};
 use crate::solver::exponential::samples::{
     BLOCK, ChannelState, DelayedInputs, InputSource, SampleBuffer, Samples, SharedInputs, room,
 };

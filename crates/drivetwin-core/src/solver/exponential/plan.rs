@@ -6,11 +6,10 @@ use crate::network::smooth_law::{AffineForm, MAX_INPUTS, SmoothLaw, normal_load}
 use crate::network::{Branch, GearState, Network, NonlinearTorque, RowId};
 use crate::number::{KernelFloat, Number};
 use crate::solver::exponential::guard_plan::TorqueGuard;
-use crate::solver::exponential::propagator::{
-    MANY, MAX_ACTIVE, MAX_STATES, Propagator, SizedPropagator,
+use crate::solver::exponential::propagator::{MAX_ACTIVE, Propagator};
+use crate::solver::exponential::propagator_cache::{
+    MANY, MAX_STATES, PropagatorCache, PropagatorKey, SizedPropagator,
 };
-use crate::solver::exponential::propagator_cache::PropagatorCache;
-use crate::solver::exponential::propagator_cache::PropagatorKey;
 use crate::solver::hybrid::event::FrictionState;
 use crate::solver::hybrid::state::HybridState;
 use crate::solver::sine::Wave;

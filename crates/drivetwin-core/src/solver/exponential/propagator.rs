@@ -20,7 +20,6 @@ use crate::solver::tolerances::{
     MIN_CHORD_DEVIATION_OF_SIZE,
 };
 use smallvec::SmallVec;
-use std::sync::Arc;
 
 /// Most channels that are carried at once.
 pub const MAX_ACTIVE: usize = 4;
@@ -251,6 +250,31 @@ impl<T: Number, const N: usize> BuildKernel<'_, T, N> {
         };
         self.waves.iter().enumerate().map(response).collect()
     }
+
+    /// Effects of the inputs that act on the state.
+    #[inline(always)]
+    fn add_inputs<const F: bool>(
+        &self,
+        operators: &mut Propagator<T, N>,
+        s: &PhiFunctions<T, N>,
+        responses_to_waves: &[Option<WaveResponse<T, N>>],
+    ) {
+        for input in 0..self.network.mechanism.inputs.len() {
+            if self.network.is_driven_by(input) {
+                let force = forcing(self.mode, self.network.first_input() + input);
+                let mut step = [apply::<T, F, N>(&s[1], &force), apply::<T, F, N>(&s[2], &force)];
+                if let Some(Some(wave)) = responses_to_waves.get(input) {
+                    // The offset is there throughout, and the wave is what the input is off it.
+                    let offset = self.waves[input].map_or(0.0, |wave| wave.offset);
+                    for i in 0..N {
+                        operators.constant[i] += (step[0][i] - wave.parts[0][i]) * offset;
+                    }
+                    step = wave.parts;
+                }
+                operators.inputs.push(InputMap::new(input, step));
+            }
+        }
+    }
 }
 
 impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
@@ -294,21 +318,7 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
             }
         }
         operators.constant = apply::<T, F, N>(&s[1], &forcing(mode, network.one()));
-        for input in 0..network.mechanism.inputs.len() {
-            if network.is_driven_by(input) {
-                let force = forcing(mode, network.first_input() + input);
-                let mut step = [apply::<T, F, N>(&s[1], &force), apply::<T, F, N>(&s[2], &force)];
-                if let Some(Some(wave)) = responses_to_waves.get(input) {
-                    // The offset is there throughout, and the wave is what the input is off it.
-                    let offset = waves[input].map_or(0.0, |wave| wave.offset);
-                    for i in 0..N {
-                        operators.constant[i] += (step[0][i] - wave.parts[0][i]) * offset;
-                    }
-                    step = wave.parts;
-                }
-                operators.inputs.push(InputMap::new(input, step));
-            }
-        }
+        self.add_inputs::<F>(&mut operators, &s, &responses_to_waves);
         let mut responses: SmallVec<[[[T; N]; N_BASIS]; 2]> = SmallVec::new();
         for (slot, &j) in active.iter().enumerate() {
             operators.signs[slot] = laws[slot].sign;
@@ -478,23 +488,3 @@ pub(super) fn over_basis<T: Number, const F: bool, const N: usize>(
     }
     out
 }
-
-/// Operators for the number of states at hand.
-#[derive(Clone, Debug)]
-pub(crate) enum SizedPropagator<T> {
-    /// Up to 4.
-    Four(Arc<Propagator<T, 4>>),
-    /// Up to 8; of one run only.
-    Eight(Arc<Propagator<T, 8>>),
-    /// Up to 12; of plain numbers only.
-    Twelve(Arc<Propagator<T, 12>>),
-    /// Up to [`MANY`]; likewise.
-    Many(Arc<Propagator<T, MANY>>),
-    /// Up to [`MAX_STATES`]; likewise, and in linear modes only.
-    Most(Arc<Propagator<T, MAX_STATES>>),
-}
-
-/// Most states of a network of plain numbers that is marched in modes with slipping elements.
-pub(crate) const MANY: usize = 24;
-/// Most states of a network of plain numbers that is marched.
-pub(crate) const MAX_STATES: usize = 48;

@@ -9,8 +9,8 @@
 use crate::number::{KernelFloat, Number, Series, TERMS, Values, with_consensus};
 use crate::solver::cache::SolverCache;
 use crate::solver::exponential::plan::supports_fixed_step;
-use crate::solver::exponential::propagator::{MAX_ACTIVE, SizedPropagator};
-use crate::solver::exponential::propagator_cache::PropagatorCache;
+use crate::solver::exponential::propagator::MAX_ACTIVE;
+use crate::solver::exponential::propagator_cache::{PropagatorCache, SizedPropagator};
 use crate::solver::exponential::samples::SampleColumn;
 use crate::solver::hybrid::event::{Event, EventCause};
 use crate::solver::hybrid::event_search::earliest_per_lane;
