@@ -170,14 +170,16 @@ def _project(
     stops = [rows[name] @ free for name in network.one_way_clutches if name not in network.locked]
     if free.shape[1] == 0:
         return np.zeros(len(nodes))
-    found = minimize(
-        lambda y: 0.5 * float(inertia @ (free @ y - stated) ** 2),
-        free.T @ stated,
-        jac=lambda y: free.T @ (inertia * (free @ y - stated)),
-        method="SLSQP",
-        constraints=[LinearConstraint(row[None, :], -np.inf, 0.0) for row in stops],
-        options={"ftol": 1e-14, "maxiter": 500},
-    )
+
+    def lost(y: FloatArray) -> float:
+        return 0.5 * float(inertia @ (free @ y - stated) ** 2)
+
+    def slope(y: FloatArray) -> FloatArray:
+        return np.asarray(free.T @ (inertia * (free @ y - stated)), dtype=np.float64)
+
+    limits = [LinearConstraint(row[None, :], -np.inf, 0.0) for row in stops]
+    start = np.asarray(free.T @ stated, dtype=np.float64)
+    found = minimize(lost, start, jac=slope, method="SLSQP", constraints=limits, tol=1e-14)
     return np.asarray(free @ found.x, dtype=np.float64)
 
 
