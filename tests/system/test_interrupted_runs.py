@@ -24,12 +24,10 @@ from drivetwin.simulation.batch import (
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     FloatArray,
-    Signal,
-    simulate_sensitivities,
 )
 from drivetwin.simulation.network import Sine, Start, simulate
 from drivetwin.simulation.serialize import as_json
-from tests.simulation.test_batch import MODEL, START, TIME, scenario, sets
+from tests.simulation.test_batch import MODEL, TIME, scenario, sets
 
 LATEST = 0.2
 """Time after a signal until which a call has ended [s]."""
@@ -82,22 +80,11 @@ def run_long_batch_sensitivities() -> None:
     )
 
 
-def run_long_sensitivities() -> None:
-    """Differentiate a run over an hour."""
-    times: FloatArray = np.linspace(0.0, 3600.0, 720_001)
-    torque = Signal(times, 1400.0 + 100.0 * np.sin(times))
-    pressures = {"B2": Signal(times, np.full(times.size, 1e6)), "B3": Signal(times, 0.0 * times)}
-    by = ["eta", "J1", "k_o", "c_o", "J_v", "load.constant", "B2.P0", "B3.P0", "B2.mu_c", "B3.mu_c"]
-    hour: FloatArray = np.linspace(0.0, 3600.0, 11)
-    simulate_sensitivities(MODEL, torque, pressures, START, hour, [*by, *by, *by])
-
-
 CALLS: dict[str, Callable[[], object]] = {
     "network": run_long_network,
     "batch": lambda: run_long_batch(1),
     "batch in two threads": lambda: run_long_batch(2),
     "batch sensitivities": run_long_batch_sensitivities,
-    "sensitivities": run_long_sensitivities,
 }
 
 
