@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The calibration that every optimiser solves: the stated upshift with 18 knots and its spread.
 
-Heavy truck, power-on upshift 2-3 from steady acceleration at 1400 N·m and 185 rad/s; requested at
+Heavy truck, power-on upshift 2-3 from steady acceleration at 1400 N·m and 185 rad/s, requested at
 0.40 s, 1.5 s in all. Knots: on-coming pressure at 0.45 to 1.15 s, off-going pressure at 0.45 to
-0.64 s, engine torque at 0.55 to 1.05 s (600 to 1400 N·m). Standard deviations between units: gain of
-each clutch 2.5 %, engine torque 1.5 %, contact pressure 0.05 bar. Wanted: a small 95 % quantile of
-peak jerk of the vehicle, 95 % of the lock-ups by 1.15 s, mean friction energy at most 46 kJ.
+0.64 s, engine torque at 0.55 to 1.05 s (600 to 1400 N·m). Standard deviations between units: gain
+of each clutch 2.5 %, engine torque 1.5 %, contact pressure 0.05 bar. Wanted: a small 95 % quantile
+of peak jerk of the vehicle, 95 % of the lock-ups by 1.15 s, mean friction energy at most 46 kJ.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,6 +39,10 @@ class Task:
     seed: int = 1
     settings: CalibrationSettings = field(default_factory=CalibrationSettings)
 
+    def set_limits(self, limits: tuple[Limit, ...]) -> Task:
+        """Return the problem with other limits."""
+        return replace(self, limits=limits)
+
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
@@ -52,7 +56,10 @@ class Assessment:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """Result: the calibration before and after, on the same fresh draws; `runs` simulated shifts."""
+    """Result: the calibration before and after, both on the fresh draws.
+
+    `runs` counts the simulated shifts.
+    """
 
     task: Task
     before: Assessment
@@ -75,15 +82,13 @@ def calibrate(task: Task) -> Calibration:
     with scale_progress(0.6, 0.9, "polishing"):
         best = _polish(task, plant, objective, found)
     with scale_progress(0.9, 1.0, "certifying on fresh draws"):
-        fresh = _draw(task, settings.certificate_draws, Purpose.CERTIFICATE)
+        fresh = draw_for(task, settings.certificate_draws, Purpose.CERTIFICATE)
         before, after = (assess(task, plant, one, fresh) for one in (space.start, best))
     _require_feasible(after.certificate, task.limits)
     return Calibration(task, before, after, fresh, plant.count.runs)
 
 
-def assess(
-    task: Task, plant: Plant, coordinates: FloatArray, scenarios: Scenarios
-) -> Assessment:
+def assess(task: Task, plant: Plant, coordinates: FloatArray, scenarios: Scenarios) -> Assessment:
     """Simulate coordinates (q,) over scenarios and certify them."""
     space = Space(task.policy)
     profiles = space.build_profiles(coordinates)
@@ -92,14 +97,15 @@ def assess(
     return Assessment(space.to_values(coordinates), profiles, outcome, certificate)
 
 
-def _draw(task: Task, count: int, purpose: Purpose) -> Scenarios:
+def draw_for(task: Task, count: int, purpose: Purpose) -> Scenarios:
+    """Draw the scenarios of a task for a purpose."""
     return draw_scenarios(task.maneuver, task.draw, count, task.seed, purpose)
 
 
 def _build_objective(task: Task, plant: Plant, space: Space) -> Objective:
     """Objective whose penalty is scaled by the tail mean of the start."""
     settings = task.settings
-    draws = _draw(task, settings.search_draws, Purpose.SEARCH)
+    draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
     start = plant.evaluate(space.build_profiles(space.start), draws)
     comfort = compute_tail_mean(start.values[Metric.PEAK_JERK], settings.search_share)
     whole = Objective(task.limits, settings.search_share, settings.penalty * comfort)
@@ -108,7 +114,7 @@ def _build_objective(task: Task, plant: Plant, space: Space) -> Objective:
 
 def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
     settings, space = task.settings, Space(task.policy)
-    draws = _draw(task, settings.search_draws, Purpose.SEARCH)
+    draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
     coarse = Plant(
         task.maneuver.set_step(max(task.maneuver.step, _COARSE)), settings.threads, plant.count
     )
@@ -125,15 +131,13 @@ def _polish(
     """Polish all finalists, then the best on more draws for its tail."""
     settings, space = task.settings, Space(task.policy)
 
-    def improve(
-        start: FloatArray, draws: Scenarios, share: float, iterations: int
-    ) -> Candidate:
+    def improve(start: FloatArray, draws: Scenarios, share: float, iterations: int) -> Candidate:
         def run(coordinates: FloatArray) -> Outcome:
             return plant.evaluate(space.build_profiles(coordinates), draws)
 
         return polish(run, start, objective.set_share(share), iterations)
 
-    draws = _draw(task, settings.polish_draws, Purpose.POLISH)
+    draws = draw_for(task, settings.polish_draws, Purpose.POLISH)
     polished = []
     for number, one in enumerate(found):
         with scale_progress(0.5 * number / len(found), 0.5 * (number + 1) / len(found)):
@@ -142,7 +146,7 @@ def _polish(
             )
     best = min(polished, key=lambda one: one.value)
     with scale_progress(0.5, 1.0):
-        tail = _draw(task, settings.tail_draws, Purpose.TAIL)
+        tail = draw_for(task, settings.tail_draws, Purpose.TAIL)
         last = improve(best.coordinates, tail, settings.tail_share, settings.tail_iterations)
     return np.asarray(last.coordinates)
 

@@ -15,8 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.profiles import PolicyParameter, Profiles, check_parameters
+from drivetwin.calibration.profiles import (
+    PolicyParameter,
+    Profiles,
+    check_parameters,
+    move_start,
+)
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import ShiftElement, Signal
 
@@ -51,6 +57,10 @@ class ControllerPolicy:
 
     def __post_init__(self) -> None:
         check_parameters(self.parameters)
+
+    def set_start(self, values: Mapping[str, float]) -> ControllerPolicy:
+        """Return the policy with other starting values by name; see `move_start`."""
+        return replace(self, parameters=move_start(self.parameters, values))
 
     def build_profiles(self, values: FloatArray) -> Profiles:
         """Return the profiles of values (p,) in SI."""
@@ -125,8 +135,8 @@ def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> Contr
     for name, needed in ((new.name, max(handover, inertia)), (old.name, hold)):
         if needed >= system_pressure:
             raise InputError(
-                f"{name} needs {needed / 1e5:.3g} bar in this shift, the system pressure is "
-                f"{system_pressure / 1e5:.3g} bar",
+                f"{name} needs {format_with_unit(needed, 'Pa', digits=3)} in this shift, the system pressure is "
+                f"{format_with_unit(system_pressure, 'Pa', digits=3)}",
                 "give a smaller engine torque, or a larger system pressure",
             )
     sync = min(_LOCK_PRESSURE * inertia, 0.5 * (inertia + system_pressure))
@@ -143,25 +153,6 @@ def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> Contr
         maneuver.point.engine_torque,
         maneuver.direction,
         system_pressure,
-    )
-
-
-def set_start(policy: ControllerPolicy, values: Mapping[str, float]) -> ControllerPolicy:
-    """Return the policy with other starting values by name, moved onto the bounds.
-
-    Raises InputError for a name that the policy does not have.
-    """
-    names = [one.name for one in policy.parameters]
-    if unknown := [name for name in values if name not in names]:
-        raise InputError(
-            f"the policy has no parameter {', '.join(unknown)}", f"use {', '.join(names)}"
-        )
-    return replace(
-        policy,
-        parameters=tuple(
-            replace(one, start=min(max(values.get(one.name, one.start), one.low), one.high))
-            for one in policy.parameters
-        ),
     )
 
 

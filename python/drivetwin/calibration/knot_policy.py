@@ -3,13 +3,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.profiles import PolicyParameter, Profiles, check_parameters
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.profiles import (
+    PolicyParameter,
+    Profiles,
+    check_parameters,
+    move_start,
+)
 from drivetwin.simulation.dual_clutch import Signal
+
+_ONCOMING = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75)
+_OFFGOING = (0.05, 0.12, 0.18, 0.24)
+_TORQUE = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65)
+"""Times of the knots after the request [s]."""
+_RAMP = 0.1
+"""Time from the last free knot to the fixed end of a profile [s]."""
+_AUTHORITY = 0.6
+"""Largest torque intervention over the engine torque."""
 
 Corners = tuple[tuple[float, float], ...]
 
@@ -66,6 +82,17 @@ class KnotPolicy:
             *self.engine_torque.list_parameters("engine_torque", "N*m"),
         )
 
+    def set_start(self, values: Mapping[str, float]) -> KnotPolicy:
+        """Return the policy with other starting values by name; see `move_start`."""
+        starts = [one.start for one in move_start(self.parameters, values)]
+        first = len(self.oncoming.times)
+        second = first + len(self.offgoing.times)
+        return KnotPolicy(
+            replace(self.oncoming, start=tuple(starts[:first])),
+            replace(self.offgoing, start=tuple(starts[first:second])),
+            replace(self.engine_torque, start=tuple(starts[second:])),
+        )
+
     def build_profiles(self, values: FloatArray) -> Profiles:
         """Return the profiles of values (p,) in SI."""
         first = len(self.oncoming.times)
@@ -75,3 +102,34 @@ class KnotPolicy:
             offgoing=self.offgoing.build_signal(values[first:second]),
             oncoming=self.oncoming.build_signal(values[:first]),
         )
+
+
+def build_knot_policy(maneuver: Maneuver, start: Profiles, system_pressure: float) -> KnotPolicy:
+    """Return knots through the profiles `start`; `system_pressure` [Pa] is that of a held element.
+
+    The knots lie between the request and 0.75 s after it; the engine torque may change towards the
+    new gear by 60 %.
+    """
+    torque = maneuver.point.engine_torque
+    reach = torque + _AUTHORITY * maneuver.direction * abs(torque)
+    bounds = (min(torque, reach), max(torque, reach))
+    pressures = (0.0, system_pressure)
+
+    def build(signal: Signal, after: tuple[float, ...], bounds: tuple[float, float],
+              ends: tuple[float, float]) -> KnotProfile:  # fmt: skip
+        times = tuple(maneuver.request + one for one in after)
+        values = np.clip(np.interp(times, signal.time, signal.values), *bounds)
+        last = times[-1] + _RAMP
+        return KnotProfile(
+            ((0.0, ends[0]), (maneuver.request, ends[0])),
+            times,
+            ((last, ends[1]), (max(maneuver.horizon, last + _RAMP), ends[1])),
+            tuple(values.tolist()),
+            *bounds,
+        )
+
+    return KnotPolicy(
+        build(start.oncoming, _ONCOMING, pressures, (0.0, system_pressure)),
+        build(start.offgoing, _OFFGOING, pressures, (system_pressure, 0.0)),
+        build(start.engine_torque, _TORQUE, bounds, (torque, torque)),
+    )

@@ -77,8 +77,8 @@ METRICS: Mapping[Metric, MetricSpec] = {
     Metric.TORQUE_HOLE: MetricSpec(
         "torque hole",
         "N*m",
-        "Fall of the output torque, in the direction of power, below the lower of its values before "
-        "the request and at the end of the run.",
+        "Fall of the output torque, in the direction of power, below the lower of its values "
+        "before the request and at the end of the run.",
         _OWN,
     ),
     Metric.SHIFT_TIME: MetricSpec(

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
+from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from drivetwin._util.arrays import FloatArray
@@ -47,7 +47,7 @@ class _Linear:
 
     value: FloatArray
     slope: FloatArray
-    owner: FloatArray
+    owner: NDArray[np.intp]
 
 
 def polish(run: Run, start: FloatArray, objective: Objective, iterations: int) -> Candidate:
@@ -85,9 +85,7 @@ def _solve_program(
     limits = [_linearise_limit(one, outcome, moved, width) for one in objective.limits]
     cost, matrix, bound = _assemble(objective, jerk, limits, outcome.jerk.shape[0])
     slack = [(0.0, None)] * (cost.size - at.size - 1)
-    box = list(
-        zip(np.maximum(-radius, -at), np.minimum(radius, 1.0 - at), strict=True)
-    )
+    box = list(zip(np.maximum(-radius, -at), np.minimum(radius, 1.0 - at), strict=True))
     solved = linprog(
         cost, A_ub=matrix, b_ub=bound, bounds=[*box, (None, None), *slack], method="highs"
     )
@@ -132,29 +130,23 @@ def _linearise_limit(
 
 def _assemble(
     objective: Objective, jerk: _Linear, limits: list[_Linear], scenarios: int
-) -> tuple[FloatArray, sparse.csr_matrix, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Cost, matrix and bounds over step (q,), threshold, excess over it (runs,), and the limits'.
 
     The tail mean is the threshold plus the mean excess over it divided by 1 - share.
     """
-    q = jerk.slope.shape[1]
+    q, rows = jerk.slope.shape[1], jerk.value.size
     counts = [one.value.size for one in limits]
-    cost = np.concatenate(
-        [
-            np.zeros(q),
-            [1.0],
-            np.full(scenarios, 1.0 / ((1.0 - objective.share) * scenarios)),
-            *(np.full(count, objective.weight / count) for count in counts),
-        ]
-    )
-    rows = jerk.value.size
-    owners = sparse.csr_matrix(
-        (-np.ones(rows), (np.arange(rows), jerk.owner)), shape=(rows, scenarios)
-    )
-    blocks = [[sparse.csr_matrix(jerk.slope), -np.ones((rows, 1)), owners, *[None] * len(counts)]]
-    for number, one in enumerate(limits):
-        own: list[object] = [None] * len(counts)
-        own[number] = -sparse.eye(one.value.size)
-        blocks.append([sparse.csr_matrix(one.slope), None, None, *own])
-    matrix = sparse.bmat(blocks, format="csr")
+    tail = 1.0 / ((1.0 - objective.share) * scenarios)
+    excess = [np.full(count, objective.weight / count) for count in counts]
+    cost = np.concatenate([np.zeros(q), [1.0], np.full(scenarios, tail), *excess])
+    matrix = np.zeros((rows + sum(counts), cost.size))
+    matrix[:rows, :q] = jerk.slope
+    matrix[:rows, q] = -1.0
+    matrix[np.arange(rows), q + 1 + jerk.owner] = -1.0
+    row, column = rows, q + 1 + scenarios
+    for one, count in zip(limits, counts, strict=True):
+        matrix[row : row + count, :q] = one.slope
+        matrix[row + np.arange(count), column + np.arange(count)] = -1.0
+        row, column = row + count, column + count
     return cost, matrix, np.concatenate([-jerk.value, *(-one.value for one in limits)])

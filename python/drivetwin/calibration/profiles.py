@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -103,3 +104,21 @@ def check_parameters(parameters: tuple[PolicyParameter, ...]) -> None:
                 f"{one.high:g}",
                 "give bounds that increase and contain the start",
             )
+
+
+def move_start(
+    parameters: tuple[PolicyParameter, ...], values: Mapping[str, float]
+) -> tuple[PolicyParameter, ...]:
+    """Return parameters with other starting values by name, moved onto the bounds.
+
+    Raises InputError for an unknown name.
+    """
+    names = [one.name for one in parameters]
+    if unknown := [name for name in values if name not in names]:
+        raise InputError(
+            f"the policy has no parameter {', '.join(unknown)}", f"use {', '.join(names)}"
+        )
+    return tuple(
+        replace(one, start=min(max(values.get(one.name, one.start), one.low), one.high))
+        for one in parameters
+    )

@@ -208,5 +208,3 @@ def scale_friction(element: ShiftElement, scale: float) -> ShiftElement:
     else:
         friction = Stribeck(scale * law.mu_c, scale * law.mu_s, law.v_s, scale * law.mu_v)
     return replace(element, friction=friction)
-
-

@@ -54,9 +54,7 @@ def search_minima(
     return sorted(found, key=lambda one: one.value)
 
 
-def _start_search(
-    cma: Any, start: FloatArray, settings: CalibrationSettings, seed: int
-) -> Any:
+def _start_search(cma: Any, start: FloatArray, settings: CalibrationSettings, seed: int) -> Any:
     options = {
         "bounds": [0.0, 1.0],
         "seed": seed + 1,  # 0 would take the clock

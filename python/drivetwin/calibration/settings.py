@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -46,3 +46,13 @@ class CalibrationSettings:
     """Confidence of the certificate."""
     threads: int = 0
     """Threads of the simulation; 0 takes all cores."""
+
+    def scale_effort(self, factor: float) -> CalibrationSettings:
+        """Return settings whose search and polish are longer by `factor`."""
+        return replace(
+            self,
+            first_evaluations=max(self.population, round(factor * self.first_evaluations)),
+            evaluations=max(self.population, round(factor * self.evaluations)),
+            polish_iterations=max(1, round(factor * self.polish_iterations)),
+            tail_iterations=max(1, round(factor * self.tail_iterations)),
+        )
