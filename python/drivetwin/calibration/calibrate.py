@@ -75,17 +75,30 @@ def calibrate(task: Task) -> Calibration:
     fresh draws, and MissingExtraError without the library of the search.
     """
     settings, space = task.settings, Space(task.policy)
-    plant = Plant(task.maneuver, settings.threads)
-    objective = _build_objective(task, plant, space)
-    with scale_progress(0.0, 0.6, "searching"):
-        found = _search(task, plant, objective)
-    with scale_progress(0.6, 0.9, "polishing"):
-        best = _polish(task, plant, objective, found)
+    quick = make_quick_plant(task)
+    with scale_progress(0.0, 0.9):
+        best = find_best(task, quick)
+    plant = replace(quick, metrics=tuple(Metric))
     with scale_progress(0.9, 1.0, "certifying on fresh draws"):
         fresh = draw_for(task, settings.certificate_draws, Purpose.CERTIFICATE)
         before, after = (assess(task, plant, one, fresh) for one in (space.start, best))
     _require_feasible(after.certificate, task.limits)
     return Calibration(task, before, after, fresh, plant.count.runs)
+
+
+def make_quick_plant(task: Task) -> Plant:
+    """Build the plant that computes what the optimiser needs."""
+    wanted = (Metric.PEAK_JERK, *(one.metric for one in task.limits))
+    return Plant(task.maneuver, task.settings.threads, tuple(dict.fromkeys(wanted)))
+
+
+def find_best(task: Task, plant: Plant) -> FloatArray:
+    """Search and polish; return the best coordinates (q,)."""
+    objective = build_objective(task, plant)
+    with scale_progress(0.0, 0.65, "searching"):
+        found = _search(task, plant, objective)
+    with scale_progress(0.65, 1.0, "polishing"):
+        return _polish(task, plant, objective, found)
 
 
 def assess(task: Task, plant: Plant, coordinates: FloatArray, scenarios: Scenarios) -> Assessment:
@@ -102,9 +115,9 @@ def draw_for(task: Task, count: int, purpose: Purpose) -> Scenarios:
     return draw_scenarios(task.maneuver, task.draw, count, task.seed, purpose)
 
 
-def _build_objective(task: Task, plant: Plant, space: Space) -> Objective:
-    """Objective whose penalty is scaled by the tail mean of the start."""
-    settings = task.settings
+def build_objective(task: Task, plant: Plant) -> Objective:
+    """Build the objective; its penalty is scaled by the tail mean of the start."""
+    settings, space = task.settings, Space(task.policy)
     draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
     start = plant.evaluate(space.build_profiles(space.start), draws)
     comfort = compute_tail_mean(start.values[Metric.PEAK_JERK], settings.search_share)
@@ -115,9 +128,7 @@ def _build_objective(task: Task, plant: Plant, space: Space) -> Objective:
 def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
     settings, space = task.settings, Space(task.policy)
     draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
-    coarse = Plant(
-        task.maneuver.set_step(max(task.maneuver.step, _COARSE)), settings.threads, plant.count
-    )
+    coarse = replace(plant, maneuver=task.maneuver.set_step(max(task.maneuver.step, _COARSE)))
 
     def evaluate(coordinates: FloatArray) -> float:
         return objective.evaluate(coarse.evaluate(space.build_profiles(coordinates), draws))

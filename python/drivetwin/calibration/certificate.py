@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,14 @@ class Quantiles:
     worst: float
 
 
+class LimitState(StrEnum):
+    """State of a limit: also its upper bound is within it, its estimate alone, or neither."""
+
+    CERTIFIED = "certified"
+    KEPT = "kept, not certified"
+    EXCEEDED = "exceeded"
+
+
 @dataclass(frozen=True)
 class LimitCheck:
     """A limit on the draws: estimate, and its upper bound with the certificate's confidence."""
@@ -45,14 +54,11 @@ class LimitCheck:
     upper: float | None
 
     @property
-    def kept(self) -> bool:
-        """True if the estimate is within the limit."""
-        return self.value <= self.limit.bound
-
-    @property
-    def certified(self) -> bool:
-        """True if the upper bound is within the limit."""
-        return self.upper is not None and self.upper <= self.limit.bound
+    def state(self) -> LimitState:
+        """State of the limit on the draws."""
+        if self.upper is not None and self.upper <= self.limit.bound:
+            return LimitState.CERTIFIED
+        return LimitState.KEPT if self.value <= self.limit.bound else LimitState.EXCEEDED
 
     @property
     def binding(self) -> bool:
@@ -105,7 +111,7 @@ def compute_quantiles(values: FloatArray, confidence: float) -> Quantiles:
     return Quantiles(
         median=float(np.median(values)),
         mean=mean,
-        mean_upper=mean + float(norm.ppf(confidence)) * error,
+        mean_upper=float(mean + norm.ppf(confidence) * error),
         share_95=float(np.quantile(values, 0.95)),
         upper_95=compute_quantile_bound(values, 0.95, confidence),
         share_99=float(np.quantile(values, 0.99)),

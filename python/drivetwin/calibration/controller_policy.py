@@ -135,8 +135,8 @@ def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> Contr
     for name, needed in ((new.name, max(handover, inertia)), (old.name, hold)):
         if needed >= system_pressure:
             raise InputError(
-                f"{name} needs {format_with_unit(needed, 'Pa', digits=3)} in this shift, the system pressure is "
-                f"{format_with_unit(system_pressure, 'Pa', digits=3)}",
+                f"{name} needs {format_with_unit(needed, 'Pa', digits=3)} in this shift, the "
+                f"system pressure is {format_with_unit(system_pressure, 'Pa', digits=3)}",
                 "give a smaller engine torque, or a larger system pressure",
             )
     sync = min(_LOCK_PRESSURE * inertia, 0.5 * (inertia + system_pressure))

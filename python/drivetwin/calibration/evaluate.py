@@ -9,7 +9,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.metrics import Outcome, compute_metrics, list_outputs
+from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics, list_outputs
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import Scenario, simulate_batch
@@ -27,10 +27,14 @@ class RunCount:
 
 @dataclass(frozen=True)
 class Plant:
-    """The driveline that profiles are tried on; `threads` 0 takes all cores."""
+    """The driveline that profiles are tried on, and the metrics to compute.
+
+    `threads` 0 takes all cores.
+    """
 
     maneuver: Maneuver
     threads: int = 0
+    metrics: tuple[Metric, ...] = tuple(Metric)
     count: RunCount = field(default_factory=RunCount)
 
     def evaluate(self, profiles: Profiles, scenarios: Scenarios) -> Outcome:
@@ -67,7 +71,7 @@ class Plant:
         chosen = Scenarios(sets, len(next(iter(sets.values()))))
         columns, last_lock = self.simulate(profiles, chosen, list_outputs(self.maneuver))
         vehicle = sets.get("J_v", np.full(chosen.count, self.maneuver.model.J_v))
-        return compute_metrics(self.maneuver, columns, last_lock, vehicle)
+        return compute_metrics(self.maneuver, columns, last_lock, vehicle, self.metrics)
 
 
 def _join(parts: list[Outcome]) -> Outcome:

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum, auto
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,75 +140,125 @@ def list_outputs(maneuver: Maneuver) -> tuple[str, ...]:
     return ("shaft_torque", f"torque.{old}", f"slip.{old}", f"torque.{new}", f"slip.{new}")
 
 
+@dataclass(frozen=True, eq=False)
+class _Runs:
+    """Signals (runs, n) of the runs of a batch, with what several metrics need."""
+
+    maneuver: Maneuver
+    torque: FloatArray
+    off: FloatArray
+    off_slip: FloatArray
+    on: FloatArray
+    on_slip: FloatArray
+    last_lock: FloatArray
+    vehicle: FloatArray
+
+    @cached_property
+    def acceleration(self) -> FloatArray:
+        """Change of the vehicle's acceleration [m/s^2] from that before the request."""
+        radius, ratio = self.maneuver.wheel_radius, self.maneuver.model.i_f
+        scale = (radius * ratio / self.vehicle)[:, None]
+        return np.asarray(scale * (self.torque - self.torque[:, :1]))
+
+    @cached_property
+    def jerk(self) -> FloatArray:
+        """Jerk of the vehicle [m/s^3]."""
+        return compute_rates(self.maneuver.time, self.acceleration)
+
+    @cached_property
+    def power(self) -> FloatArray:
+        """Friction power of both elements [W]."""
+        return np.asarray(np.abs(self.off * self.off_slip) + np.abs(self.on * self.on_slip))
+
+
 def compute_metrics(
-    maneuver: Maneuver, columns: FloatArray, last_lock: FloatArray, vehicle: FloatArray
+    maneuver: Maneuver,
+    columns: FloatArray,
+    last_lock: FloatArray,
+    vehicle: FloatArray,
+    wanted: Iterable[Metric] = tuple(Metric),
 ) -> Outcome:
-    """Compute the metrics from `columns` (runs, 5, n) in the order of `list_outputs`.
+    """Compute the `wanted` metrics from `columns` (runs, 5, n) in the order of `list_outputs`.
 
     `last_lock` (runs,) [s] is that of the batch; `vehicle` (runs,) the wheel's inertia J_v
-    [kg m^2] of each run.
+    [kg m^2] of each run. A run that failed has 1e6 in every metric.
     """
     failed = ~np.isfinite(columns).all(axis=(1, 2))
-    torque, *friction = np.moveaxis(np.nan_to_num(columns), 1, 0)
-    off, off_slip, on, on_slip = friction
-    time, dt = maneuver.time, maneuver.step
-    scale = (maneuver.wheel_radius * maneuver.model.i_f / vehicle)[:, None]
-    change = scale * (torque - torque[:, :1])
-    jerk = compute_rates(time, change)
-    power = np.abs(off * off_slip) + np.abs(on * on_slip)
-    unlocked = np.abs(on_slip[:, -1]) > _LOCKED
-    values = {
-        Metric.PEAK_JERK: np.abs(jerk).max(axis=1),
-        Metric.SMOOTH_JERK: _compute_smooth_jerk(change, dt),
-        Metric.VIBRATION_DOSE: compute_vibration_doses(time, change),
-        Metric.TORQUE_HOLE: _compute_torque_hole(torque),
-        Metric.SHIFT_TIME: _compute_shift_time(maneuver, last_lock, on_slip[:, -1]),
-        Metric.RESPONSE_TIME: _compute_response_time(maneuver, off_slip),
-        Metric.FRICTION_ENERGY: power.sum(axis=1) * dt,
-        Metric.PEAK_POWER: power.max(axis=1),
-        Metric.FLARE: _compute_flare(maneuver, off_slip),
-        Metric.TIE_UP: _compute_tie_up(off),
-    }
+    signals = np.moveaxis(np.nan_to_num(columns) if failed.any() else columns, 1, 0)
+    torque, off, off_slip, on, on_slip = signals
+    runs = _Runs(maneuver, torque, off, off_slip, on, on_slip, last_lock, vehicle)
+    values = {one: _COMPUTE[one](runs) for one in wanted}
     for one in values.values():
         one[failed] = _FAILED
-    return Outcome(values, jerk, unlocked | failed, _find_relocks(on_slip))
+    unlocked = np.abs(runs.on_slip[:, -1]) > _LOCKED
+    return Outcome(values, runs.jerk, unlocked | failed, _find_relocks(runs.on_slip))
 
 
-def _compute_smooth_jerk(change: FloatArray, dt: float) -> FloatArray:
-    filtered = sosfilt(butter(2, LOW_PASS, fs=1.0 / dt, output="sos"), change, axis=-1)
+def _compute_peak_jerk(runs: _Runs) -> FloatArray:
+    return np.asarray(np.abs(runs.jerk).max(axis=1))
+
+
+def _compute_smooth_jerk(runs: _Runs) -> FloatArray:
+    dt = runs.maneuver.step
+    sections = butter(2, LOW_PASS, fs=1.0 / dt, output="sos")
+    filtered = sosfilt(sections, runs.acceleration, axis=-1)
     return np.asarray(np.abs(np.diff(filtered, axis=-1)).max(axis=1) / dt, dtype=np.float64)
 
 
-def _compute_torque_hole(torque: FloatArray) -> FloatArray:
-    sign = np.sign(torque[:, :1])
-    driving = sign * torque
+def _compute_vibration_dose(runs: _Runs) -> FloatArray:
+    return compute_vibration_doses(runs.maneuver.time, runs.acceleration)
+
+
+def _compute_torque_hole(runs: _Runs) -> FloatArray:
+    driving = np.sign(runs.torque[:, :1]) * runs.torque
     level = np.minimum(driving[:, 0], driving[:, -1])
     return np.asarray(np.maximum(level - driving.min(axis=1), 0.0))
 
 
-def _compute_shift_time(
-    maneuver: Maneuver, last_lock: FloatArray, end_slip: FloatArray
-) -> FloatArray:
-    slip = np.abs(end_slip)
-    locked = np.isfinite(last_lock) & (slip <= _LOCKED)
-    late = maneuver.horizon + _SLIP_TIME * slip
-    return np.asarray(np.where(locked, last_lock, late) - maneuver.request)
+def _compute_shift_time(runs: _Runs) -> FloatArray:
+    slip = np.abs(runs.on_slip[:, -1])
+    locked = np.isfinite(runs.last_lock) & (slip <= _LOCKED)
+    late = runs.maneuver.horizon + _SLIP_TIME * slip
+    return np.asarray(np.where(locked, runs.last_lock, late) - runs.maneuver.request)
 
 
-def _compute_response_time(maneuver: Maneuver, off_slip: FloatArray) -> FloatArray:
-    slipping = np.abs(off_slip) > _BREAKS_AWAY
+def _compute_response_time(runs: _Runs) -> FloatArray:
+    slipping = np.abs(runs.off_slip) > _BREAKS_AWAY
     first = np.where(slipping.any(axis=1), slipping.argmax(axis=1), slipping.shape[1] - 1)
-    return np.asarray(maneuver.time[first] - maneuver.request)
+    return np.asarray(runs.maneuver.time[first] - runs.maneuver.request)
 
 
-def _compute_flare(maneuver: Maneuver, off_slip: FloatArray) -> FloatArray:
+def _compute_friction_energy(runs: _Runs) -> FloatArray:
+    return np.asarray(runs.power.sum(axis=1) * runs.maneuver.step)
+
+
+def _compute_peak_power(runs: _Runs) -> FloatArray:
+    return np.asarray(runs.power.max(axis=1))
+
+
+def _compute_flare(runs: _Runs) -> FloatArray:
     """Slip is ω_e/(i_in·i_c) - i_out·ω_out: its excess at the engine is i_in·i_c times it."""
-    lead = maneuver.model.i_in * maneuver.offgoing.i_c * off_slip
-    return np.asarray(np.maximum(-maneuver.direction * lead, 0.0).max(axis=1))
+    shift = runs.maneuver
+    lead = shift.model.i_in * shift.offgoing.i_c * runs.off_slip
+    return np.asarray(np.maximum(-shift.direction * lead, 0.0).max(axis=1))
 
 
-def _compute_tie_up(off: FloatArray) -> FloatArray:
-    return np.asarray(np.maximum(-np.sign(off[:, :1]) * off, 0.0).max(axis=1))
+def _compute_tie_up(runs: _Runs) -> FloatArray:
+    return np.asarray(np.maximum(-np.sign(runs.off[:, :1]) * runs.off, 0.0).max(axis=1))
+
+
+_COMPUTE: Mapping[Metric, Callable[[_Runs], FloatArray]] = {
+    Metric.PEAK_JERK: _compute_peak_jerk,
+    Metric.SMOOTH_JERK: _compute_smooth_jerk,
+    Metric.VIBRATION_DOSE: _compute_vibration_dose,
+    Metric.TORQUE_HOLE: _compute_torque_hole,
+    Metric.SHIFT_TIME: _compute_shift_time,
+    Metric.RESPONSE_TIME: _compute_response_time,
+    Metric.FRICTION_ENERGY: _compute_friction_energy,
+    Metric.PEAK_POWER: _compute_peak_power,
+    Metric.FLARE: _compute_flare,
+    Metric.TIE_UP: _compute_tie_up,
+}
 
 
 def _find_relocks(on_slip: FloatArray) -> NDArray[np.bool_]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cached_property
 
 import numpy as np
 
@@ -160,7 +161,7 @@ class TwinDraws:
 
     def _draw_parameters(self, random: np.random.Generator) -> dict[str, float]:
         twin = self.twin
-        ids = self.list_drawn_ids()
+        ids = self.drawn_ids
         if not ids or twin.covariance is None:
             return {}
         index = [twin.covariance_ids.index(one) for one in ids]
@@ -172,8 +173,9 @@ class TwinDraws:
             for name, value in zip(ids, values, strict=True)
         }
 
-    def list_drawn_ids(self) -> list[str]:
-        """Return the ids of the covariance that the model of the shift depends on."""
+    @cached_property
+    def drawn_ids(self) -> list[str]:
+        """Ids of the covariance that the model of the shift depends on."""
         twin, used = self.twin, set(self.twin.list_model_ids(self.shift))
         gear = twin.select_inertia_gear(self.shift)
         used -= {name for name in used if name.startswith("J_prime_")}
@@ -185,8 +187,12 @@ class TwinDraws:
         ]
 
     def _scale_friction(self, element: ShiftElement, random: np.random.Generator) -> ShiftElement:
-        std = compute_friction_std(self.twin.friction.get(element.name))
-        return scale_friction(element, float(random.normal(1.0, std)))
+        return scale_friction(element, float(random.normal(1.0, self._friction_stds[element.name])))
+
+    @cached_property
+    def _friction_stds(self) -> dict[str, float]:
+        names = (self.shift.offgoing, self.shift.oncoming)
+        return {name: compute_friction_std(self.twin.friction.get(name)) for name in names}
 
 
 def compute_friction_std(curve: FrictionCurve | None) -> float:

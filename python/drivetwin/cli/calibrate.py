@@ -213,11 +213,10 @@ def _print_results(found: Calibration) -> None:
     print_table(table)
     for one in after.limits:
         display = get_metric_display(one.limit.metric)
-        state = "certified" if one.certified else "kept on the draws, not certified"
         print_line(
             f"{METRICS[one.limit.metric].label} ({one.limit.statistic.value}): "
             f"{one.value * display.factor:.4g} {display.label}, limit "
-            f"{one.limit.bound * display.factor:.4g}: {state}{', binds' if one.binding else ''}"
+            f"{one.limit.bound * display.factor:.4g}: {one.state.value}{', binds' if one.binding else ''}"
         )
     print_line(f"no lock-up in {after.unlocked}, slip after lock-up in {after.relocked} draws")
 

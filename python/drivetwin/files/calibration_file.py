@@ -155,8 +155,7 @@ def build_certificate_document(found: Calibration) -> dict[str, Any]:
                     "bound": one.limit.bound,
                     "value": one.value,
                     "upper": one.upper,
-                    "kept": one.kept,
-                    "certified": one.certified,
+                    "state": one.state.value,
                     "binding": one.binding,
                 }
                 for one in found.after.certificate.limits

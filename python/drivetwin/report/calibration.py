@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivetwin.calibration.calibrate import Calibration
-from drivetwin.calibration.certificate import LimitCheck
+from drivetwin.calibration.certificate import LimitCheck, LimitState
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.findings import Finding
 from drivetwin.report.figures.calibration import (
@@ -28,6 +28,12 @@ from drivetwin.report.sections.blocks import (
     Tone,
     make_cells,
 )
+
+_TONES = {
+    LimitState.CERTIFIED: Tone.GOOD,
+    LimitState.KEPT: Tone.DOUBTFUL,
+    LimitState.EXCEEDED: Tone.UNKNOWN,
+}
 
 
 def render_calibration(found: Calibration, title: str, findings: Sequence[Finding]) -> str:
@@ -103,15 +109,16 @@ def _build_limits(found: Calibration) -> TableBlock:
 def _build_limit_row(one: LimitCheck) -> tuple[Cell, ...]:
     display = get_metric_display(one.limit.metric)
     upper = "–" if one.upper is None else f"{one.upper * display.factor:.4g}"
-    state = "binds" if one.binding else "open"
-    kept = "certified" if one.certified else "kept, not certified" if one.kept else "exceeded"
-    tone = Tone.GOOD if one.certified else Tone.DOUBTFUL if one.kept else Tone.UNKNOWN
     return (
         *make_cells(METRICS[one.limit.metric].label, one.limit.statistic.value),
         Cell(f"{one.limit.bound * display.factor:.4g} {display.label}", number=True),
         Cell(f"{one.value * display.factor:.4g}", number=True),
         Cell(upper, number=True),
-        Cell(f"{kept}, {state}", badge=True, tone=tone),
+        Cell(
+            f"{one.state.value}{', binds' if one.binding else ''}",
+            badge=True,
+            tone=_TONES[one.state],
+        ),
     )
 
 
