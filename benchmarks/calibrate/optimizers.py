@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -149,10 +150,8 @@ def _run_within(
         watch.note(value, coordinates)
         return value
 
-    try:
+    with suppress(OutOfTimeError):
         search(evaluate, space.start)
-    except OutOfTimeError:
-        pass
     best = space.start if watch.best is None else watch.best
     return _finish(name, task, (watch.begin, plant), (best, fresh))
 

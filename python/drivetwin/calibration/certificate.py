@@ -61,6 +61,11 @@ class LimitCheck:
         return LimitState.KEPT if self.value <= self.limit.bound else LimitState.EXCEEDED
 
     @property
+    def text(self) -> str:
+        """State in words, and whether the limit binds."""
+        return f"{self.state.value}{', binds' if self.binding else ''}"
+
+    @property
     def binding(self) -> bool:
         """True if the estimate lies within 2 % of the limit, or beyond it."""
         return self.value >= (1.0 - _BINDING) * self.limit.bound

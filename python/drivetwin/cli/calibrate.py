@@ -216,7 +216,7 @@ def _print_results(found: Calibration) -> None:
         print_line(
             f"{METRICS[one.limit.metric].label} ({one.limit.statistic.value}): "
             f"{one.value * display.factor:.4g} {display.label}, limit "
-            f"{one.limit.bound * display.factor:.4g}: {one.state.value}{', binds' if one.binding else ''}"
+            f"{one.limit.bound * display.factor:.4g}: {one.text}"
         )
     print_line(f"no lock-up in {after.unlocked}, slip after lock-up in {after.relocked} draws")
 

@@ -114,11 +114,7 @@ def _build_limit_row(one: LimitCheck) -> tuple[Cell, ...]:
         Cell(f"{one.limit.bound * display.factor:.4g} {display.label}", number=True),
         Cell(f"{one.value * display.factor:.4g}", number=True),
         Cell(upper, number=True),
-        Cell(
-            f"{one.state.value}{', binds' if one.binding else ''}",
-            badge=True,
-            tone=_TONES[one.state],
-        ),
+        Cell(one.text, badge=True, tone=_TONES[one.state]),
     )
 
 
