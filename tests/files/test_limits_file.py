@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import Limit, Statistic
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
@@ -59,3 +60,19 @@ def test_faults_are_named(tmp_path: Path, text: str, said: str) -> None:
     path.write_text(text)
     with pytest.raises(InputError, match=said):
         load_limits(path)
+
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "calibrate.md"
+
+
+def test_the_documented_limits_are_those_of_the_program(tmp_path: Path) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    (example,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    path = tmp_path / "limits.toml"
+    path.write_text(example, encoding="utf-8")
+    found = load_limits(path)
+    assert found.spread == Spread()
+    assert len(found.limits) == 2
+    listed = re.findall(r"^\| `(\w+)` \| ([\w -]+) \|", text, re.MULTILINE)
+    keys = {name: METRICS[metric].label for name, (metric, _) in build_limit_keys().items()}
+    assert dict(listed) == {k: v for k, v in keys.items() if not k.startswith("mean_")}
