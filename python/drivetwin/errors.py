@@ -141,3 +141,7 @@ class RefusedError(InputError):
 
 class CompilerError(DrivetwinError):
     """A C compiler refuses the sources of an export; the text quotes it."""
+
+
+class InfeasibleError(DrivetwinError):
+    """No calibration within the limits was found; the text names those exceeded and by how much."""

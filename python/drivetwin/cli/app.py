@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from drivetwin.cli.calibrate import calibrate
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
@@ -44,6 +45,7 @@ for command in (
     examine,
     simulate,
     observe,
+    calibrate,
     report,
     export,
     gearbox,

@@ -130,7 +130,7 @@ def _load_subject(
     """Load the model, and the initial state from the shift of the log if one is given."""
     from drivetwin.export.subject import build_subject
 
-    gears = _parse_gears(shift)
+    gears = None if shift is None else parse_gears(shift)
     if log is None:
         return build_subject(twin, gears), None
     from drivetwin.export.fmu.measured import build_measured_subject
@@ -139,9 +139,8 @@ def _load_subject(
     return build_measured_subject(twin, read_log(log, twin.build_card(), channels), gears)
 
 
-def _parse_gears(text: str | None) -> tuple[str, str] | None:
-    if text is None:
-        return None
+def parse_gears(text: str) -> tuple[str, str]:
+    """Return the two gears of `--shift`. Raises InputError where it does not name two."""
     old, dash, new = text.partition("-")
     if not (old and dash and new):
         raise InputError(f"--shift {text!r} does not name two gears", "write it as in --shift 2-3")

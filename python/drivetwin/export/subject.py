@@ -4,13 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
-from drivetwin.errors import InputError
-from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, State
+from drivetwin.twin.nominal_shift import build_nominal_shift
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.shift_kind import ShiftKind
 
 DEFAULT_ENGINE_SPEED = 150.0
 """Default engine speed [rad/s] at the start, for a twin without recorded speeds."""
@@ -44,38 +41,12 @@ def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
     )
 
 
-def build_nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
-    """The shift between two gears without times, as far as a model needs it."""
-    start, end = gears or _find_first_shift(twin)
-    elements = twin.get_gear(start).element, twin.get_gear(end).element
-    if elements[0] == elements[1]:
-        raise InputError(
-            f"gears {start!r} and {end!r} of {twin.name!r} are held by the same element",
-            "choose two neighbouring gears",
-        )
-    never = (0.0, 0.0)
-    kind = ShiftKind.POWER_ON_UP
-    return Shift(start, end, *elements, kind, never, never, never, never, 0.0)
-
-
 def compute_steady_start(model: DualClutch, locked: str, engine_speed: float) -> State:
     """Constant speed with one element locked: the shaft carries the load, nothing slips."""
     output_speed = engine_speed / model.get_overall_ratio(locked)
     wheel_speed = output_speed / model.i_f
     twist = model.load.evaluate(wheel_speed) / model.i_f / model.k_o
     return State(engine_speed, output_speed, wheel_speed, twist, (locked,))
-
-
-def _find_first_shift(twin: Twin) -> tuple[str, str]:
-    """First pair of neighbouring gears with a friction curve."""
-    for old, new in pairwise(twin.gears):
-        held = (twin.gears[old].element, twin.gears[new].element)
-        if held[0] != held[1] and any(name in twin.friction for name in held):
-            return old, new
-    raise InputError(
-        f"the twin {twin.name!r} has no pair of neighbouring gears with a known friction curve",
-        "name the shift with --shift, such as --shift 2-3",
-    )
 
 
 def _compute_usual_speed(twin: Twin) -> float:

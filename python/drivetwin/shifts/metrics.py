@@ -37,13 +37,30 @@ def compute_response_time(request: Channel, shift: Shift) -> float | None:
     return begin - float(starts[-1]) if starts.size else None
 
 
+def compute_rates(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Time derivatives (..., n) of `values` (..., n) sampled at `time` (n,), per s.
+
+    Central differences, one-sided at both ends.
+    """
+    steps = np.diff(time)
+    uniform = bool(np.allclose(steps, steps[0], rtol=1e-9, atol=0.0))
+    spacing = float(steps.mean()) if uniform else time
+    return np.asarray(np.gradient(values, spacing, axis=-1), dtype=np.float64)
+
+
 def compute_largest_rate(time: FloatArray, values: FloatArray) -> float:
     """Largest magnitude of the time derivative of `values` (n,), in their unit per s.
 
     Central differences. With the angular acceleration of the wheel [rad/s^2] as `values` this is
     its peak jerk [rad/s^3]. Source: definition of jerk.
     """
-    return float(np.abs(np.gradient(values, time)).max())
+    return float(np.abs(compute_rates(time, values)).max())
+
+
+def compute_vibration_doses(time: FloatArray, acceleration: FloatArray) -> FloatArray:
+    """Vibration dose values (...) of accelerations (..., n); see `compute_vibration_dose`."""
+    fourth = np.square(np.square(acceleration))
+    return np.asarray(np.trapezoid(fourth, time, axis=-1) ** 0.25, dtype=np.float64)
 
 
 def compute_vibration_dose(time: FloatArray, acceleration: FloatArray) -> float:
@@ -52,4 +69,4 @@ def compute_vibration_dose(time: FloatArray, acceleration: FloatArray) -> float:
     For a in m/s^2 the unit is m/s^1.75, for rad/s^2 rad/s^1.75. The frequency weighting of the
     standard is not applied. Source: ISO 2631-1:1997, section 6.3.2.
     """
-    return float(np.trapezoid(acceleration**4, time) ** 0.25)
+    return float(compute_vibration_doses(time, acceleration))

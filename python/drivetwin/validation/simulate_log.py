@@ -15,7 +15,7 @@ from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, SignalFit
 from drivetwin.estimation.result.validation import SignalTrace, Validation
-from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.pressures import get_shift_pressures
@@ -23,15 +23,18 @@ from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory, simulate
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.gate import assess_model
+from drivetwin.validation.identified_range import (
+    check_range,
+    collect_loaded_slip,
+    find_range_excess,
+    name_ends,
+)
 from drivetwin.validation.initial_state import estimate_start_state, find_quiescent_time
 from drivetwin.vehicle.spec import PriorValue
 
 SIGNALS = ("output_torque", "input_speed", "output_speed")
 _GRID = 1e-3
 """Output step [s] of the simulation: 80 points per period of a 12 Hz oscillation."""
-_CARRIES = 0.02
-"""Share of a run's largest clutch torque from which an element's slip asks for its friction."""
-
 
 Start = tuple[float, State]
 """Time [s] and state from which a simulation starts."""
@@ -289,14 +292,14 @@ def _check_run(twin: Twin, validation: Validation) -> tuple[Finding, ...]:
     run = validation.trajectory
     findings = _check_end(run)
     seen = {
-        "slip": _collect_loaded_slip(run),
+        "slip": collect_loaded_slip(run),
         "pressure": [signal.values for signal in validation.pressures.values()],
         "torque": [validation.engine_torque.values],
         "speed": [run.engine_speed],
     }
     for name, arrays in seen.items():
         if name in twin.validity:
-            findings += _check_range(name, arrays, twin.validity[name])
+            findings += check_range(name, arrays, twin.validity[name])
     return tuple(findings)
 
 
@@ -312,50 +315,9 @@ def _check_divergence(one: Validation) -> list[Finding]:
     if speed is None or not np.isfinite(speed.measured).any():
         return findings
     limits = (float(np.nanmin(speed.measured)), float(np.nanmax(speed.measured)))
-    if (reached := _find_range_excess([speed.simulated], limits)) is None:
+    if (reached := find_range_excess([speed.simulated], limits)) is None:
         return findings
     shift = one.shift
     label = f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s"
-    ends = _name_ends(reached, limits, "rad/s")
+    ends = name_ends(reached, limits, "rad/s")
     return [*findings, report(Code.SIMULATION_DIVERGES, label, **ends)]
-
-
-def _name_ends(
-    reached: tuple[float, float], limits: tuple[float, float], unit: str
-) -> dict[str, Number]:
-    """Return the ends of the range reached by a run and of its limits, for a finding."""
-    names = ("low", "high", "limit_low", "limit_high")
-    return {n: Number(x, unit) for n, x in zip(names, (*reached, *limits), strict=True)}
-
-
-def _collect_loaded_slip(run: Trajectory) -> list[FloatArray]:
-    """|slip| of each element while it carries torque [rad/s]; an open one may turn at any speed."""
-    torques = {name: np.abs(torque) for name, torque in run.clutch_torque.items()}
-    least = _CARRIES * max(float(np.nanmax(torque)) for torque in torques.values())
-    return [np.abs(slip[torques[name] > least]) for name, slip in run.slip.items()]
-
-
-_RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N*m", "speed": "rad/s"}
-"""Units of what a twin has a range of."""
-
-
-def _check_range(name: str, arrays: list[FloatArray], limits: tuple[float, float]) -> list[Finding]:
-    if (reached := _find_range_excess(arrays, limits)) is None:
-        return []
-    ends = _name_ends(reached, limits, _RANGES[name])
-    return [report(Code.OUTSIDE_IDENTIFIED_RANGE, name, **ends)]
-
-
-def _find_range_excess(
-    arrays: list[FloatArray], limits: tuple[float, float]
-) -> tuple[float, float] | None:
-    """Least and greatest value; None where no value lies clearly beyond the limits."""
-    values = np.concatenate(arrays)
-    values = values[np.isfinite(values)]
-    if values.size == 0:
-        return None
-    low, high = float(values.min()), float(values.max())
-    margin = 0.02 * (limits[1] - limits[0])
-    if low >= limits[0] - margin and high <= limits[1] + margin:
-        return None
-    return low, high

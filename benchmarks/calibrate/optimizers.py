@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""Optimisers that are compared: the product's, CMA-ES alone, and L-BFGS, from one start."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.calibrate import (
+    Assessment,
+    Task,
+    assess,
+    build_objective,
+    draw_for,
+    find_best,
+    make_quick_plant,
+)
+from drivetwin.calibration.evaluate import Plant
+from drivetwin.calibration.metrics import Metric, Outcome
+from drivetwin.calibration.objective import Objective
+from drivetwin.calibration.profiles import Space
+from drivetwin.calibration.scenarios import Purpose, Scenarios
+from drivetwin.calibration.search import search_minima
+
+_DIFFERENCE = 2e-3
+"""Step of the differences of L-BFGS, in shares of the ranges."""
+_POWER = 8
+"""Power of the soft maximum over time and draws by L-BFGS, which needs a smooth objective."""
+
+
+class OutOfTimeError(Exception):
+    """The CPU time of an optimiser is used up."""
+
+
+@dataclass
+class Watch:
+    """CPU time [s] that an optimiser has, and the best coordinates that it has found."""
+
+    limit: float
+    begin: float
+    value: float = float("inf")
+    best: FloatArray | None = None
+
+    def note(self, value: float, coordinates: FloatArray) -> None:
+        """Remember better coordinates. Raises OutOfTimeError after the limit."""
+        if value < self.value:
+            self.value, self.best = value, coordinates.copy()
+        if self.elapsed > self.limit:
+            raise OutOfTimeError
+
+    @property
+    def elapsed(self) -> float:
+        """CPU time used [s]."""
+        return time.process_time() - self.begin
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Result of an optimiser: CPU time [s], simulated shifts, and its best calibration."""
+
+    name: str
+    cpu: float
+    runs: int
+    found: Assessment
+
+
+def run_product(task: Task, fresh: Scenarios, _: float) -> Entry:
+    """Run search and polish of `drivetwin calibrate`."""
+    begin, plant = time.process_time(), make_quick_plant(task)
+    best = find_best(task, plant)
+    return _finish("drivetwin calibrate", task, (begin, plant), (best, fresh))
+
+
+def run_cma(task: Task, fresh: Scenarios, limit: float) -> Entry:
+    """Run CMA-ES alone, one start after the other, on the draws of the polish."""
+
+    def search(evaluate: Callable[[FloatArray], float], start: FloatArray) -> None:
+        seed = 100 * task.seed
+        alone = replace(task.settings, starts=1, finalists=1, first_evaluations=4000,
+                        evaluations=4000)  # fmt: skip
+        while True:
+            search_minima(evaluate, start, alone, seed)
+            seed += 1
+
+    return _run_within("CMA-ES alone", task, fresh, limit, search)
+
+
+def run_lbfgs(task: Task, fresh: Scenarios, limit: float) -> Entry:
+    """Run L-BFGS on a soft maximum of jerk by differences, from random starts after the first."""
+    space, plant = Space(task.policy), make_quick_plant(task)
+    draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
+    objective = build_objective(task, plant)
+    random = np.random.default_rng(task.seed)
+
+    def search(evaluate: Callable[[FloatArray], float], start: FloatArray) -> None:
+        def smooth(at: FloatArray) -> float:
+            outcome = plant.evaluate(space.build_profiles(at), draws)
+            return _soften(objective, outcome)
+
+        def slope(at: FloatArray) -> tuple[float, FloatArray]:
+            evaluate(at)
+            base, signs = smooth(at), np.where(at < 0.5, 1.0, -1.0)
+            moved = [smooth(at + _DIFFERENCE * one) for one in np.diag(signs)]
+            return base, (np.array(moved) - base) / (_DIFFERENCE * signs)
+
+        at = start
+        while True:
+            minimize(slope, at, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * at.size)
+            at = np.clip(start + 0.12 * random.standard_normal(start.size), 0.0, 1.0)
+
+    return _run_within("L-BFGS", task, fresh, limit, search)
+
+
+def run_start(task: Task, fresh: Scenarios) -> Entry:
+    """Assess the hand tuning."""
+    plant = make_quick_plant(task)
+    clock = time.process_time(), plant
+    return _finish("hand tuning", task, clock, (Space(task.policy).start, fresh))
+
+
+def _soften(objective: Objective, outcome: Outcome) -> float:
+    size = np.minimum(np.abs(outcome.jerk), 1e3) / 50.0
+    peak = 50.0 * (size**_POWER).sum(axis=1) ** (1.0 / _POWER)
+    soft = float((peak**_POWER).mean() ** (1.0 / _POWER))
+    excess = sum(float(one.compute_excess(outcome).mean()) for one in objective.limits)
+    return soft + objective.weight * excess
+
+
+def _run_within(
+    name: str,
+    task: Task,
+    fresh: Scenarios,
+    limit: float,
+    search: Callable[[Callable[[FloatArray], float], FloatArray], None],
+) -> Entry:
+    """Run a search until its CPU time [s] is used up."""
+    space, plant = Space(task.policy), make_quick_plant(task)
+    watch = Watch(limit, time.process_time())
+    draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
+    objective = build_objective(task, plant)
+
+    def evaluate(coordinates: FloatArray) -> float:
+        value = objective.evaluate(plant.evaluate(space.build_profiles(coordinates), draws))
+        watch.note(value, coordinates)
+        return value
+
+    with suppress(OutOfTimeError):
+        search(evaluate, space.start)
+    best = space.start if watch.best is None else watch.best
+    return _finish(name, task, (watch.begin, plant), (best, fresh))
+
+
+def _finish(
+    name: str, task: Task, clock: tuple[float, Plant], result: tuple[FloatArray, Scenarios]
+) -> Entry:
+    begin, plant = clock
+    cpu, runs = time.process_time() - begin, plant.count.runs
+    whole = replace(plant, metrics=tuple(Metric))
+    return Entry(name, cpu, runs, assess(task, whole, *result))

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""The calibration that every optimiser solves: the stated upshift with 18 knots and its spread.
+
+Heavy truck, power-on upshift 2-3 from steady acceleration at 1400 N·m and 185 rad/s, requested at
+0.40 s, 1.5 s in all. Knots: on-coming pressure at 0.45 to 1.15 s, off-going pressure at 0.45 to
+0.64 s, engine torque at 0.55 to 1.05 s (600 to 1400 N·m). Standard deviations between units: gain
+of each clutch 2.5 %, engine torque 1.5 %, contact pressure 0.05 bar. Wanted: a small 95 % quantile
+of peak jerk of the vehicle, 95 % of the lock-ups by 1.15 s, mean friction energy at most 46 kJ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.calibration.calibrate import Task
+from drivetwin.calibration.knot_policy import KnotPolicy, KnotProfile
+from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
+from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.scenarios import scale_units
+from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.spread import Spread
+from drivetwin.simulation.dual_clutch import DualClutch
+from tests.support.upshift.scenario import build_model
+from tests.support.upshift.statement import BAR, make_problem
+
+REQUEST, HORIZON, LOCK_BY = 0.40, 1.5, 1.15
+TORQUE, SPEED, WHEEL_RADIUS = 1400.0, 185.0, 0.5
+ENERGY = 46e3
+SHARE_95, SHARE_99 = 50.0, 60.0
+"""Stated bounds of the quantiles of peak jerk [m/s^3]."""
+CPU = 60.0
+"""Stated CPU time of a calibration with all its starts [s]."""
+FRESH = 4000
+"""Fresh draws of the certificate."""
+CERTIFICATE_SEED = 4242
+
+
+def make_maneuver() -> Maneuver:
+    """Return the shift."""
+    point = OperatingPoint(TORQUE, SPEED)
+    return Maneuver(build_model(make_problem()), point, WHEEL_RADIUS, REQUEST, HORIZON)
+
+
+def make_policy() -> KnotPolicy:
+    """Return the knots with a careful hand tuning as their start."""
+    on = (0.9, 1.2, 3.5, 6.0, 6.2, 6.3, 6.6, 9.0)
+    off = (8.0, 5.5, 3.0, 0.4)
+    held, gone = 10.0 * BAR, 0.0
+    return KnotPolicy(
+        oncoming=KnotProfile(
+            ((0.0, 0.0), (REQUEST, 0.0)),
+            (0.45, 0.55, 0.65, 0.75, 0.85, 0.95, 1.05, 1.15),
+            ((1.25, held), (HORIZON, held)),
+            tuple(BAR * value for value in on),
+            0.2 * BAR,
+            10.0 * BAR,
+        ),
+        offgoing=KnotProfile(
+            ((0.0, held), (REQUEST, held)),
+            (0.45, 0.52, 0.58, 0.64),
+            ((0.70, gone), (HORIZON, gone)),
+            tuple(BAR * value for value in off),
+            0.0,
+            10.0 * BAR,
+        ),
+        engine_torque=KnotProfile(
+            ((0.0, TORQUE), (0.5, TORQUE)),
+            (0.55, 0.65, 0.75, 0.85, 0.95, 1.05),
+            ((1.15, TORQUE), (HORIZON, TORQUE)),
+            (1400.0, 1300.0, 1150.0, 1150.0, 1200.0, 1350.0),
+            600.0,
+            TORQUE,
+        ),
+    )
+
+
+def make_task(settings: CalibrationSettings, seed: int) -> Task:
+    """Return the problem."""
+    maneuver = make_maneuver()
+    spread = Spread()
+
+    def draw(random: np.random.Generator) -> DualClutch:
+        return scale_units(maneuver.model, spread, random)
+
+    limits = (
+        Limit(Metric.SHIFT_TIME, LOCK_BY - REQUEST),
+        Limit(Metric.FRICTION_ENERGY, ENERGY, Statistic.MEAN),
+    )
+    return Task(maneuver, make_policy(), draw, limits, seed, settings)

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Calibration of a shift: controller policy, scenarios, metrics, optimiser, certificate."""

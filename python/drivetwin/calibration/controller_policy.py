@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: MIT
+"""Policy of a transmission controller for shifts whose torque phase comes first.
+
+Events in the order of time: the on-coming element is filled and held at its kiss pressure; in the
+torque phase its pressure rises to the hand-over value while the off-going element is released; in
+the inertia phase its pressure follows two straight lines while the engine torque is reduced; a
+final ramp locks it. Pressures are those at the clutch: the twin has no model of the actuator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import format_with_unit
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.profiles import (
+    PolicyParameter,
+    Profiles,
+    check_parameters,
+    move_start,
+)
+from drivetwin.errors import InputError
+from drivetwin.simulation.dual_clutch import ShiftElement, Signal
+
+_FILL_PRESSURE = 0.9
+"""Starting pressure at the end of the filling, over the contact pressure P0."""
+_INERTIA_TIME = 0.45
+"""Starting duration of the inertia phase [s]."""
+_REDUCTION = 0.15
+"""Starting depth of the torque reduction, over the engine torque."""
+_LOCK_PRESSURE = 1.3
+"""Starting pressure at the end of the inertia phase, over that in its middle."""
+_HOLD_MARGIN = 1.25
+"""Starting pressure of the off-going element before its release, over what carries the torque."""
+_SHORTEST = 1e-3
+"""Shortest step of a profile [s]; a jump has no rate."""
+
+
+@dataclass(frozen=True)
+class ControllerPolicy:
+    """Profiles from the controller's own parameters; see `build_controller_policy`.
+
+    `request` and `horizon` [s] as in `Maneuver`; `engine_torque` [N m] is the driver's demand,
+    `direction` the sign of the torque intervention, `system_pressure` [Pa] that of a held element.
+    """
+
+    parameters: tuple[PolicyParameter, ...]
+    request: float
+    horizon: float
+    engine_torque: float
+    direction: float
+    system_pressure: float
+
+    def __post_init__(self) -> None:
+        check_parameters(self.parameters)
+
+    def set_start(self, values: Mapping[str, float]) -> ControllerPolicy:
+        """Return the policy with other starting values by name; see `move_start`."""
+        return replace(self, parameters=move_start(self.parameters, values))
+
+    def build_profiles(self, values: FloatArray) -> Profiles:
+        """Return the profiles of values (p,) in SI."""
+        names = (one.name for one in self.parameters)
+        at = dict(zip(names, values.tolist(), strict=True))
+        filled = self.request + at["fill_time"]
+        handed_over = filled + at["torque_phase_time"]
+        return Profiles(
+            engine_torque=self._build_torque(at, handed_over),
+            offgoing=self._build_offgoing(at, filled),
+            oncoming=self._build_oncoming(at, filled, handed_over),
+        )
+
+    def _build_oncoming(self, at: Mapping[str, float], filled: float, handed: float) -> Signal:
+        middle = handed + at["inertia_share"] * at["inertia_time"]
+        end = handed + at["inertia_time"]
+        return self._build_signal(
+            (self.request, 0.0),
+            (self.request + 0.8 * at["fill_time"], at["fill_pressure"]),
+            (filled, at["kiss_pressure"]),
+            (handed, at["handover_pressure"]),
+            (middle, at["inertia_pressure"]),
+            (end, at["sync_pressure"]),
+            (end + at["lock_ramp_time"], self.system_pressure),
+        )
+
+    def _build_offgoing(self, at: Mapping[str, float], filled: float) -> Signal:
+        release = filled + at["release_delay"]
+        return self._build_signal(
+            (self.request, self.system_pressure),
+            (filled, at["hold_pressure"]),
+            (release, at["hold_pressure"]),
+            (release + at["release_time"], 0.0),
+        )
+
+    def _build_torque(self, at: Mapping[str, float], handed: float) -> Signal:
+        reduced = self.engine_torque + self.direction * at["reduction_depth"]
+        begin = handed + at["reduction_delay"]
+        restore = max(
+            begin + at["reduction_time"], handed + at["inertia_time"] + at["return_delay"]
+        )
+        return self._build_signal(
+            (begin, self.engine_torque),
+            (begin + at["reduction_time"], reduced),
+            (restore, reduced),
+            (restore + at["return_time"], self.engine_torque),
+        )
+
+    def _build_signal(self, *corners: tuple[float, float]) -> Signal:
+        """Return a signal that is constant before its first and after its last corner."""
+        times, values = [0.0], [corners[0][1]]
+        for time, value in corners:
+            times.append(max(time, times[-1] + _SHORTEST))
+            values.append(value)
+        times.append(max(self.horizon, times[-1]) + _SHORTEST)
+        values.append(values[-1])
+        return Signal(np.array(times), np.array(values))
+
+
+def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> ControllerPolicy:
+    """Return the policy of a shift, with a start from the static torque balance.
+
+    At hand-over the on-coming element carries the engine torque alone; in the inertia phase also
+    the torque that changes the engine speed within 0.45 s. `system_pressure` [Pa] is that of a
+    held element. Raises InputError where it cannot carry the engine torque.
+    """
+    torque = abs(maneuver.point.engine_torque)
+    old, new = maneuver.offgoing, maneuver.oncoming
+    handover = _compute_pressure(new, _compute_handover_torque(maneuver))
+    inertia = _compute_pressure(new, _compute_inertia_torque(maneuver))
+    hold = _compute_pressure(old, _HOLD_MARGIN * _compute_held_torque(maneuver))
+    for name, needed in ((new.name, max(handover, inertia)), (old.name, hold)):
+        if needed >= system_pressure:
+            raise InputError(
+                f"{name} needs {format_with_unit(needed, 'Pa', digits=3)} in this shift, the "
+                f"system pressure is {format_with_unit(system_pressure, 'Pa', digits=3)}",
+                "give a smaller engine torque, or a larger system pressure",
+            )
+    sync = min(_LOCK_PRESSURE * inertia, 0.5 * (inertia + system_pressure))
+    parameters = (
+        *_list_fill_parameters(new),
+        *_list_torque_phase_parameters(handover, hold, system_pressure),
+        *_list_inertia_parameters((inertia, sync), system_pressure),
+        *_list_torque_parameters(torque),
+    )
+    return ControllerPolicy(
+        parameters,
+        maneuver.request,
+        maneuver.horizon,
+        maneuver.point.engine_torque,
+        maneuver.direction,
+        system_pressure,
+    )
+
+
+def _list_fill_parameters(element: ShiftElement) -> tuple[PolicyParameter, ...]:
+    contact = element.P0
+    fill = _FILL_PRESSURE * contact
+    top = max(contact, 1e4)
+    return (
+        PolicyParameter("fill_pressure", "Pa", 0.0, top, fill,
+                        "on-coming pressure after 80 % of the filling", free=False),
+        PolicyParameter("fill_time", "s", 0.03, 0.20, 0.08, "request to the end of the filling"),
+        PolicyParameter("kiss_pressure", "Pa", 0.5 * top, 2.0 * top, 1.05 * top,
+                        "on-coming pressure at the end of the filling"),
+    )  # fmt: skip
+
+
+def _list_torque_phase_parameters(
+    handover: float, hold: float, highest: float
+) -> tuple[PolicyParameter, ...]:
+    return (
+        PolicyParameter("torque_phase_time", "s", 0.05, 0.40, 0.15,
+                        "ramp of the on-coming element in the torque phase"),
+        PolicyParameter("handover_pressure", "Pa", 0.4 * handover, min(1.8 * handover, highest),
+                        handover, "on-coming pressure at the end of the torque phase"),
+        PolicyParameter("hold_pressure", "Pa", 0.5 * hold, min(1.8 * hold, highest), hold,
+                        "off-going pressure before its release"),
+        PolicyParameter("release_delay", "s", 0.0, 0.25, 0.03,
+                        "end of the filling to the begin of the release"),
+        PolicyParameter("release_time", "s", 0.03, 0.35, 0.13,
+                        "ramp of the off-going element to zero"),
+    )  # fmt: skip
+
+
+def _list_inertia_parameters(
+    pressures: tuple[float, float], highest: float
+) -> tuple[PolicyParameter, ...]:
+    middle, sync = pressures
+    return (
+        PolicyParameter("inertia_pressure", "Pa", 0.4 * middle, min(2.0 * middle, highest),
+                        middle, "on-coming pressure in the inertia phase"),
+        PolicyParameter("inertia_share", "1", 0.15, 0.85, 0.5,
+                        "place of the inertia pressure within the inertia phase"),
+        PolicyParameter("sync_pressure", "Pa", 0.4 * middle, highest, sync,
+                        "on-coming pressure at the end of the inertia phase"),
+        PolicyParameter("inertia_time", "s", 0.15, 0.90, _INERTIA_TIME,
+                        "end of the torque phase to the begin of the final ramp"),
+        PolicyParameter("lock_ramp_time", "s", 0.05, 0.40, 0.15, "final ramp to system pressure"),
+    )  # fmt: skip
+
+
+def _list_torque_parameters(torque: float) -> tuple[PolicyParameter, ...]:
+    return (
+        PolicyParameter("reduction_depth", "N*m", 0.0, 0.6 * torque, _REDUCTION * torque,
+                        "engine torque intervention"),
+        PolicyParameter("reduction_delay", "s", -0.10, 0.20, 0.0,
+                        "end of the torque phase to the begin of the intervention"),
+        PolicyParameter("reduction_time", "s", 0.04, 0.30, 0.10, "ramp of the intervention"),
+        PolicyParameter("return_delay", "s", -0.40, 0.20, -0.05,
+                        "end of the inertia phase to the return of the engine torque"),
+        PolicyParameter("return_time", "s", 0.05, 0.50, 0.15, "ramp of the return"),
+    )  # fmt: skip
+
+
+def _compute_engine_inertia(maneuver: Maneuver) -> float:
+    model = maneuver.model
+    return model.J1 * model.eta + model.J2e
+
+
+def _compute_held_torque(maneuver: Maneuver) -> float:
+    """Torque [N m] of the off-going element in steady acceleration."""
+    ratio, element = maneuver.ratios[0], maneuver.offgoing
+    torque = maneuver.point.engine_torque
+    rate = ratio * maneuver.compute_acceleration(torque, ratio)
+    free = maneuver.model.eta * torque - _compute_engine_inertia(maneuver) * rate
+    return abs(free * maneuver.model.i_in * element.i_c)
+
+
+def _compute_handover_torque(maneuver: Maneuver) -> float:
+    """Torque [N m] with which the on-coming element alone holds the engine in the old gear."""
+    return _compute_held_torque(maneuver) * abs(maneuver.oncoming.i_c / maneuver.offgoing.i_c)
+
+
+def _compute_inertia_torque(maneuver: Maneuver) -> float:
+    """Torque [N m] of the on-coming element that synchronises the engine in the starting time."""
+    old, new = maneuver.ratios
+    torque, speed = maneuver.point.engine_torque, maneuver.point.engine_speed
+    change = speed * (new / old - 1.0)
+    reduced = torque + maneuver.direction * _REDUCTION * abs(torque)
+    rate = _compute_engine_inertia(maneuver) * change / _INERTIA_TIME
+    free = maneuver.model.eta * reduced - rate
+    return abs(free * maneuver.model.i_in * maneuver.oncoming.i_c)
+
+
+def _compute_pressure(element: ShiftElement, torque: float) -> float:
+    """Pressure [Pa] at which a slipping element carries a torque [N m] of either sign."""
+    friction = float(element.friction.evaluate(np.array([20.0]))[0])
+    return element.P0 + abs(torque) / (friction * element.gain)

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Policy of free knots: the corners of each profile are the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.profiles import (
+    PolicyParameter,
+    Profiles,
+    check_parameters,
+    move_start,
+)
+from drivetwin.simulation.dual_clutch import Signal
+
+_ONCOMING = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75)
+_OFFGOING = (0.05, 0.12, 0.18, 0.24)
+_TORQUE = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65)
+"""Times of the knots after the request [s]."""
+_RAMP = 0.1
+"""Time from the last free knot to the fixed end of a profile [s]."""
+_AUTHORITY = 0.6
+"""Largest torque intervention over the engine torque."""
+
+Corners = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class KnotProfile:
+    """One profile: free knots at `times` [s] between fixed corners (time [s], value SI).
+
+    `start` are the starting values of the knots, `low` and `high` their common bounds.
+    """
+
+    head: Corners
+    times: tuple[float, ...]
+    tail: Corners
+    start: tuple[float, ...]
+    low: float
+    high: float
+
+    def build_signal(self, values: FloatArray) -> Signal:
+        """Return the signal through fixed corners and knots with `values` (k,)."""
+        time = [*(t for t, _ in self.head), *self.times, *(t for t, _ in self.tail)]
+        fixed = [v for _, v in self.head], [v for _, v in self.tail]
+        return Signal(np.array(time), np.array([*fixed[0], *values.tolist(), *fixed[1]]))
+
+    def list_parameters(self, name: str, unit: str) -> tuple[PolicyParameter, ...]:
+        """Return the knots as parameters of the policy."""
+        return tuple(
+            PolicyParameter(
+                f"{name}_{number}", unit, self.low, self.high, value, f"value at {time:g} s"
+            )
+            for number, (time, value) in enumerate(
+                zip(self.times, self.start, strict=True), start=1
+            )
+        )
+
+
+@dataclass(frozen=True)
+class KnotPolicy:
+    """Knots of on-coming pressure, off-going pressure [Pa] and engine torque [N m]."""
+
+    oncoming: KnotProfile
+    offgoing: KnotProfile
+    engine_torque: KnotProfile
+
+    def __post_init__(self) -> None:
+        check_parameters(self.parameters)
+
+    @property
+    def parameters(self) -> tuple[PolicyParameter, ...]:
+        """Knots in the order of on-coming, off-going and engine torque."""
+        return (
+            *self.oncoming.list_parameters("oncoming_pressure", "Pa"),
+            *self.offgoing.list_parameters("offgoing_pressure", "Pa"),
+            *self.engine_torque.list_parameters("engine_torque", "N*m"),
+        )
+
+    def set_start(self, values: Mapping[str, float]) -> KnotPolicy:
+        """Return the policy with other starting values by name; see `move_start`."""
+        starts = [one.start for one in move_start(self.parameters, values)]
+        first = len(self.oncoming.times)
+        second = first + len(self.offgoing.times)
+        return KnotPolicy(
+            replace(self.oncoming, start=tuple(starts[:first])),
+            replace(self.offgoing, start=tuple(starts[first:second])),
+            replace(self.engine_torque, start=tuple(starts[second:])),
+        )
+
+    def build_profiles(self, values: FloatArray) -> Profiles:
+        """Return the profiles of values (p,) in SI."""
+        first = len(self.oncoming.times)
+        second = first + len(self.offgoing.times)
+        return Profiles(
+            engine_torque=self.engine_torque.build_signal(values[second:]),
+            offgoing=self.offgoing.build_signal(values[first:second]),
+            oncoming=self.oncoming.build_signal(values[:first]),
+        )
+
+
+def build_knot_policy(maneuver: Maneuver, start: Profiles, system_pressure: float) -> KnotPolicy:
+    """Return knots through the profiles `start`; `system_pressure` [Pa] is that of a held element.
+
+    The knots lie between the request and 0.75 s after it; the engine torque may change towards the
+    new gear by 60 %.
+    """
+    torque = maneuver.point.engine_torque
+    reach = torque + _AUTHORITY * maneuver.direction * abs(torque)
+    bounds = (min(torque, reach), max(torque, reach))
+    pressures = (0.0, system_pressure)
+
+    def build(signal: Signal, after: tuple[float, ...], bounds: tuple[float, float],
+              ends: tuple[float, float]) -> KnotProfile:  # fmt: skip
+        times = tuple(maneuver.request + one for one in after)
+        values = np.clip(np.interp(times, signal.time, signal.values), *bounds)
+        last = times[-1] + _RAMP
+        return KnotProfile(
+            ((0.0, ends[0]), (maneuver.request, ends[0])),
+            times,
+            ((last, ends[1]), (max(maneuver.horizon, last + _RAMP), ends[1])),
+            tuple(values.tolist()),
+            *bounds,
+        )
+
+    return KnotPolicy(
+        build(start.oncoming, _ONCOMING, pressures, (0.0, system_pressure)),
+        build(start.offgoing, _OFFGOING, pressures, (system_pressure, 0.0)),
+        build(start.engine_torque, _TORQUE, bounds, (torque, torque)),
+    )

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""The shift to be calibrated: driveline, operating point, request and time grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import InputError
+from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, State
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """State at the request: engine torque [N m] and engine speed [rad/s]."""
+
+    engine_torque: float
+    engine_speed: float
+
+
+@dataclass(frozen=True)
+class Maneuver:
+    """A shift of `model` from its first shift element to its second at an operating point.
+
+    `wheel_radius` [m] converts the wheel's motion to the vehicle's. The gear is requested at
+    `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s].
+    """
+
+    model: DualClutch
+    point: OperatingPoint
+    wheel_radius: float
+    request: float = 0.1
+    horizon: float = 1.6
+    step: float = 1e-3
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """Samples (n,) [s] of a run."""
+        return self.step * np.arange(round(self.horizon / self.step) + 1, dtype=np.float64)
+
+    @property
+    def offgoing(self) -> ShiftElement:
+        """Element that holds the old gear."""
+        return self.model.elements[0]
+
+    @property
+    def oncoming(self) -> ShiftElement:
+        """Element that holds the new gear."""
+        return self.model.elements[1]
+
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """Overall ratios ω_e/ω_out of the old and the new gear."""
+        old, new = (self.model.get_overall_ratio(one.name) for one in self.model.elements)
+        return old, new
+
+    @property
+    def direction(self) -> float:
+        """Sign of the change of engine speed: -1 for an upshift, 1 for a downshift."""
+        old, new = self.ratios
+        return float(np.sign(abs(new) - abs(old)))
+
+    def build_start(self, model: DualClutch | None = None) -> State:
+        """Return steady acceleration in the old gear; `model` stands for another parameter set."""
+        model = model or self.model
+        ratio = self.ratios[0]
+        output = self.point.engine_speed / ratio
+        wheel = output / model.i_f
+        torque = model.compute_steady_torque(self.point.engine_torque, ratio, wheel)
+        speed = self.point.engine_speed
+        return State(speed, output, wheel, torque / model.k_o, (self.offgoing.name,))
+
+    def compute_acceleration(self, torque: float, ratio: float) -> float:
+        """Steady acceleration of the output shaft [rad/s^2] at an engine torque [N m] in a gear."""
+        model = self.model
+        wheel = self.point.engine_speed / (self.ratios[0] * model.i_f)
+        drive = model.eta * torque * ratio - model.load.evaluate(wheel) / model.i_f
+        return drive / sum(model.compute_side_inertias(ratio))
+
+    def set_step(self, step: float) -> Maneuver:
+        """Return the shift with another sampling step [s]."""
+        return replace(self, step=step)
+
+
+def check_torque_phase_first(maneuver: Maneuver) -> None:
+    """Raise InputError where the speeds change before the torque is handed over.
+
+    These are upshifts with the power off and downshifts with the power on, whose order of phases
+    the policy does not have.
+    """
+    torque, direction = maneuver.point.engine_torque, maneuver.direction
+    if direction == 0.0:
+        raise InputError(
+            "both gears of the shift have the same overall ratio", "choose two different gears"
+        )
+    if torque * direction >= 0.0:
+        kind = "downshift with the power on" if torque > 0.0 else "upshift without power"
+        least = "a positive" if direction < 0.0 else "a negative"
+        raise InputError(
+            f"a {kind} (engine torque {torque:.4g} N·m) cannot be calibrated: its speeds change "
+            "before the torque is handed over",
+            f"give {least} engine torque, or another shift",
+        )

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: MIT
+"""Metrics of simulated shifts, each over all runs of a batch; definitions in `METRICS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum, auto
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfilt
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.shifts.metrics import compute_rates, compute_vibration_doses
+
+LOW_PASS = 20.0
+"""Corner frequency [Hz] of the low-passed jerk: above it a seat passes little on."""
+_LOCKED = 0.5
+"""Slip [rad/s] below which the on-coming element counts as locked at the end of a run."""
+_BREAKS_AWAY = 1.0
+"""Slip [rad/s] of the off-going element from which the inertia phase has begun."""
+_SLIP_TIME = 0.05
+"""Time [s] that an unlocked run is later than its end per rad/s of remaining slip."""
+_FAILED = 1e6
+"""Value of every metric of a run that failed."""
+
+
+class Metric(StrEnum):
+    """A metric of a shift."""
+
+    PEAK_JERK = auto()
+    SMOOTH_JERK = auto()
+    VIBRATION_DOSE = auto()
+    TORQUE_HOLE = auto()
+    SHIFT_TIME = auto()
+    RESPONSE_TIME = auto()
+    FRICTION_ENERGY = auto()
+    PEAK_POWER = auto()
+    FLARE = auto()
+    TIE_UP = auto()
+
+
+@dataclass(frozen=True)
+class MetricSpec:
+    """Name for people, SI unit, definition and source of a metric."""
+
+    label: str
+    unit: str
+    definition: str
+    source: str
+
+
+_OWN = "definition of this program"
+METRICS: Mapping[Metric, MetricSpec] = {
+    Metric.PEAK_JERK: MetricSpec(
+        "peak jerk",
+        "m/s^3",
+        "Largest magnitude of the rate of the vehicle's acceleration r_w·(i_f·T_o - T_v)/J_v, by "
+        "central differences on 1 ms; the load is constant within a shift.",
+        "definition of jerk",
+    ),
+    Metric.SMOOTH_JERK: MetricSpec(
+        "peak jerk below 20 Hz",
+        "m/s^3",
+        "Peak jerk of the acceleration after a causal Butterworth low-pass of order 2 at 20 Hz.",
+        _OWN,
+    ),
+    Metric.VIBRATION_DOSE: MetricSpec(
+        "vibration dose value",
+        "m/s^1.75",
+        "(∫ a^4 dt)^¼ of the acceleration minus that before the request, without frequency "
+        "weighting.",
+        "ISO 2631-1:1997, section 6.3.2",
+    ),
+    Metric.TORQUE_HOLE: MetricSpec(
+        "torque hole",
+        "N*m",
+        "Fall of the output torque, in the direction of power, below the lower of its values "
+        "before the request and at the end of the run.",
+        _OWN,
+    ),
+    Metric.SHIFT_TIME: MetricSpec(
+        "shift time",
+        "s",
+        "Request to the last lock-up; a run that ends with slip counts to its end and 50 ms more "
+        "per rad/s.",
+        _OWN,
+    ),
+    Metric.RESPONSE_TIME: MetricSpec(
+        "response time",
+        "s",
+        "Request to the begin of the inertia phase (slip of the off-going element above 1 rad/s).",
+        _OWN,
+    ),
+    Metric.FRICTION_ENERGY: MetricSpec(
+        "friction energy", "J", "∫ |τ·s| dt, of both shift elements together.", "definition of work"
+    ),
+    Metric.PEAK_POWER: MetricSpec(
+        "peak friction power",
+        "W",
+        "Largest |τ·s| of both shift elements together.",
+        "definition of power",
+    ),
+    Metric.FLARE: MetricSpec(
+        "flare",
+        "rad/s",
+        "Largest slip of the off-going element at the engine, away from the new gear.",
+        _OWN,
+    ),
+    Metric.TIE_UP: MetricSpec(
+        "tie-up",
+        "N*m",
+        "Largest torque of the off-going element against the direction of power.",
+        _OWN,
+    ),
+}
+"""Definitions of the metrics, in the order of reports."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Metrics (runs,) of runs with one profile; `jerk` (runs, n) [m/s^3] of the vehicle.
+
+    `unlocked` marks runs that end with slip, `relocked` those whose on-coming element slipped
+    again after its first lock-up.
+    """
+
+    values: Mapping[Metric, FloatArray]
+    jerk: FloatArray
+    unlocked: NDArray[np.bool_]
+    relocked: NDArray[np.bool_]
+
+
+def list_outputs(maneuver: Maneuver) -> tuple[str, ...]:
+    """Return the outputs of a batch that `compute_metrics` takes, in its order."""
+    old, new = maneuver.offgoing.name, maneuver.oncoming.name
+    return ("shaft_torque", f"torque.{old}", f"slip.{old}", f"torque.{new}", f"slip.{new}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Runs:
+    """Signals (runs, n) of the runs of a batch, with what several metrics need."""
+
+    maneuver: Maneuver
+    torque: FloatArray
+    off: FloatArray
+    off_slip: FloatArray
+    on: FloatArray
+    on_slip: FloatArray
+    last_lock: FloatArray
+    vehicle: FloatArray
+
+    @cached_property
+    def acceleration(self) -> FloatArray:
+        """Change of the vehicle's acceleration [m/s^2] from that before the request."""
+        radius, ratio = self.maneuver.wheel_radius, self.maneuver.model.i_f
+        scale = (radius * ratio / self.vehicle)[:, None]
+        return np.asarray(scale * (self.torque - self.torque[:, :1]))
+
+    @cached_property
+    def jerk(self) -> FloatArray:
+        """Jerk of the vehicle [m/s^3]."""
+        return compute_rates(self.maneuver.time, self.acceleration)
+
+    @cached_property
+    def power(self) -> FloatArray:
+        """Friction power of both elements [W]."""
+        return np.asarray(np.abs(self.off * self.off_slip) + np.abs(self.on * self.on_slip))
+
+
+def compute_metrics(
+    maneuver: Maneuver,
+    columns: FloatArray,
+    last_lock: FloatArray,
+    vehicle: FloatArray,
+    wanted: Iterable[Metric] = tuple(Metric),
+) -> Outcome:
+    """Compute the `wanted` metrics from `columns` (runs, 5, n) in the order of `list_outputs`.
+
+    `last_lock` (runs,) [s] is that of the batch; `vehicle` (runs,) the wheel's inertia J_v
+    [kg m^2] of each run. A run that failed has 1e6 in every metric.
+    """
+    failed = ~np.isfinite(columns).all(axis=(1, 2))
+    signals = np.moveaxis(np.nan_to_num(columns) if failed.any() else columns, 1, 0)
+    torque, off, off_slip, on, on_slip = signals
+    runs = _Runs(maneuver, torque, off, off_slip, on, on_slip, last_lock, vehicle)
+    values = {one: _COMPUTE[one](runs) for one in wanted}
+    for one in values.values():
+        one[failed] = _FAILED
+    unlocked = np.abs(runs.on_slip[:, -1]) > _LOCKED
+    return Outcome(values, runs.jerk, unlocked | failed, _find_relocks(runs.on_slip))
+
+
+def _compute_peak_jerk(runs: _Runs) -> FloatArray:
+    return np.asarray(np.abs(runs.jerk).max(axis=1))
+
+
+def _compute_smooth_jerk(runs: _Runs) -> FloatArray:
+    dt = runs.maneuver.step
+    sections = butter(2, LOW_PASS, fs=1.0 / dt, output="sos")
+    filtered = sosfilt(sections, runs.acceleration, axis=-1)
+    return np.asarray(np.abs(np.diff(filtered, axis=-1)).max(axis=1) / dt, dtype=np.float64)
+
+
+def _compute_vibration_dose(runs: _Runs) -> FloatArray:
+    return compute_vibration_doses(runs.maneuver.time, runs.acceleration)
+
+
+def _compute_torque_hole(runs: _Runs) -> FloatArray:
+    driving = np.sign(runs.torque[:, :1]) * runs.torque
+    level = np.minimum(driving[:, 0], driving[:, -1])
+    return np.asarray(np.maximum(level - driving.min(axis=1), 0.0))
+
+
+def _compute_shift_time(runs: _Runs) -> FloatArray:
+    slip = np.abs(runs.on_slip[:, -1])
+    locked = np.isfinite(runs.last_lock) & (slip <= _LOCKED)
+    late = runs.maneuver.horizon + _SLIP_TIME * slip
+    return np.asarray(np.where(locked, runs.last_lock, late) - runs.maneuver.request)
+
+
+def _compute_response_time(runs: _Runs) -> FloatArray:
+    slipping = np.abs(runs.off_slip) > _BREAKS_AWAY
+    first = np.where(slipping.any(axis=1), slipping.argmax(axis=1), slipping.shape[1] - 1)
+    return np.asarray(runs.maneuver.time[first] - runs.maneuver.request)
+
+
+def _compute_friction_energy(runs: _Runs) -> FloatArray:
+    return np.asarray(runs.power.sum(axis=1) * runs.maneuver.step)
+
+
+def _compute_peak_power(runs: _Runs) -> FloatArray:
+    return np.asarray(runs.power.max(axis=1))
+
+
+def _compute_flare(runs: _Runs) -> FloatArray:
+    """Slip is ω_e/(i_in·i_c) - i_out·ω_out: its excess at the engine is i_in·i_c times it."""
+    shift = runs.maneuver
+    lead = shift.model.i_in * shift.offgoing.i_c * runs.off_slip
+    return np.asarray(np.maximum(-shift.direction * lead, 0.0).max(axis=1))
+
+
+def _compute_tie_up(runs: _Runs) -> FloatArray:
+    return np.asarray(np.maximum(-np.sign(runs.off[:, :1]) * runs.off, 0.0).max(axis=1))
+
+
+_COMPUTE: Mapping[Metric, Callable[[_Runs], FloatArray]] = {
+    Metric.PEAK_JERK: _compute_peak_jerk,
+    Metric.SMOOTH_JERK: _compute_smooth_jerk,
+    Metric.VIBRATION_DOSE: _compute_vibration_dose,
+    Metric.TORQUE_HOLE: _compute_torque_hole,
+    Metric.SHIFT_TIME: _compute_shift_time,
+    Metric.RESPONSE_TIME: _compute_response_time,
+    Metric.FRICTION_ENERGY: _compute_friction_energy,
+    Metric.PEAK_POWER: _compute_peak_power,
+    Metric.FLARE: _compute_flare,
+    Metric.TIE_UP: _compute_tie_up,
+}
+
+
+def _find_relocks(on_slip: FloatArray) -> NDArray[np.bool_]:
+    """Find runs that slip more than 0.5 rad/s after they were locked."""
+    held = np.abs(on_slip) < 1e-6
+    first = np.where(held.any(axis=1), held.argmax(axis=1), on_slip.shape[1])
+    after = np.arange(on_slip.shape[1])[None, :] > first[:, None]
+    return np.asarray((after & (np.abs(on_slip) > _LOCKED)).any(axis=1))

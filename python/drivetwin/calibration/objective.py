@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Objective of a calibration: tail mean of peak jerk, with exact penalties for limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.metrics import METRICS, Metric, Outcome
+from drivetwin.errors import InputError
+
+
+class Statistic(StrEnum):
+    """Statistic over the draws that a limit bounds."""
+
+    MEAN = "mean"
+    SHARE_95 = "95 %"
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Upper bound (SI) of a metric, for its mean or for 95 % of the draws."""
+
+    metric: Metric
+    bound: float
+    statistic: Statistic = Statistic.SHARE_95
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.bound < float("inf"):
+            raise InputError(
+                f"the limit of {self.metric} is {self.bound!r}",
+                f"give a finite positive number in {METRICS[self.metric].unit}",
+            )
+
+    def compute_excess(self, outcome: Outcome) -> FloatArray:
+        """Excess over the bound, relative to it, not below 0: (1,) of a mean, else (runs,)."""
+        values = outcome.values[self.metric]
+        if self.statistic is Statistic.MEAN:
+            values = values.mean(keepdims=True)
+        return np.asarray(np.maximum(values / self.bound - 1.0, 0.0))
+
+
+def compute_tail_mean(values: FloatArray, share: float) -> float:
+    """Mean of the largest part of `values` (n,) beyond the quantile `share` (CVaR).
+
+    Source: R. T. Rockafellar and S. Uryasev, Optimization of conditional value-at-risk, Journal
+    of Risk 2 (2000).
+    """
+    count = max(1, round((1.0 - share) * values.size))
+    return float(np.sort(values)[-count:].mean())
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Tail mean of peak jerk beyond the quantile `share`, plus `weight` times relative excesses."""
+
+    limits: Sequence[Limit]
+    share: float
+    weight: float
+
+    def evaluate(self, outcome: Outcome) -> float:
+        """Return the value [m/s^3] of an outcome; smaller is better."""
+        comfort = compute_tail_mean(outcome.values[Metric.PEAK_JERK], self.share)
+        excess = sum(float(one.compute_excess(outcome).mean()) for one in self.limits)
+        return comfort + self.weight * excess
+
+    def set_share(self, share: float) -> Objective:
+        """Return the objective with another quantile."""
+        return replace(self, share=share)
+
+    def tighten(self, margin: float) -> Objective:
+        """Return the objective with its bounds lower by the relative `margin`."""
+        limits = tuple(replace(one, bound=(1.0 - margin) * one.bound) for one in self.limits)
+        return replace(self, limits=limits)

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""Settings of a calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """Effort and tolerances of search, polish and certificate."""
+
+    starts: int = 4
+    """Independent searches; the problem has many local minima."""
+    finalists: int = 2
+    """Searches that are continued and polished."""
+    population: int = 24
+    """Candidates per generation."""
+    first_evaluations: int = 480
+    """Candidates of each search before the finalists are chosen."""
+    evaluations: int = 1440
+    """Candidates of each finalist in all."""
+    initial_step: float = 0.12
+    """Standard deviation of the first generation, in shares of the ranges."""
+    search_draws: int = 16
+    """Scenarios of the search."""
+    polish_draws: int = 64
+    """Scenarios of the polish."""
+    tail_draws: int = 256
+    """Scenarios of the last polish, which shapes the tail."""
+    certificate_draws: int = 2000
+    """Fresh scenarios of the certificate."""
+    search_share: float = 0.9
+    """Quantile beyond which peak jerk is averaged in search and polish."""
+    tail_share: float = 0.98
+    """The same in the last polish."""
+    polish_iterations: int = 12
+    """Largest number of linear programs of the polish."""
+    tail_iterations: int = 8
+    """Largest number of linear programs of the last polish."""
+    penalty: float = 10.0
+    """Weight of a relative excess over a limit, in tail means of the start."""
+    margin: float = 0.005
+    """Relative distance that the optimiser keeps from a limit, for the draws it does not see."""
+    confidence: float = 0.95
+    """Confidence of the certificate."""
+    threads: int = 0
+    """Threads of the simulation; 0 takes all cores."""
+
+    def scale_effort(self, factor: float) -> CalibrationSettings:
+        """Return settings whose search and polish are longer by `factor`."""
+        return replace(
+            self,
+            first_evaluations=max(self.population, round(factor * self.first_evaluations)),
+            evaluations=max(self.population, round(factor * self.evaluations)),
+            polish_iterations=max(1, round(factor * self.polish_iterations)),
+            tail_iterations=max(1, round(factor * self.tail_iterations)),
+        )

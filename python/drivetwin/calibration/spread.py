@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: MIT
+"""Spread of made units, as standard deviations beside the identified covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from drivetwin.errors import InputError
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Standard deviations of what differs between units of one type.
+
+    The defaults are engineering estimates of series production, not measurements; a fleet
+    gives better ones.
+    """
+
+    gain: float = 0.025
+    """Friction gain of each clutch, relative, independent."""
+    engine_torque: float = 0.015
+    """Scale of the engine torque, relative."""
+    contact_pressure: float = 5e3
+    """Contact pressure P0 [Pa], common to both clutches."""
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if not 0.0 <= value < float("inf"):
+                raise InputError(
+                    f"spread of {one.name} is {value!r}",
+                    "give a standard deviation that is finite and not negative",
+                )

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: MIT
+"""From a twin and a request to the problem of a calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from drivetwin.calibration.calibrate import Task, draw_for
+from drivetwin.calibration.certificate import compute_quantiles
+from drivetwin.calibration.controller_policy import build_controller_policy
+from drivetwin.calibration.evaluate import Plant
+from drivetwin.calibration.knot_policy import build_knot_policy
+from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
+from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.profiles import Policy, Space
+from drivetwin.calibration.scenarios import Purpose, TwinDraws
+from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.spread import Spread
+from drivetwin.errors import IdentificationError, InputError, Where
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.twin.nominal_shift import build_nominal_shift
+from drivetwin.twin.twin import Twin
+
+DEFAULT_LIMITS = {
+    Metric.SHIFT_TIME: Statistic.SHARE_95,
+    Metric.VIBRATION_DOSE: Statistic.SHARE_95,
+    Metric.FRICTION_ENERGY: Statistic.MEAN,
+}
+"""Limits without a file: no worse than the start."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to calibrate: gears, operating point (None: from the twin), policy, limits, effort.
+
+    `wheel_radius` [m]; `system_pressure` [Pa], by default the largest that the twin's log has;
+    `engine_torque` [N m] and `engine_speed` [rad/s] at the request; `start` holds starting values
+    of the policy by name; `limits` None stands for those of the start.
+    """
+
+    gears: tuple[str, str]
+    wheel_radius: float
+    engine_torque: float | None = None
+    engine_speed: float | None = None
+    system_pressure: float | None = None
+    policy: PolicyKind = PolicyKind.CONTROLLER
+    limits: tuple[Limit, ...] | None = None
+    spread: Spread = field(default_factory=Spread)
+    start: Mapping[str, float] = field(default_factory=dict)
+    seed: int = 1
+    settings: CalibrationSettings = field(default_factory=CalibrationSettings)
+
+
+def build_task(twin: Twin, request: Request) -> Task:
+    """Build the problem of a request.
+
+    Raises IdentificationError for a twin without an identified parameter, InputError for a shift
+    that has no such policy, and MissingParameterError where the twin cannot be simulated.
+    """
+    require_identified(twin)
+    shift = build_nominal_shift(twin, request.gears)
+    model = twin.build_dual_clutch(shift)
+    point = _choose_point(twin, request)
+    maneuver = Maneuver(model, point, request.wheel_radius)
+    check_torque_phase_first(maneuver)
+    policy = _build_policy(twin, maneuver, request)
+    draw = TwinDraws(twin, shift, request.spread)
+    task = Task(maneuver, policy, draw, request.limits or (), request.seed, request.settings)
+    if request.limits is None:
+        task = task.set_limits(derive_limits(task))
+    return task
+
+
+def require_identified(twin: Twin) -> None:
+    """Raise IdentificationError where no parameter of a twin is identified.
+
+    A model that fails its validation has none.
+    """
+    verdicts = [one.verdict for one in twin.parameters.values()]
+    if Verdict.IDENTIFIED not in verdicts:
+        reasons = sorted({one.reason for one in twin.parameters.values() if one.reason})
+        raise IdentificationError(
+            "the twin is not valid: none of its parameters is identified"
+            + (f" ({reasons[0]})" if reasons else ""),
+            "correct the vehicle card or take another log, and identify again",
+            Where(file=twin.name),
+        )
+
+
+def derive_limits(task: Task) -> tuple[Limit, ...]:
+    """Limits at which a calibration is no worse than the start in time, vibration and energy."""
+    plant, space = Plant(task.maneuver, task.settings.threads), Space(task.policy)
+    draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
+    outcome = plant.evaluate(space.build_profiles(space.start), draws)
+    limits = []
+    for metric, statistic in DEFAULT_LIMITS.items():
+        found = compute_quantiles(outcome.values[metric], task.settings.confidence)
+        value = found.mean if statistic is Statistic.MEAN else found.share_95
+        limits.append(Limit(metric, value, statistic))
+    return tuple(limits)
+
+
+def _choose_point(twin: Twin, request: Request) -> OperatingPoint:
+    """Operating point: as requested, else the middle of what the log has."""
+    torque, speed = request.engine_torque, request.engine_speed
+    missing = [
+        name
+        for name, value in (("torque", torque), ("speed", speed))
+        if value is None and name not in twin.validity
+    ]
+    if missing:
+        raise InputError(
+            f"the twin {twin.name!r} does not say which engine {' and '.join(missing)} its log had",
+            "give --engine-torque and --engine-speed",
+        )
+    if torque is None:
+        torque = 0.5 * sum(twin.validity["torque"])
+    if speed is None:
+        speed = 0.5 * sum(twin.validity["speed"])
+    if not speed > 0.0:
+        raise InputError(f"the engine speed is {speed:g} rad/s", "give one above zero")
+    return OperatingPoint(torque, speed)
+
+
+def _build_policy(twin: Twin, maneuver: Maneuver, request: Request) -> Policy:
+    pressure = request.system_pressure
+    if pressure is None and "pressure" not in twin.validity:
+        raise InputError(
+            f"the twin {twin.name!r} does not say which pressures its log had",
+            "give --system-pressure",
+        )
+    if pressure is None:
+        pressure = twin.validity["pressure"][1]
+    controller = build_controller_policy(maneuver, pressure)
+    if request.policy is PolicyKind.CONTROLLER:
+        return controller.set_start(request.start)
+    space = Space(controller)
+    knots = build_knot_policy(maneuver, space.build_profiles(space.start), pressure)
+    return knots.set_start(request.start)

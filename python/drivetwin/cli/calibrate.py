@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin calibrate TWIN --shift 2-3`: shift profiles that survive the spread of units."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_findings,
+    print_json,
+    print_line,
+    print_table,
+    show_step,
+)
+from drivetwin.errors import IdentificationError, InputError, Where
+
+if TYPE_CHECKING:
+    from drivetwin.calibration.calibrate import Calibration
+    from drivetwin.calibration.twin_task import Request
+    from drivetwin.findings import Finding
+    from drivetwin.twin.twin import Twin
+
+CALIBRATION, CERTIFICATE, REPORT = "calibration.toml", "certificate.json", "report.html"
+
+
+def calibrate(
+    twin: Annotated[
+        Path, typer.Argument(metavar="TWIN", help="twin.toml, or the folder of `identify -o`.")
+    ],
+    shift: Annotated[
+        str, typer.Option("--shift", metavar="GEAR-GEAR", help="Which shift, as 2-3.")
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Where the results go.")
+    ],
+    limits: Annotated[
+        Path | None,
+        typer.Option("--limits", metavar="FILE", help="Limits and spread (TOML)."),
+    ] = None,
+    engine_torque: Annotated[
+        float | None, typer.Option("--engine-torque", metavar="NM", help="At the request.")
+    ] = None,
+    engine_speed: Annotated[
+        float | None, typer.Option("--engine-speed", metavar="RPM", help="At the request.")
+    ] = None,
+    system_pressure: Annotated[
+        float | None,
+        typer.Option("--system-pressure", metavar="BAR", help="Pressure of a held element."),
+    ] = None,
+    wheel_radius: Annotated[
+        float, typer.Option("--wheel-radius", metavar="M", min=0.05, help="Dynamic tyre radius.")
+    ] = 0.5,
+    policy: Annotated[
+        PolicyKind,
+        typer.Option("--policy", help="The controller's parameters, or knots of the profiles."),
+    ] = PolicyKind.CONTROLLER,
+    start: Annotated[
+        Path | None,
+        typer.Option("--start", metavar="FILE", help="A calibration.toml to start from."),
+    ] = None,
+    effort: Annotated[
+        float, typer.Option("--effort", min=0.05, max=20.0, help="Length of the search, times 1.")
+    ] = 1.0,
+    draws: Annotated[
+        int, typer.Option("--draws", min=59, help="Fresh draws of the certificate.")
+    ] = 2000,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of draws and search.")] = 1,
+    as_json: JsonFlag = False,
+) -> None:
+    """Find shift profiles that keep peak jerk small over the spread of made units.
+
+    Minimises the tail mean of peak jerk under limits, and certifies the result on fresh draws.
+    DIR gets calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx.
+    """
+    from drivetwin.calibration.calibrate import calibrate as run_calibration
+    from drivetwin.calibration.identified_range import check_identified_range
+    from drivetwin.calibration.settings import CalibrationSettings
+    from drivetwin.calibration.twin_task import Request, build_task
+    from drivetwin.cli.export import parse_gears
+    from drivetwin.files.limits_file import Requirements, load_limits
+
+    given = Requirements(()) if limits is None else load_limits(limits)
+    source, model = _load_valid_twin(twin)
+    gears = parse_gears(shift)
+    request = Request(
+        gears=gears,
+        wheel_radius=wheel_radius,
+        engine_torque=engine_torque,
+        engine_speed=None if engine_speed is None else engine_speed * math.pi / 30.0,
+        system_pressure=None if system_pressure is None else system_pressure * 1e5,
+        policy=policy,
+        limits=given.limits or None,
+        spread=given.spread,
+        start=_load_start(start, policy),
+        seed=seed,
+        settings=CalibrationSettings(certificate_draws=draws).scale_effort(effort),
+    )
+    with show_step(f"calibrating {shift} of {model.name}"):
+        found = run_calibration(build_task(model, request))
+    findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
+    with show_step(f"writing {output}"):
+        _write_results(output, found, findings, (model, request, source))
+    if as_json:
+        print_json(_to_document(found, findings, output))
+        return
+    _print_results(found)
+    print_findings(findings)
+    print_line(f"wrote {output / REPORT}")
+
+
+def _load_valid_twin(path: Path) -> tuple[Path, Twin]:
+    """File and twin; raises IdentificationError where its result says that it is not valid."""
+    from drivetwin.cli.identify_run import RESULT, TWIN
+    from drivetwin.estimation.result.status import ModelStatus
+    from drivetwin.files.result_file import load_result
+    from drivetwin.files.twin_conversion import load_twin
+
+    source = path / TWIN if path.is_dir() else path
+    model = load_twin(source)
+    result = source.with_name(RESULT)
+    if source.name == TWIN and result.is_file():
+        status = load_result(result).status
+        if status is ModelStatus.NOT_VALID:
+            raise IdentificationError(
+                f"the twin is {status.value}: its simulation does not follow the log",
+                f"see {RESULT} for the reasons, correct the vehicle card and identify again",
+                Where(file=str(source)),
+            )
+    return source, model
+
+
+def _load_start(path: Path | None, policy: PolicyKind) -> dict[str, float]:
+    if path is None:
+        return {}
+    from drivetwin.files.calibration_file import read_calibration_file
+
+    content = read_calibration_file(path)
+    if content.policy is not policy:
+        raise InputError(
+            f"the calibration has the policy {content.policy.value!r}, not {policy.value!r}",
+            f"start from another file, or add --policy {content.policy.value}",
+            Where(file=str(path)),
+        )
+    return {name: one.value for name, one in content.parameters.items()}
+
+
+def _write_results(
+    output: Path,
+    found: Calibration,
+    findings: tuple[Finding, ...],
+    origin: tuple[Twin, Request, Path],
+) -> None:
+    from drivetwin._util.atomic import write_text
+    from drivetwin._util.version import get_program_version
+    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+    from drivetwin.export.parameters.of_calibration import collect_calibration
+    from drivetwin.files.calibration_file import (
+        Provenance,
+        build_calibration_file,
+        build_certificate_document,
+        hash_file,
+        write_calibration_file,
+    )
+    from drivetwin.report.calibration import render_calibration
+
+    twin, request, source = origin
+    label = "-".join(request.gears)
+    provenance = Provenance(
+        get_program_version(),
+        twin.name,
+        label,
+        request.policy,
+        {source.name: hash_file(source)},
+        request.spread,
+    )
+    name = f"{twin.name} {label}"
+    content = collect_calibration(found, name)
+    with write_atomically(output) as folder:
+        write_calibration_file(folder / CALIBRATION, build_calibration_file(found, provenance))
+        certificate = build_certificate_document(found)
+        write_text(folder / CERTIFICATE, json.dumps(certificate, indent=2, allow_nan=False) + "\n")
+        for kind in (ParameterFormat.CSV, ParameterFormat.DCM, ParameterFormat.CDFX):
+            write_parameters(content, folder / f"calibration.{kind.value}", kind)
+        page = render_calibration(found, f"Calibration of {name}", findings)
+        write_text(folder / REPORT, page)
+
+
+def _print_results(found: Calibration) -> None:
+    from drivetwin.calibration.metrics import METRICS
+    from drivetwin.report.figures.calibration import get_metric_display
+
+    numbers = ("95 % before", "95 %", "99 %", "worst")
+    after = found.after.certificate
+    table = make_table(
+        f"Shift on {after.draws} fresh draws ({found.runs} simulated shifts)",
+        "metric", "unit", *numbers, right=numbers,
+    )  # fmt: skip
+    for metric, spec in METRICS.items():
+        display = get_metric_display(metric)
+        old, new = found.before.certificate.quantiles[metric], after.quantiles[metric]
+        values = (old.share_95, new.share_95, new.share_99, new.worst)
+        texts = (f"{value * display.factor:.4g}" for value in values)
+        table.add_row(spec.label, display.label, *texts)
+    print_table(table)
+    for one in after.limits:
+        display = get_metric_display(one.limit.metric)
+        print_line(
+            f"{METRICS[one.limit.metric].label} ({one.limit.statistic.value}): "
+            f"{one.value * display.factor:.4g} {display.label}, limit "
+            f"{one.limit.bound * display.factor:.4g}: {one.text}"
+        )
+    print_line(f"no lock-up in {after.unlocked}, slip after lock-up in {after.relocked} draws")
+
+
+def _to_document(found: Calibration, findings: tuple[Finding, ...], output: Path) -> dict[str, Any]:
+    from drivetwin.files.calibration_file import build_certificate_document
+    from drivetwin.files.records import dump_findings
+
+    parameters = zip(found.task.policy.parameters, found.after.values.tolist(), strict=True)
+    return {
+        "folder": str(output),
+        "parameters": {one.name: value for one, value in parameters},
+        "certificate": build_certificate_document(found),
+        "findings": dump_findings(findings),
+    }

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""A calibration as named numbers and curves for calibration tools."""
+
+from __future__ import annotations
+
+from drivetwin.calibration.calibrate import Calibration
+from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.simulation.dual_clutch import Signal
+
+_CURVES = {
+    "engine_torque": ("N*m", "engine torque demand"),
+    "pressure.offgoing": ("Pa", "pressure of the off-going element, at the clutch"),
+    "pressure.oncoming": ("Pa", "pressure of the on-coming element, at the clutch"),
+}
+"""Units and meanings of the profiles."""
+
+
+def collect_calibration(found: Calibration, name: str) -> ParameterSet:
+    """Collect the policy's parameters, and the profiles over the time from the request [s]."""
+    task = found.task
+    values = zip(task.policy.parameters, found.after.values.tolist(), strict=True)
+    request = task.maneuver.request
+    return ParameterSet(
+        name=name,
+        scalars=tuple(Scalar(one.name, value, one.unit, one.text) for one, value in values),
+        curves=tuple(
+            _build_curve(f"profile.{label}", signal, request, _CURVES[label])
+            for label, signal in found.after.profiles.signals.items()
+        ),
+        notes=(
+            f"engine torque {task.maneuver.point.engine_torque:.6g} N*m, engine speed "
+            f"{task.maneuver.point.engine_speed:.6g} rad/s at the request",
+            "pressures are those at the clutch, not commands: dead time, lag and filling of the "
+            "actuator are not in the twin",
+        ),
+    )
+
+
+def _build_curve(name: str, signal: Signal, request: float, labels: tuple[str, str]) -> Curve:
+    times = tuple((signal.time - request).tolist())
+    return Curve(name, Axis("time", times, "s"), tuple(signal.values.tolist()), *labels)

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""`calibration.toml` and the certificate of a calibration on disk."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from pydantic import FiniteFloat
+
+from drivetwin._util.atomic import write_text
+from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.toml import parse_toml
+from drivetwin.calibration.calibrate import Calibration
+from drivetwin.calibration.metrics import METRICS
+from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.spread import Spread
+from drivetwin.files.limits_file import SpreadRecord, build_limit_keys
+from drivetwin.files.read import read_record
+from drivetwin.files.records import Record, SchemaName
+
+CALIBRATION_SCHEMA = "drivetwin/calibration-1"
+_HEADER = (
+    "Calibration of a shift; written by drivetwin. All values in SI units: s, N*m, Pa, rad/s.",
+    "Pressures are those at the clutch. Times count from the request of the gear.",
+)
+
+
+class PolicyValueRecord(Record):
+    """A parameter of the policy: value and start in `unit`, bounds, meaning."""
+
+    value: FiniteFloat
+    unit: str
+    start: FiniteFloat
+    low: FiniteFloat
+    high: FiniteFloat
+    text: str
+
+
+class PointRecord(Record):
+    """Operating point of a calibration."""
+
+    engine_torque_Nm: FiniteFloat
+    engine_speed_rad_s: FiniteFloat
+    wheel_radius_m: FiniteFloat
+
+
+class CalibrationFile(Record):
+    """The whole of `calibration.toml`."""
+
+    schema_name: SchemaName
+    version: str
+    twin: str
+    shift: str
+    policy: PolicyKind
+    seed: int
+    inputs: dict[str, str]
+    point: PointRecord
+    parameters: dict[str, PolicyValueRecord]
+    limits: dict[str, FiniteFloat]
+    spread: SpreadRecord
+    settings: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Origin of a calibration: program version, twin, shift `2-3`, policy, inputs with SHA-256."""
+
+    version: str
+    twin: str
+    shift: str
+    policy: PolicyKind
+    inputs: dict[str, str]
+    spread: Spread
+
+
+def hash_file(path: Path) -> str:
+    """Return the SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def build_calibration_file(found: Calibration, origin: Provenance) -> CalibrationFile:
+    """Return the records of a calibration."""
+    task = found.task
+    keys = {value: name for name, value in build_limit_keys().items()}
+    values = zip(task.policy.parameters, found.after.values.tolist(), strict=True)
+    return CalibrationFile.from_result(
+        {
+            "schema": CALIBRATION_SCHEMA,
+            "version": origin.version,
+            "twin": origin.twin,
+            "shift": origin.shift,
+            "policy": origin.policy,
+            "seed": task.seed,
+            "inputs": origin.inputs,
+            "point": {
+                "engine_torque_Nm": task.maneuver.point.engine_torque,
+                "engine_speed_rad_s": task.maneuver.point.engine_speed,
+                "wheel_radius_m": task.maneuver.wheel_radius,
+            },
+            "parameters": {
+                one.name: {
+                    "value": value,
+                    "unit": one.unit,
+                    "start": one.start,
+                    "low": one.low,
+                    "high": one.high,
+                    "text": one.text,
+                }
+                for one, value in values
+            },
+            "limits": {keys[one.metric, one.statistic]: one.bound for one in task.limits},
+            "spread": {
+                "gain": origin.spread.gain,
+                "engine_torque": origin.spread.engine_torque,
+                "contact_pressure_Pa": origin.spread.contact_pressure,
+            },
+            "settings": asdict(task.settings),
+        }
+    )
+
+
+def write_calibration_file(path: Path, content: CalibrationFile) -> None:
+    """Write `calibration.toml`; it appears whole or not at all."""
+    document = tomlkit.document()
+    for line in _HEADER:
+        document.add(tomlkit.comment(line))
+    for key, value in content.model_dump(mode="json", by_alias=True).items():
+        document.add(key, tomlkit.item(value))
+    write_text(path, tomlkit.dumps(document))
+
+
+def read_calibration_file(path: Path) -> CalibrationFile:
+    """Read `calibration.toml`. Raises ResultFileError where it is damaged or of a newer schema."""
+    return read_record(path, parse_toml, CALIBRATION_SCHEMA, CalibrationFile)
+
+
+def build_certificate_document(found: Calibration) -> dict[str, Any]:
+    """Return the certificates before and after as a JSON document."""
+    return {
+        "schema": "drivetwin/certificate-1",
+        "seed": found.task.seed,
+        "simulated_shifts": found.runs,
+        "metrics": {name.value: asdict(spec) for name, spec in METRICS.items()},
+        "before": to_plain_values(asdict(found.before.certificate)),
+        "after": {
+            **to_plain_values(asdict(found.after.certificate)),
+            "limits": [
+                {
+                    "metric": one.limit.metric.value,
+                    "statistic": one.limit.statistic.value,
+                    "bound": one.limit.bound,
+                    "value": one.value,
+                    "upper": one.upper,
+                    "state": one.state.value,
+                    "binding": one.binding,
+                }
+                for one in found.after.certificate.limits
+            ],
+        },
+    }

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""File of the limits of a calibration and of the spread between units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, FiniteFloat
+
+from drivetwin._util.spelling import suggest_spelling
+from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
+from drivetwin.calibration.metrics import METRICS, Metric
+from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.spread import Spread
+from drivetwin.errors import InputError
+from drivetwin.files.records import Record
+
+_SUFFIX = {
+    "m/s^3": "m_s3",
+    "m/s^1.75": "m_s175",
+    "N*m": "Nm",
+    "s": "s",
+    "J": "J",
+    "W": "W",
+    "rad/s": "rad_s",
+}
+"""Units as keys of a file have them."""
+
+
+def build_limit_keys() -> dict[str, tuple[Metric, Statistic]]:
+    """Return the keys of `[limits]`: for 95 % of the draws, and with `mean_` for their mean."""
+    keys = {}
+    for metric, spec in METRICS.items():
+        name = f"{metric.value}_{_SUFFIX[spec.unit]}"
+        keys[name] = metric, Statistic.SHARE_95
+        keys[f"mean_{name}"] = metric, Statistic.MEAN
+    return keys
+
+
+class SpreadRecord(Record):
+    """Table `[spread]`: standard deviations between units."""
+
+    gain: FiniteFloat = Field(default=Spread.gain, ge=0, lt=0.5)
+    engine_torque: FiniteFloat = Field(default=Spread.engine_torque, ge=0, lt=0.5)
+    contact_pressure_Pa: FiniteFloat = Field(default=Spread.contact_pressure, ge=0)
+
+
+class LimitsFile(Record):
+    """A file of limits: upper bounds, and the spread between units."""
+
+    limits: dict[str, Annotated[FiniteFloat, Field(gt=0)]]
+    spread: SpreadRecord = SpreadRecord()
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """Limits and spread of a file."""
+
+    limits: tuple[Limit, ...]
+    spread: Spread = field(default_factory=Spread)
+
+
+def load_limits(path: Path) -> Requirements:
+    """Read a file of limits. Raises InputError that names every faulty key."""
+    document = read_toml(path, InputError)
+    remedy = "correct these entries; the how-to page on calibration lists the keys"
+    keys = build_limit_keys()
+    table = document.get("limits")
+    unknown = [
+        Fault(f"limits.{name}", f"unknown key{suggest_spelling(name, keys)}")
+        for name in (table if isinstance(table, dict) else ())
+        if name not in keys
+    ]
+    faults = [*validate_schema(document, LimitsFile), *unknown]
+    raise_faults(faults, InputError, str(path), remedy)
+    content = LimitsFile.model_validate(document)
+    limits = tuple(Limit(keys[name][0], bound, keys[name][1])
+                   for name, bound in content.limits.items())  # fmt: skip
+    spread = content.spread
+    return Requirements(
+        limits, Spread(spread.gain, spread.engine_torque, spread.contact_pressure_Pa)
+    )

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""Shifts for the tests of calibration: an upshift, a downshift, small settings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin.calibration.calibrate import Task
+from drivetwin.calibration.controller_policy import build_controller_policy
+from drivetwin.calibration.evaluate import Plant
+from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
+from drivetwin.calibration.objective import Limit
+from drivetwin.calibration.scenarios import (
+    DrawModel,
+    Purpose,
+    Scenarios,
+    draw_scenarios,
+    scale_units,
+)
+from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.spread import Spread
+from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad
+from tests.support.upshift.scenario import build_model
+from tests.support.upshift.statement import BAR, make_problem
+
+SYSTEM = 10.0 * BAR
+QUICK = CalibrationSettings(
+    starts=2,
+    finalists=1,
+    population=6,
+    first_evaluations=12,
+    evaluations=24,
+    search_draws=4,
+    polish_draws=6,
+    tail_draws=8,
+    certificate_draws=60,
+    polish_iterations=2,
+    tail_iterations=1,
+)
+
+
+def make_upshift(step: float = 1e-3) -> Maneuver:
+    """Power-on upshift 2-3 of a heavy truck."""
+    return Maneuver(build_model(make_problem()), OperatingPoint(1400.0, 185.0), 0.5, step=step)
+
+
+def make_downshift() -> Maneuver:
+    """Power-off downshift 3-2 of the same truck on a slope."""
+    model = build_model(make_problem())
+    old, new = model.elements
+    model = replace(model, elements=(new, old), load=RoadLoad(constant=-2000.0))
+    return Maneuver(model, OperatingPoint(-150.0, 120.0), 0.5)
+
+
+def make_draw(maneuver: Maneuver, spread: Spread | None = None) -> DrawModel:
+    """Made units around the driveline of a shift."""
+    given = spread or Spread()
+
+    def draw(random: np.random.Generator) -> DualClutch:
+        return scale_units(maneuver.model, given, random)
+
+    return draw
+
+
+def make_draws(maneuver: Maneuver, count: int, seed: int = 1) -> Scenarios:
+    """Scenarios of made units."""
+    return draw_scenarios(maneuver, make_draw(maneuver), count, seed, Purpose.SEARCH)
+
+
+def make_task(
+    limits: tuple[Limit, ...] = (), settings: CalibrationSettings = QUICK, seed: int = 1
+) -> Task:
+    """Calibration of the upshift by the controller's policy."""
+    maneuver = make_upshift(step=2e-3)
+    policy = build_controller_policy(maneuver, SYSTEM)
+    return Task(maneuver, policy, make_draw(maneuver), limits, seed, settings)
+
+
+def make_plant(maneuver: Maneuver) -> Plant:
+    """Plant on one thread."""
+    return Plant(maneuver, threads=1)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+"""Runs over scenarios: independent of chunks, and of which metrics are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.calibration import evaluate
+from drivetwin.calibration.controller_policy import build_controller_policy
+from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.profiles import Space
+from tests.calibration.cases import SYSTEM, make_draws, make_plant, make_upshift
+
+
+def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    shift = make_upshift(step=2e-3)
+    space, plant, draws = (
+        Space(build_controller_policy(shift, SYSTEM)),
+        make_plant(shift),
+        make_draws(shift, 7),
+    )
+    profiles = space.build_profiles(space.start)
+    whole = plant.evaluate(profiles, draws)
+    monkeypatch.setattr(evaluate, "_CHUNK", 3)
+    parts = plant.evaluate(profiles, draws)
+    for name, values in whole.values.items():
+        assert values == pytest.approx(parts.values[name], rel=1e-9, abs=1e-9)
+    assert plant.count.runs == 14
+    few = replace(plant, metrics=(Metric.FLARE,)).evaluate(profiles, draws)
+    assert set(few.values) == {Metric.FLARE}
+    assert np.array_equal(few.jerk.shape, whole.jerk.shape)

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""Polish on a problem with a closed form: jerk linear in the coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivetwin.calibration.metrics import Metric, Outcome
+from drivetwin.calibration.objective import Limit, Objective
+from drivetwin.calibration.polish import polish
+from drivetwin.simulation.dual_clutch import FloatArray
+
+DRAWS = np.linspace(-1.0, 1.0, 20)
+
+
+def _run(at: FloatArray) -> Outcome:
+    """Peak jerk |40·(x - 0.6) + 4·draw| + 5, shift time 1 - y, which x + y moves no further."""
+    peak = 40.0 * (at[0] - 0.6) + 4.0 * DRAWS
+    jerk = np.zeros((DRAWS.size, 21))
+    jerk[:, 5] = peak
+    jerk[:, 15] = -5.0 - 10.0 * at[1]
+    no = np.zeros(DRAWS.size, dtype=np.bool_)
+    values = {
+        Metric.PEAK_JERK: np.abs(jerk).max(axis=1),
+        Metric.SHIFT_TIME: np.full(DRAWS.size, 1.0 - at[1]),
+    }
+    return Outcome(values, jerk, no, no)
+
+
+def test_reaches_the_minimum_without_limits() -> None:
+    objective = Objective((), 0.9, 1.0)
+    found = polish(_run, np.array([0.2, 0.4]), objective, 40)
+    assert found.value == pytest.approx(5.0, abs=0.2)
+
+
+def test_keeps_a_limit_that_costs_comfort() -> None:
+    objective = Objective((Limit(Metric.SHIFT_TIME, 0.5),), 0.9, 1000.0)
+    found = polish(_run, np.array([0.5, 0.1]), objective, 40)
+    assert found.coordinates[1] == pytest.approx(0.5, abs=2e-3)
+    assert found.value == pytest.approx(10.0, abs=0.3)
+
+
+def test_never_returns_worse_than_the_start() -> None:
+    objective = Objective((), 0.9, 1.0)
+    start = np.array([0.61, 0.0])
+    assert polish(_run, start, objective, 3).value <= objective.evaluate(_run(start))

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""From a twin and a request to a task: defaults, draws of the covariance, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.calibration.calibrate import draw_for
+from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.scenarios import Purpose
+from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.twin_task import Request, build_task
+from drivetwin.errors import IdentificationError, InputError
+from drivetwin.estimation.result.estimate import Verdict
+from tests.calibration.cases import QUICK
+from tests.calibration.twins import STD, make_twin
+
+REQUEST = Request(("2", "3"), 0.5, settings=QUICK)
+
+
+def test_operating_point_and_limits_come_from_the_twin() -> None:
+    task = build_task(make_twin(), REQUEST)
+    assert task.maneuver.point.engine_torque == 1200.0
+    assert task.maneuver.point.engine_speed == 155.0
+    assert [one.metric for one in task.limits] == [
+        Metric.SHIFT_TIME,
+        Metric.VIBRATION_DOSE,
+        Metric.FRICTION_ENERGY,
+    ]
+
+
+def test_draws_have_the_covariance_of_the_twin() -> None:
+    twin = make_twin()
+    task = build_task(twin, replace(REQUEST, spread=Spread(0.0, 0.0, 0.0), limits=()))
+    sets = draw_for(task, 1500, Purpose.SEARCH).sets
+    for name, parameter in (("eta", "eta"), ("k_o", "k_o"), ("J_v", "J_vehicle")):
+        value = twin.parameters[parameter].value
+        assert value is not None
+        assert sets[name].std() / value == pytest.approx(STD, rel=0.08)
+    band = 0.02 / 1.959963984540054  # half width of the friction band in standard deviations
+    assert (sets["B3.mu_c"] / 0.12).std() == pytest.approx(band, rel=0.08)
+    assert (sets["B3.mu_c"] != sets["B2.mu_c"]).all()
+
+
+def test_draws_follow_correlations() -> None:
+    twin = make_twin()
+    assert twin.covariance is not None
+    ids = twin.covariance_ids
+    a, b = ids.index("k_o"), ids.index("J_vehicle")
+    covariance = twin.covariance.copy()
+    covariance[a, b] = covariance[b, a] = 0.9 * np.sqrt(covariance[a, a] * covariance[b, b])
+    task = build_task(replace(twin, covariance=covariance), replace(REQUEST, limits=()))
+    sets = draw_for(task, 800, Purpose.SEARCH).sets
+    assert np.corrcoef(sets["k_o"], sets["J_v"])[0, 1] == pytest.approx(0.9, abs=0.03)
+
+
+def test_a_twin_without_identified_values_is_refused() -> None:
+    with pytest.raises(IdentificationError, match="not valid"):
+        build_task(make_twin(Verdict.WEAK), REQUEST)
+
+
+def test_what_the_twin_does_not_say_must_be_given() -> None:
+    bare = replace(make_twin(), validity={})
+    with pytest.raises(InputError, match="torque and speed"):
+        build_task(bare, REQUEST)
+    asked = replace(REQUEST, engine_torque=1000.0, engine_speed=150.0, limits=())
+    with pytest.raises(InputError, match="pressures"):
+        build_task(bare, asked)
+    task = build_task(bare, replace(asked, system_pressure=12e5))
+    assert task.maneuver.point.engine_torque == 1000.0
+
+
+@pytest.mark.parametrize("kind", list(PolicyKind))
+def test_a_start_by_name(kind: PolicyKind) -> None:
+    name = {"controller": "fill_time", "knots": "oncoming_pressure_1"}[kind.value]
+    task = build_task(make_twin(), replace(REQUEST, policy=kind, start={name: 0.1}, limits=()))
+    found = {one.name: one.start for one in task.policy.parameters}
+    assert found[name] == 0.1
+    with pytest.raises(InputError, match="no parameter wrong"):
+        build_task(make_twin(), replace(REQUEST, policy=kind, start={"wrong": 0.1}, limits=()))
+
+
+def test_a_downshift_with_power_is_refused() -> None:
+    with pytest.raises(InputError, match="downshift with the power on"):
+        build_task(make_twin(), replace(REQUEST, gears=("3", "2")))

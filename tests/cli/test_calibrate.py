@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin calibrate`: its files, what it refuses, and an interrupt."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli import main
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.export.parameters.files import read_parameters
+from drivetwin.files.calibration_file import read_calibration_file
+from drivetwin.files.twin_conversion import save_twin
+from tests.calibration.cases import QUICK
+from tests.calibration.twins import make_twin
+
+FILES = {
+    "calibration.toml",
+    "certificate.json",
+    "report.html",
+    "calibration.csv",
+    "calibration.dcm",
+    "calibration.cdfx",
+}
+SHORT = ("--draws", "60", "--engine-torque", "1400")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def effort() -> Iterator[None]:
+    """Few candidates and draws in all tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "drivetwin.calibration.settings.CalibrationSettings",
+            lambda **given: replace(QUICK, **given),
+        )
+        yield
+
+
+@pytest.fixture(scope="module")
+def twin(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("twin") / "twin.toml"
+    save_twin(path, make_twin())
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(twin: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a short calibration."""
+    out = tmp_path_factory.mktemp("calibration") / "out"
+    limits = out.with_name("limits.toml")
+    limits.write_text("[limits]\nshift_time_s = 1.1\nmean_friction_energy_J = 90000\n")
+    given = ["calibrate", str(twin), "--shift", "2-3", "--limits", str(limits), "-o", str(out)]
+    assert main([*given, *SHORT]) == 0
+    return out
+
+
+def test_writes_all_files_with_equal_values(folder: Path) -> None:
+    assert {one.name for one in folder.iterdir()} == FILES
+    content = read_calibration_file(folder / "calibration.toml")
+    assert content.shift == "2-3"
+    assert content.limits == {"shift_time_s": 1.1, "mean_friction_energy_J": 90000.0}
+    assert list(content.inputs) == ["twin.toml"]
+    for suffix in ("csv", "dcm", "cdfx"):
+        read = read_parameters(folder / f"calibration.{suffix}")
+        values = {one.name: one.value for one in read.scalars}
+        assert values == {name: one.value for name, one in content.parameters.items()}
+        assert len(read.curves) == 3
+        assert all(curve.axis.unit == "s" for curve in read.curves)
+
+
+def test_certificate_says_draws_and_confidence(folder: Path) -> None:
+    content = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
+    after, before = content["after"], content["before"]
+    assert (after["draws"], after["confidence"]) == (60, 0.95)
+    jerk = [one["quantiles"]["peak_jerk"] for one in (before, after)]
+    assert jerk[1]["share_95"] < jerk[0]["share_95"]
+    assert jerk[1]["upper_99"] is None  # 60 draws do not support it
+    assert {one["metric"] for one in after["limits"]} == {"shift_time", "friction_energy"}
+    assert content["metrics"]["peak_jerk"]["unit"] == "m/s^3"
+
+
+def test_report_shows_limits_profiles_and_definitions(folder: Path) -> None:
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for text in ("Limits; the upper bound", "vibration dose value", "ISO 2631-1", "kiss_pressure"):
+        assert text in page
+
+
+def test_starts_from_a_calibration(
+    folder: Path, twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    start = folder / "calibration.toml"
+    given = ["calibrate", str(twin), "--shift", "2-3", "--start", str(start), "-o", str(tmp_path)]
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[limits]\nshift_time_s = 1.2\n")
+    assert main([*given, *SHORT, "--limits", str(limits), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["folder"] == str(tmp_path)
+    before = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))["after"]
+    assert found["certificate"]["before"]["quantiles"]["peak_jerk"]["median"] == pytest.approx(
+        before["quantiles"]["peak_jerk"]["median"], rel=1e-9
+    )
+    assert main([*given, *SHORT, "--policy", "knots"]) == 2
+    assert "policy 'controller', not 'knots'" in capsys.readouterr().err
+
+
+def test_limits_out_of_reach_leave_no_files(
+    twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[limits]\nshift_time_s = 0.05\n")
+    out = tmp_path / "out"
+    given = ["calibrate", str(twin), "--shift", "2-3", "--limits", str(limits), "-o", str(out)]
+    assert main([*given, *SHORT]) == 2
+    assert "limit 0.05" in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--shift", "2"), "does not name two gears"),
+        (("--shift", "2-7"), "knows no gear '7'"),
+        (("--shift", "3-2"), "downshift with the power on"),
+        (("--shift", "2-3", "--engine-torque", "-50"), "upshift without power"),
+        (("--shift", "2-3", "--system-pressure", "2"), "system pressure is 2.00 bar"),
+    ],
+)
+def test_refusals(
+    twin: Path,
+    tmp_path: Path,
+    options: tuple[str, ...],
+    said: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["calibrate", str(twin), "-o", str(tmp_path / "out"), *options]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_twin_that_is_not_valid_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "weak.toml"
+    save_twin(path, replace(make_twin(Verdict.WEAK)))
+    assert main(["calibrate", str(path), "--shift", "2-3", "-o", str(tmp_path / "out")]) == 2
+    assert "not valid" in capsys.readouterr().err
+
+
+def test_an_interrupt_leaves_nothing(
+    twin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("drivetwin.calibration.calibrate.search_minima", interrupt)
+    out = tmp_path / "out"
+    code = main(["calibrate", str(twin), "--shift", "2-3", "-o", str(out), *SHORT])
+    assert code == 130
+    assert not out.exists()
+    assert list(tmp_path.iterdir()) == []
