@@ -10,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from drivetwin._util.csv_text import format_csv_row
 from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.errors import QueryError
 from drivetwin.fleet.index import ONE_FILE_EACH, Index
@@ -112,7 +113,7 @@ def _convert_fields(fields: str) -> dict[str, float | datetime]:
 
 def save_answer(answer: Answer, path: Path) -> None:
     """Write an answer as CSV, or as Parquet for a name that ends in `.parquet`."""
-    from io import BytesIO, StringIO
+    from io import BytesIO
 
     from drivetwin._util.atomic import write_bytes, write_text
 
@@ -125,10 +126,4 @@ def save_answer(answer: Answer, path: Path) -> None:
         pq.write_table(table, buffer)
         write_bytes(path, buffer.getvalue())
         return
-    import csv
-
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(answer.columns)
-    writer.writerows(answer.rows)
-    write_text(path, text.getvalue())
+    write_text(path, "".join(map(format_csv_row, (answer.columns, *answer.rows))))
