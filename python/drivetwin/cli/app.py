@@ -42,7 +42,7 @@ class _EscapingGroup(TyperGroup):
         except Exception as fault:
             message = getattr(fault, "message", None)
             if isinstance(message, str):
-                fault.message = escape_line(message)
+                vars(fault)["message"] = escape_line(message)
             raise
 
 

@@ -83,7 +83,7 @@ def format_c_string(text: str) -> str:
     def literal(byte: int) -> str:
         return chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?*' else f"\\{byte:03o}"
 
-    return '"' + "".join(map(literal, text.encode())) + '"'
+    return '"' + "".join(map(literal, text.encode(errors="backslashreplace"))) + '"'
 
 
 def _format_comment(text: str) -> str:
