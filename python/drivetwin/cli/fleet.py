@@ -306,7 +306,7 @@ def query(
     with show_step("asking"), Store(store) as opened:
         answer = query_store(opened, sql)
     if output is not None:
-        save_answer(answer, output)
+        save_answer(answer, output, store)
     if as_json:
         rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
         print_json({"rows": rows})

@@ -63,9 +63,11 @@ def _expand_name(name: str) -> Iterator[Path]:
                 "check the name; quote a pattern such as 'logs/**/*.mf4'",
                 Where(file=name),
             )
-        for one in found:
-            if Path(one).is_file():
-                yield Path(one).absolute()
+        seen: set[Path] = set()  # a link to a folder above leads to the same files again
+        for one in map(Path, found):
+            if not one.is_dir() and (place := one.parent.resolve() / one.name) not in seen:
+                seen.add(place)
+                yield one.absolute()
 
 
 def _iterate_files(folder: Path) -> Iterator[Path]:
