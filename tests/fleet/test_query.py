@@ -50,11 +50,13 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
 
 @pytest.mark.parametrize(
     "sql",
-    ["COPY rows TO '{out}'", "COPY (SELECT 1) TO '{out}' (FORMAT parquet)", "EXPORT DATABASE '{out}'",
+    ["COPY rows TO '{out}'", "COPY (SELECT 1) TO '{out}' (FORMAT parquet)",
+     "EXPORT DATABASE '{out}'",
      "SELECT * FROM read_csv('{secret}')", "SELECT * FROM '{secret}'",
      "SELECT * FROM read_text('{secret}')", "SELECT * FROM read_blob('{secret}')",
      "SELECT * FROM glob('/etc/*')", "SELECT * FROM read_json('/etc/passwd')",
-     "SELECT * FROM read_parquet('{secret}')", "ATTACH '{out}' AS x", "ATTACH '{out}' (TYPE sqlite)",
+     "SELECT * FROM read_parquet('{secret}')", "ATTACH '{out}' AS x",
+     "ATTACH '{out}' (TYPE sqlite)",
      "CREATE TABLE x AS SELECT 1", "DROP VIEW rows", "INSERT INTO x VALUES (1)", "DELETE FROM logs",
      "INSTALL httpfs", "LOAD httpfs", "SET enable_external_access = true", "RESET allowed_paths",
      "PRAGMA database_list", "SELECT 1; COPY rows TO '{out}'", "IMPORT DATABASE '{out}'",
