@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import sys
 
+from drivetwin._util.interrupts import interrupt_on_sigterm
 from drivetwin.errors import INTERRUPTED
 
 LINEAR_ALGEBRA = ("OPENBLAS", "OMP", "MKL", "VECLIB")
@@ -15,10 +16,11 @@ give no speed-up on the narrow matrices and slow the run down when other program
 
 
 def main() -> int:
-    """Run the program; Ctrl-C ends it quietly even while it is still being loaded."""
+    """Run the program; Ctrl-C or SIGTERM ends it quietly even while it is still being loaded."""
     for library in LINEAR_ALGEBRA:  # before NumPy reads it
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
+        interrupt_on_sigterm()
         from drivetwin.cli import main as run
 
         return run()

@@ -20,12 +20,17 @@ class Where:
 
     def __str__(self) -> str:
         parts = [
-            self.file,
+            _quote_unprintable(self.file),
             f"channel {self.channel!r}" if self.channel is not None else None,
             f"t = {self.time:.9g} s" if self.time is not None else None,
             f"key {self.key!r}" if self.key is not None else None,
         ]
         return ", ".join(part for part in parts if part)
+
+
+def _quote_unprintable(text: str | None) -> str | None:
+    """Return a text that contains characters without a glyph, or line ends, as a Python literal."""
+    return text if text is None or text.isprintable() else repr(text)
 
 
 @dataclass(eq=False)

@@ -82,7 +82,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     server = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     told = server.stdout.readline()
-    found = re.search(r"http://\S+/", told)
+    found = re.search(r"http://\S+/\?token=\S+", told)
     assert found, told
     yield Bench(found.group(), folder, log.name, card.name, wrong)
     server.terminate()
@@ -400,6 +400,7 @@ def test_a_claim_of_two_gigabytes_is_refused_at_once(bench: Bench, refusing: Pag
     connection.putrequest("POST", "/upload/log?name=log.mf4")
     connection.putheader("Content-Length", str(2 * 10**9))
     connection.putheader("X-Drivetwin-Session", key)
+    connection.putheader("Cookie", place.query.replace("token=", "drivetwin-token="))
     connection.endheaders(b"MDF     ")
     answer = connection.getresponse()
     assert answer.status == 400

@@ -34,7 +34,7 @@ def test_it_listens_on_this_machine_alone(
 
 def test_another_host_is_warned_of(bench_files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     assert _app(bench_files, "--port", "0", "--host", "0.0.0.0") == 0
-    assert "no password" in capsys.readouterr().out.replace("\n", " ")
+    assert "not encrypted" in capsys.readouterr().out.replace("\n", " ")
 
 
 def test_a_log_outside_the_folder_is_refused(

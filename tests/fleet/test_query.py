@@ -3,10 +3,15 @@
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
+from drivetwin.errors import InputError, QueryError
 from drivetwin.fleet.mixed_model.observations import collect_facts
-from drivetwin.fleet.query import query_store
+from drivetwin.fleet.query import Answer, query_store, save_answer
 from drivetwin.fleet.store import Store
 from tests.fleet.toys import make_logs, run_toys
 
@@ -32,3 +37,59 @@ def test_a_log_that_stands_twice_counts_once(tmp_path: Path) -> None:
     with Store(tmp_path / "store") as store:
         rows = query_store(store, "SELECT count(*) FROM rows WHERE kind = 'parameter'").rows
         assert query_store(store, "SELECT count(*) FROM parameters").rows == rows
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
+    folder = tmp_path_factory.mktemp("asked")
+    run_toys(make_logs(folder / "logs", 2), folder / "store")
+    (folder / "secret.csv").write_text("a,b\n1,2\n")
+    with Store(folder / "store") as opened:
+        yield opened
+
+
+@pytest.mark.parametrize(
+    "sql",
+    ["COPY rows TO '{out}'", "COPY (SELECT 1) TO '{out}' (FORMAT parquet)",
+     "EXPORT DATABASE '{out}'",
+     "SELECT * FROM read_csv('{secret}')", "SELECT * FROM '{secret}'",
+     "SELECT * FROM read_text('{secret}')", "SELECT * FROM read_blob('{secret}')",
+     "SELECT * FROM glob('/etc/*')", "SELECT * FROM read_json('/etc/passwd')",
+     "SELECT * FROM read_parquet('{secret}')", "ATTACH '{out}' AS x",
+     "ATTACH '{out}' (TYPE sqlite)",
+     "CREATE TABLE x AS SELECT 1", "DROP VIEW rows", "INSERT INTO x VALUES (1)", "DELETE FROM logs",
+     "INSTALL httpfs", "LOAD httpfs", "SET enable_external_access = true", "RESET allowed_paths",
+     "PRAGMA database_list", "SELECT 1; COPY rows TO '{out}'", "IMPORT DATABASE '{out}'",
+     "CALL checkpoint()", "VACUUM", "SELECT * FROM sniff_csv('{secret}')",
+     "SELECT * FROM read_csv('https://example.com/a.csv')", "PREPARE p AS SELECT 1"],
+)  # fmt: skip
+def test_a_query_only_reads(store: Store, sql: str) -> None:
+    folder = store.folder.parent
+    before = sorted(folder.rglob("*"))
+    with pytest.raises(QueryError):
+        query_store(store, sql.format(out=folder / "out", secret=folder / "secret.csv"))
+    assert sorted(folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    "sql",
+    ["SELECT count(*) FROM rows", "WITH a AS (SELECT 1) SELECT * FROM a", "EXPLAIN SELECT 1",
+     "DESCRIBE rows", "SHOW TABLES", "FROM files", "VALUES (1)"],
+)  # fmt: skip
+def test_questions_are_answered(store: Store, sql: str) -> None:
+    assert query_store(store, sql).rows
+
+
+@pytest.mark.parametrize("name", ["a.csv", "rows/a.csv", "index.sqlite", "rows/../a.parquet"])
+def test_answers_stay_out_of_the_store(store: Store, name: str) -> None:
+    with pytest.raises(InputError, match="into the store"):
+        save_answer(Answer(["a"], [(1,)]), store.folder / name, store.folder)
+
+
+def test_answers_are_safe_for_spreadsheets(store: Store, tmp_path: Path) -> None:
+    answer = query_store(
+        store, "SELECT '=1+1' AS \"=a\", -1.5 AS b, CAST(-2.5 AS DECIMAL(3,1)) AS c"
+    )
+    save_answer(answer, tmp_path / "a.csv", store.folder)
+    with (tmp_path / "a.csv").open(newline="") as file:
+        assert list(csv.reader(file)) == [["'=a", "b", "c"], ["'=1+1", "-1.5", "-2.5"]]

@@ -81,3 +81,33 @@ def test_a_field_that_is_no_number_is_the_logs_fault(folder: Path) -> None:
     found = list(Scan(rules, Method.PAPER).scan_files(Sources([str(folder)]), lambda _: None))
     faults = [one.fault for one in found if isinstance(one, Scanned)]
     assert all(fault is not None and "odometer" in fault.what for fault in faults)
+
+
+def test_a_file_that_grows_or_vanishes_while_it_is_read(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compute = Scan._compute_bounded_digest
+
+    def change_first(self: Scan, path: Path, size: int) -> str:
+        digest = compute(self, path, size)
+        if path.name == "a.csv":
+            path.write_text("longer " * 1000)
+        else:
+            path.unlink()
+        return digest
+
+    monkeypatch.setattr(Scan, "_compute_bounded_digest", change_first)
+    first, second = (one.fault for one in _scan(folder))
+    assert first is not None
+    assert "changed while it was read" in first.what
+    assert second is not None
+    assert "cannot read the file" in second.what
+
+
+def test_the_time_limit_covers_the_scan(folder: Path) -> None:
+    rules = RulesFile(rules=[RuleTable(name="r", vehicle=str(folder / "card.toml"))])
+    scan = Scan(rules, Method.PAPER, 0.0)
+    for one in scan.scan_files(Sources([str(folder)]), lambda _: None):
+        assert isinstance(one, Scanned)
+        assert one.fault is not None
+        assert "longer than 0 s" in one.fault.what

@@ -14,6 +14,7 @@ import pytest
 from flask.testing import FlaskClient
 
 from drivetwin.errors import DrivetwinError
+from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import SESSION_HEADER, build_server
 from drivetwin.workbench.session import Session, Sessions
 from drivetwin.workbench.uploads import LIMITS
@@ -23,6 +24,7 @@ from tests.workbench.bad_files import TABLE, bad_files
 from tests.workbench.conftest import CARD
 
 BAD = bad_files()
+TOKEN = "secret"
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,10 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def bench(place: Path) -> Iterator[Bench]:
-    app, sessions = build_server(Folder.from_path(place), Start())
-    yield Bench(app.server.test_client(), sessions, sessions.create())
+    app, sessions = build_server(Folder.from_path(place), Start(), Access(token=TOKEN))
+    client = app.server.test_client()
+    client.set_cookie("drivetwin-token", TOKEN, domain="127.0.0.1")
+    yield Bench(client, sessions, sessions.create())
     sessions.close()
 
 

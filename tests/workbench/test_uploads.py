@@ -65,7 +65,7 @@ def test_an_accepted_name_is_one_part_of_a_path(name: str) -> None:
 @pytest.mark.parametrize(
     "cell",
     ["=1+1", "=cmd|' /C calc'!A0", "@SUM(A1)", '"=HYPERLINK(1)"', "+cmd|' /C calc'!A0",
-     "-2+3+cmd|' /C calc'!A0", " =A1", "-A1", "'=A1"],
+     "-2+3+cmd|' /C calc'!A0", " =A1", "-A1"],
 )  # fmt: skip
 @pytest.mark.parametrize("where", ["{},n\n0,1\n", "time,n\ns,rpm\n0,{}\n", "t;n\n{};1\n"])
 def test_cells_that_a_spreadsheet_computes_are_refused(

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
+from drivetwin._util.visible_text import escape_line
 from drivetwin.cli.calibrate import calibrate
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
@@ -30,8 +32,24 @@ from drivetwin.cli.synth import synth
 from drivetwin.cli.workbench import workbench
 from drivetwin.errors import INTERRUPTED, DrivetwinError, InputError, Where
 
+
+class _EscapingGroup(TyperGroup):
+    """Commands whose usage errors quote arguments, such as names of files, with escapes."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Invoke a command."""
+        try:
+            return super().invoke(ctx)
+        except Exception as fault:
+            message = getattr(fault, "message", None)
+            if isinstance(message, str):
+                vars(fault)["message"] = escape_line(message)
+            raise
+
+
 app = typer.Typer(
     name="drivetwin",
+    cls=_EscapingGroup,
     help="From gear-shift logs to validated driveline models.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

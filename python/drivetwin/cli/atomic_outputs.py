@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from drivetwin._util.atomic import refuse_overwrite
+from drivetwin._util.interrupts import defer_interrupts
 from drivetwin.errors import DrivetwinError, InputError
 
 
@@ -45,8 +46,9 @@ def write_atomically(folder: Path) -> Iterator[Path]:
         files = sorted(beside.iterdir())
         for file in files:
             refuse_overwrite(folder / file.name)
-        for file in files:
-            file.replace(folder / file.name)
+        with defer_interrupts():
+            for file in files:
+                file.replace(folder / file.name)
     except DrivetwinError as error:
         error.where = replace(error.where, file=_map_to_target(error.where.file, beside, folder))
         raise
@@ -54,7 +56,8 @@ def write_atomically(folder: Path) -> Iterator[Path]:
         error.filename = _map_to_target(error.filename, beside, folder)
         raise
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
+        with defer_interrupts():
+            shutil.rmtree(beside, ignore_errors=True)
 
 
 def _map_to_target(file: object, beside: Path, folder: Path) -> str | None:

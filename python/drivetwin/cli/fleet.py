@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -126,21 +125,12 @@ def run(
         WorkerSpec(limits=Limits(time_limit, memory_limit * 2**20)),
         RunOptions(attempts, retry, reports, traces),
     )
-    before = signal.signal(signal.SIGTERM, _raise_interrupt)
-    try:
-        with show_progress(as_json=as_json) as tell:
-            summary = run_fleet(request, tell)
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    with show_progress(as_json=as_json) as tell:
+        summary = run_fleet(request, tell)
     if not as_json:
         _print_summary(summary, output)
     if not summary.complete:
         raise typer.Exit(INTERRUPTED)
-
-
-def _raise_interrupt(_number: int, _frame: object) -> None:
-    """A scheduler's or a shell's wish to end is that of the keyboard."""
-    raise KeyboardInterrupt
 
 
 def _print_summary(summary: Summary, output: Path) -> None:
@@ -306,7 +296,7 @@ def query(
     with show_step("asking"), Store(store) as opened:
         answer = query_store(opened, sql)
     if output is not None:
-        save_answer(answer, output)
+        save_answer(answer, output, store)
     if as_json:
         rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
         print_json({"rows": rows})

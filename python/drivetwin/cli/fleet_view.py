@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import TYPE_CHECKING
 
+from drivetwin._util.visible_text import escape_json
 from drivetwin.cli.output import make_console, print_line
 from drivetwin.fleet.events import (
     Event,
@@ -111,7 +112,7 @@ def show_progress(*, as_json: bool) -> Iterator[Listener]:
 
 
 def _print_event(event: Event) -> None:
-    sys.stdout.write(json.dumps(to_document(event), ensure_ascii=False) + "\n")
+    sys.stdout.write(escape_json(json.dumps(to_document(event), ensure_ascii=False)) + "\n")
     sys.stdout.flush()
 
 

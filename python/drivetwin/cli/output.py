@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from drivetwin._util.visible_text import escape_json
 from drivetwin.errors import DrivetwinError
 from drivetwin.findings import Finding
 
@@ -27,15 +28,16 @@ def make_console(*, stderr: bool = False) -> Console:
     """Create a console; without a terminal it has no colours and 80 columns.
 
     Texts are shown as they are: a unit in brackets, `[/min]`, is no markup and `:on:` no picture.
+    Characters without a glyph, which a terminal might obey, are shown as escapes.
     """
-    from rich.console import Console
+    from drivetwin.cli.escaping_console import EscapingConsole
 
-    return Console(stderr=stderr, highlight=False, markup=False, emoji=False)
+    return EscapingConsole(stderr=stderr, highlight=False, markup=False, emoji=False)
 
 
-def print_line(text: str) -> None:
-    """Print a line of plain text on stdout; a long one is left to the terminal to wrap."""
-    make_console().print(text, soft_wrap=True)
+def print_line(text: str, *, stderr: bool = False) -> None:
+    """Print a line of plain text; a long one is left to the terminal to wrap."""
+    make_console(stderr=stderr).print(text, soft_wrap=True)
 
 
 def print_paragraph(text: str) -> None:
@@ -84,7 +86,7 @@ def print_json(value: Mapping[str, Any]) -> None:
     from drivetwin._util.plain_values import to_plain_values
 
     text = json.dumps(to_plain_values(dict(value)), allow_nan=False, ensure_ascii=False, indent=2)
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(escape_json(text) + "\n")
 
 
 @contextmanager

@@ -104,13 +104,13 @@ def _apply_parameters(twin: Twin, parameters: Path) -> Twin:
 
     content = read_parameters(parameters)
     update = update_twin(twin, content)
-    typer.echo(f"{parameters.name} changes {', '.join(update.changed) or 'nothing'}", err=True)
+    print_line(f"{parameters.name} changes {', '.join(update.changed) or 'nothing'}", stderr=True)
     if update.idle:
-        typer.echo(f"no simulation depends on {', '.join(update.idle)}", err=True)
+        print_line(f"no simulation depends on {', '.join(update.idle)}", stderr=True)
     if update.unknown:
-        typer.echo(f"not of this twin: {', '.join(update.unknown)}", err=True)
+        print_line(f"not of this twin: {', '.join(update.unknown)}", stderr=True)
     if content.skipped:
-        typer.echo(f"neither number nor curve: {', '.join(content.skipped)}", err=True)
+        print_line(f"neither number nor curve: {', '.join(content.skipped)}", stderr=True)
     return update.twin
 
 

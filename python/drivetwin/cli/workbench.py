@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import signal
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from drivetwin.workbench.workspace_folder import Folder
 
 LOOPBACK = "127.0.0.1"
+_LINK_PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>drivetwin</title>
+<meta http-equiv="refresh" content="0; url={0}"></head><body><a href="{0}">{0}</a></body></html>
+"""
 
 
 def workbench(
@@ -42,32 +46,45 @@ def workbench(
 ) -> None:
     """Open the workbench: from a log to a checked model, in the browser.
 
-    Works without a network. Other machines reach it only with --host.
+    Works without a network. Only holders of the printed link get in; other machines reach it only
+    with --host.
     """
     _require_dash()
-    from drivetwin.workbench.access_control import is_loopback
+    from drivetwin.workbench.access_control import Access, is_loopback
     from drivetwin.workbench.server import build_server, start_server
     from drivetwin.workbench.workspace_folder import Folder
 
     place = Folder.from_path(folder)
-    app, sessions = build_server(place, _make_start(place, log, vehicle, channels), host)
+    access = Access(host)
+    app, sessions = build_server(place, _make_start(place, log, vehicle, channels), access)
     server = start_server(app, host, port)
-    shown = f"[{host}]" if ":" in host else host
-    address = f"http://{shown}:{server.port}/"
-    print_line(f"workbench at {address}, files of {place.root}; Ctrl-C ends it")
+    link = access.make_link(server.port)
+    print_line(f"workbench at {link} , files of {place.root}; Ctrl-C ends it")
+    print_line(access.describe())
     if not is_loopback(host):
         print_paragraph(
-            "warning: every machine that reaches this address can read and write files of this "
-            "folder; there is no password"
+            "warning: the connection is not encrypted. Whoever reads the network traffic gets the "
+            "link, and can read and write files of this folder"
         )
-    if browser:
-        typer.launch(address)
     signal.signal(signal.SIGTERM, _stop_on_signal)
-    try:
-        server.serve_forever()
-    finally:
-        server.server_close()
-        sessions.close()
+    with tempfile.TemporaryDirectory(prefix="drivetwin-link-") as private:
+        try:
+            if browser:
+                _launch_browser(link, Path(private))
+            server.serve_forever()
+        finally:
+            server.server_close()
+            sessions.close()
+
+
+def _launch_browser(link: str, private: Path) -> None:
+    """Open the link by a page in a private folder.
+
+    Other users can read the arguments of a command, so that the link is none.
+    """
+    page = private / "workbench.html"
+    page.write_text(_LINK_PAGE.format(link), encoding="utf-8")
+    typer.launch(page.as_uri())
 
 
 def _stop_on_signal(*_: object) -> None:

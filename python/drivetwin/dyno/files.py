@@ -9,6 +9,7 @@ from io import StringIO
 import numpy as np
 import tomlkit
 
+from drivetwin._util.csv_text import format_csv_row
 from drivetwin.channels.pressure_roles import get_pressure_element
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR
@@ -28,8 +29,8 @@ def format_log(run: DynoRun) -> str:
     time = max((channel.time for channel in run.channels), key=lambda stamps: stamps.size)
     columns = [time, *(_format_column(channel, time) for channel in run.channels)]
     text = StringIO()
-    text.write(",".join(("time", *(channel.source_name for channel in run.channels))) + "\n")
-    text.write(",".join(("s", *(channel.source_unit for channel in run.channels))) + "\n")
+    text.write(format_csv_row(("time", *(channel.source_name for channel in run.channels))))
+    text.write(format_csv_row(("s", *(channel.source_unit for channel in run.channels))))
     np.savetxt(text, np.column_stack(columns), fmt="%.9g", delimiter=",")
     return text.getvalue()
 

@@ -78,14 +78,29 @@ def read_rows(path: Path, kinds: Sequence[RowKind] = ()) -> Any:
         if rows.schema != make_schema():
             raise pa.ArrowInvalid("its columns are not those of a part")
     except (OSError, pa.ArrowException) as fault:
-        raise StoreError(
-            f"a part cannot be read: {str(fault).splitlines()[0]}",
-            "remove the file and run `drivetwin fleet` again: its logs are then done anew",
-            Where(file=str(path)),
-        ) from None
+        raise _make_damage_error(fault, path) from None
     if not kinds:
         return rows
     return rows.filter(pc.is_in(rows.column("kind"), pa.array([kind.value for kind in kinds])))
+
+
+def check_footer(path: Path) -> None:
+    """Raise StoreError where a part is cut off: the end of the file has its table of contents."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        pq.read_metadata(path)
+    except (OSError, pa.ArrowException) as fault:
+        raise _make_damage_error(fault, path) from None
+
+
+def _make_damage_error(fault: Exception, path: Path) -> StoreError:
+    return StoreError(
+        f"a part cannot be read: {str(fault).splitlines()[0]}",
+        "remove the file and run `drivetwin fleet` again: its logs are then done anew",
+        Where(file=str(path)),
+    )
 
 
 def make_prefixes(count: int) -> list[str]:

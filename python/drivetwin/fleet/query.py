@@ -10,8 +10,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from drivetwin._util.csv_text import format_csv_row
 from drivetwin._util.optional_dependencies import import_extra
-from drivetwin.errors import QueryError
+from drivetwin.errors import InputError, QueryError, Where
 from drivetwin.fleet.index import ONE_FILE_EACH, Index
 from drivetwin.fleet.readings import to_datetime
 from drivetwin.fleet.rows import RowKind, make_schema
@@ -38,12 +39,15 @@ def query_store(store: Store, sql: str) -> Answer:
     `rows`, all numbers of all logs; `files`, with a column for each field; `logs`, `shifts` and
     `settings` of the index; and, with path, unit and fields of one file of the log beside each
     row, `parameters`, `frictions`, `fits`, `qualities` and `warnings`. Raises QueryError for a
-    question that DuckDB does not take, MissingExtraError without DuckDB.
+    question that DuckDB does not take, that would write or that names other files,
+    MissingExtraError without DuckDB.
     """
     duckdb = import_extra("duckdb", "query", "a query", store.folder)
     with duckdb.connect(config={"autoinstall_known_extensions": "false"}) as database:
         _make_tables(database, store)
+        _close_outside(database, store)
         try:
+            _refuse_changes(duckdb, sql)
             database.execute(sql)
             columns = [column[0] for column in database.description or ()]
             return Answer(columns, database.fetchall() if columns else ())
@@ -52,6 +56,24 @@ def query_store(store: Store, sql: str) -> Answer:
                 f"the database does not take this: {fault}",
                 "try `SELECT * FROM parameters LIMIT 5`; docs/howto/fleet.md lists the tables",
             ) from None
+
+
+def _close_outside(database: Any, store: Store) -> None:
+    """Let the database read the parts of the store and no other file."""
+    allowed = ", ".join("'" + str(path).replace("'", "''") + "'" for path in store.list_parts())
+    database.execute(f"SET allowed_paths = [{allowed}]")
+    database.execute("SET enable_external_access = false")
+    database.execute("SET lock_configuration = true")
+
+
+def _refuse_changes(duckdb: Any, sql: str) -> None:
+    """Raise QueryError for statements that do more than answer, such as COPY and ATTACH."""
+    for statement in duckdb.extract_statements(sql):
+        if statement.type not in (duckdb.StatementType.SELECT, duckdb.StatementType.EXPLAIN):
+            raise QueryError(
+                f"a query may only read: this is {statement.type.name}",
+                "ask with SELECT; `-o FILE` writes the answer",
+            )
 
 
 def _make_tables(database: Any, store: Store) -> None:
@@ -110,12 +132,18 @@ def _convert_fields(fields: str) -> dict[str, float | datetime]:
     }
 
 
-def save_answer(answer: Answer, path: Path) -> None:
-    """Write an answer as CSV, or as Parquet for a name that ends in `.parquet`."""
-    from io import BytesIO, StringIO
+def save_answer(answer: Answer, path: Path, store: Path) -> None:
+    """Write an answer as CSV, or as Parquet for a name that ends in `.parquet`.
+
+    Raises InputError for a path inside the store.
+    """
+    from io import BytesIO
 
     from drivetwin._util.atomic import write_bytes, write_text
 
+    if path.resolve().is_relative_to(store.resolve()):
+        what = "an answer is not written into the store that it was taken from"
+        raise InputError(what, "name a file outside the store", Where(file=str(path)))
     if path.suffix.casefold() == ".parquet":
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -125,10 +153,4 @@ def save_answer(answer: Answer, path: Path) -> None:
         pq.write_table(table, buffer)
         write_bytes(path, buffer.getvalue())
         return
-    import csv
-
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(answer.columns)
-    writer.writerows(answer.rows)
-    write_text(path, text.getvalue())
+    write_text(path, "".join(map(format_csv_row, (answer.columns, *answer.rows))))

@@ -43,7 +43,7 @@ def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
     until then stays in the store.
     """
     with Store(request.store, write=True) as store, closing(_make_pool(request, tell)) as pool:
-        scan = Scan(request.rules, request.method)
+        scan = Scan(request.rules, request.method, request.worker.limits.seconds)
         return Coordinator(store, pool, request.wishes, tell).run(scan, request.sources)
 
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+import threading
 from collections import deque
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
+from time import monotonic
 
+from drivetwin._util.regular_file import measure_regular_file
 from drivetwin._util.version import get_program_version
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import DrivetwinError, FileFormatError, Where
@@ -28,6 +32,7 @@ ROWS_FORMAT = 2
 _READERS = 4
 """Threads that hash files; a disk or network drive answers several at once."""
 _LOOKAHEAD = 4 * _READERS
+_CHUNK = 2**20
 _KEY = 40
 """Hexadecimal digits of a log's key."""
 
@@ -65,8 +70,11 @@ class _Content:
 class Scan:
     """Looks at the files of a fleet by its rules, with one method; see `scanned`."""
 
-    def __init__(self, rules: RulesFile, method: Method) -> None:
+    def __init__(self, rules: RulesFile, method: Method, seconds: float = math.inf) -> None:
+        """Scan by `rules`; reading one file may take `seconds`."""
         self._rules = rules
+        self._seconds = seconds
+        self._stop = threading.Event()
         self._method = method
         self._recipe = lru_cache(self._read_recipe)
 
@@ -77,18 +85,22 @@ class Scan:
         read again.
         """
         waiting: deque[tuple[Source, Future[_Content]]] = deque()
-        with ThreadPoolExecutor(_READERS) as readers:
+        self._stop.clear()
+        readers = ThreadPoolExecutor(_READERS)
+        try:
             for source in sources:
-                waiting.append(
-                    (source, readers.submit(_read_content, source.path, known(str(source.path))))
-                )
+                entry = known(_format_path(source.path))
+                waiting.append((source, readers.submit(self._read_content, source.path, entry)))
                 if len(waiting) >= _LOOKAHEAD:
                     yield self._scan_file(*waiting.popleft())
             while waiting:
                 yield self._scan_file(*waiting.popleft())
+        finally:
+            self._stop.set()
+            readers.shutdown(cancel_futures=True)
 
     def _scan_file(self, source: Source, reading: Future[_Content]) -> Scanned | Skipped:
-        path = str(source.path)
+        path = _format_path(source.path)
         unit, content = "", _Content("", 0, 0)
         try:
             content = reading.result()
@@ -107,6 +119,43 @@ class Scan:
             path, log, content.digest, content.size, content.modified, rule.name, unit, fields
         )
         return Scanned(file, settings, recipe)
+
+    def _read_content(self, path: Path, known: FileRow | None) -> _Content:
+        """Read content and state of a file, unless it is `known` and did not change.
+
+        Raises FileFormatError for what is no regular file, for one that changes meanwhile or takes
+        too long, and for a name that is no text; OSError.
+        """
+        where = Where(file=_format_path(path))
+        if where.file != str(path):
+            raise FileFormatError("the file name is no UTF-8 text", "rename the file", where)
+        measure_regular_file(path, FileFormatError)
+        status = path.stat()
+        size, modified = status.st_size, status.st_mtime_ns
+        if known is not None and (known.size, known.modified) == (size, modified) and known.content:
+            return _Content(known.content, size, modified)
+        digest = self._compute_bounded_digest(path, size)
+        after = path.stat()
+        if (after.st_size, after.st_mtime_ns) != (size, modified):
+            raise FileFormatError(
+                "the file changed while it was read", "run again when it is complete", where
+            )
+        return _Content(digest, size, modified)
+
+    def _compute_bounded_digest(self, path: Path, size: int) -> str:
+        """Hash the first `size` bytes of a file. Raises FileFormatError after the time limit."""
+        digest, deadline = hashlib.sha256(), monotonic() + self._seconds
+        with path.open("rb") as file:
+            while size > 0 and (chunk := file.read(min(size, _CHUNK))):
+                digest.update(chunk)
+                size -= len(chunk)
+                if self._stop.is_set() or monotonic() > deadline:
+                    raise FileFormatError(
+                        f"reading took longer than {self._seconds:g} s",
+                        "copy the file to a faster disk, or give a larger --time-limit",
+                        Where(file=str(path)),
+                    )
+        return digest.hexdigest()
 
     def _read_recipe(self, vehicle: str, channels: str | None) -> TaskSpec:
         """The recipe of a rule; its files are read once."""
@@ -147,17 +196,15 @@ def _compute_key(*parts: str) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:_KEY]
 
 
-def _read_content(path: Path, known: FileRow | None) -> _Content:
-    status = path.stat()
-    size, modified = status.st_size, status.st_mtime_ns
-    if known is not None and (known.size, known.modified) == (size, modified) and known.content:
-        return _Content(known.content, size, modified)
-    return _Content(_compute_digest(path), size, modified)
-
-
 def _compute_digest(path: Path) -> str:
+    measure_regular_file(path, FileFormatError)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _format_path(path: Path) -> str:
+    """Return a path as text; bytes of names that are no UTF-8 become escapes."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
 
 
 def _read_channel_names(path: Path) -> frozenset[str]:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from drivetwin._util.csv_text import parse_csv_row, restore_cell
 from drivetwin.errors import InputError, Where
 from drivetwin.fleet.index import INDEX
 from drivetwin.logs.formats.detect import SUFFIXES
@@ -62,9 +63,11 @@ def _expand_name(name: str) -> Iterator[Path]:
                 "check the name; quote a pattern such as 'logs/**/*.mf4'",
                 Where(file=name),
             )
-        for one in found:
-            if Path(one).is_file():
-                yield Path(one).absolute()
+        seen: set[Path] = set()  # a link to a folder above leads to the same files again
+        for one in map(Path, found):
+            if not one.is_dir() and (place := one.parent.resolve() / one.name) not in seen:
+                seen.add(place)
+                yield one.absolute()
 
 
 def _iterate_files(folder: Path) -> Iterator[Path]:
@@ -82,7 +85,7 @@ def _read_list(path: Path) -> Iterator[Source]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             head = file.readline()
-            columns = next(csv.reader([head]), [])
+            columns = parse_csv_row(head)
             if _PATH not in columns:
                 file.seek(0)
                 for line in file:
@@ -90,7 +93,8 @@ def _read_list(path: Path) -> Iterator[Source]:
                         yield Source((path.parent / line.strip()).absolute())
                 return
             rows = csv.DictReader(file, columns)
-            for row in rows:
+            for cells in rows:
+                row = {k: v and restore_cell(v) for k, v in cells.items() if isinstance(k, str)}
                 if not row[_PATH]:
                     raise InputError(
                         f"line {rows.line_num + 1} names no path",

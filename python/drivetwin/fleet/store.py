@@ -92,7 +92,9 @@ class Store:
     def _reset_incomplete(self) -> None:
         """Reset the logs whose rows are missing to waiting, and delete unfinished files."""
         for part in self.index.list_large_parts():
-            if not (self.folder / part).is_file():
+            if (self.folder / part).is_file():
+                parts.check_footer(self.folder / part)
+            else:
                 logs = self.index.select("SELECT log FROM logs WHERE part = ?", part)
                 self.index.reset([log for (log,) in logs])
         single = [log for log, part in self.index.iterate_done_logs() if not part]

@@ -16,6 +16,7 @@ from typing import BinaryIO
 import numpy as np
 
 from drivetwin._util.atomic import open_atomic
+from drivetwin._util.csv_text import format_csv_row
 from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import resolve_channel_unit
@@ -84,21 +85,15 @@ def _write_csv(file: BinaryIO, _: Path, channels: Sequence[RawChannel]) -> None:
     names = [_TIME, *(channel.name for channel in channels)]
     units = ["s", *(channel.unit or "" for channel in channels)]
     rows = [
-        _format_row(names),
-        _format_row(units),
-        *(",".join(row) for row in zip(*texts, strict=True)),
+        format_csv_row(names),
+        format_csv_row(units),
+        *(",".join(row) + "\n" for row in zip(*texts, strict=True)),
     ]
-    file.write(("\n".join(rows) + "\n").encode("utf-8"))
+    file.write("".join(rows).encode("utf-8"))
 
 
 def _format_cell(value: float) -> str:
     return repr(value) if np.isfinite(value) else "NaN"
-
-
-def _format_row(cells: Sequence[str]) -> str:
-    return ",".join(
-        '"' + cell.replace('"', '""') + '"' if re.search('[,"]', cell) else cell for cell in cells
-    )
 
 
 def _write_parquet(file: BinaryIO, path: Path, channels: Sequence[RawChannel]) -> None:

@@ -14,6 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.progress import notify_progress, scale_progress
+from drivetwin._util.visible_text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.report.embedded_data import Store, encode_content
@@ -77,6 +78,7 @@ def render_page(
     environment = Environment(
         loader=PackageLoader("drivetwin.report"),
         autoescape=True,
+        finalize=_show,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -144,7 +146,12 @@ def encode_figure(block: FigureBlock, store: Store) -> Markup:
 
 
 def _encode_json(value: object) -> Markup:
-    return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
+    return Markup(json.dumps(escape_values(value), separators=(",", ":")).replace("<", "\\u003c"))
+
+
+def _show(value: object) -> object:
+    """Return a value of the template as displayed: texts of others with escapes."""
+    return escape_text(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _read_resource(name: str) -> Markup:

@@ -9,9 +9,10 @@ from functools import singledispatch
 
 import numpy as np
 import plotly.graph_objects as go
-from markupsafe import escape
+from markupsafe import Markup, escape
 
 from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
+from drivetwin._util.visible_text import escape_text
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
@@ -46,7 +47,7 @@ class Summary:
 
     def __str__(self) -> str:
         parts = [self.title, *(_format_text(table) for table in self.tables), *self.remarks]
-        return "\n\n".join(part for part in parts if part)
+        return escape_text("\n\n".join(part for part in parts if part))
 
     __repr__ = __str__
 
@@ -54,9 +55,9 @@ class Summary:
     def html(self) -> str:
         """Plain HTML that takes the notebook's own colours."""
         tables = "".join(_format_html(table) for table in self.tables)
-        remarks = "".join(f"<li>{escape(text)}</li>" for text in self.remarks)
+        remarks = "".join(f"<li>{_escape(text)}</li>" for text in self.remarks)
         listed = f"<ul>{remarks}</ul>" if remarks else ""
-        return f"<div><strong>{escape(self.title)}</strong>{tables}{listed}</div>"
+        return f"<div><strong>{_escape(self.title)}</strong>{tables}{listed}</div>"
 
     def _repr_html_(self) -> str:
         return self.html
@@ -82,7 +83,7 @@ def _format_text(table: Table) -> str:
 def _format_html(table: Table) -> str:
     def cells(line: Row, tag: str) -> str:
         return "".join(
-            f'<{tag} style="text-align:{"right" if k in table.right else "left"}">{escape(text)}'
+            f'<{tag} style="text-align:{"right" if k in table.right else "left"}">{_escape(text)}'
             f"</{tag}>"
             for k, text in enumerate(line)
         )
@@ -207,3 +208,8 @@ def _build_fit_tables(fit: Mapping[str, Mapping[str, SignalFit]]) -> Iterable[Ta
         rows.append((get_channel_label(signal), *told, error))
     head = ("fit %", *phases, "rmse")
     yield Table(head, rows, frozenset(range(1, len(head))))
+
+
+def _escape(text: str) -> Markup:
+    """Return a text of others as HTML."""
+    return escape(escape_text(text))

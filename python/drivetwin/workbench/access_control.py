@@ -1,41 +1,75 @@
 # SPDX-License-Identifier: MIT
-"""Access control: the server answers only requests that name its own address.
+"""Access control: the server answers only its own address, and only holders of its link.
 
 A page of another site can make a browser send requests here, under a name that it has made point to
 this machine (DNS rebinding). Such a request carries that name as its host and is refused.
+
+Other users of the machine, and other machines, can reach the port. The link that the program prints
+contains a random token; the page that it opens gets a cookie with the token. A request without the
+cookie is refused, whatever it asks for.
 """
 
 from __future__ import annotations
 
+import hmac
 import ipaddress
 import json
+import secrets
+from dataclasses import dataclass, field
+from typing import cast
 from urllib.parse import urlsplit
 
-from flask import Flask, Response, request
+from flask import Flask, Response, redirect, request
 from werkzeug.exceptions import HTTPException
 
 MAX_REQUEST = 4 * 2**20
 """Bytes of a request that is no upload."""
 LOCAL = "localhost"
+_COOKIE = "drivetwin-token"
+_TOKEN_FIELD = "token"
 
 
-def protect(server: Flask, host: str, script_hashes: list[str]) -> None:
-    """Refuse foreign hosts and origins, bound requests, and let pages load nothing from outside.
+@dataclass(frozen=True)
+class Access:
+    """Rules of access to a server.
 
-    `host` is the address that the server listens on; names beside it and `localhost` are refused.
+    `host` is the address that it listens on, `token` the secret that its users have.
+    """
+
+    host: str = "127.0.0.1"
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(32), repr=False)
+
+    def make_link(self, port: int) -> str:
+        """Return the link that opens the workbench."""
+        shown = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{shown}:{port}/?{_TOKEN_FIELD}={self.token}"
+
+    def describe(self) -> str:
+        """Describe who may connect, for the status line."""
+        if is_loopback(self.host):
+            return "access: this machine only, with the link from the terminal"
+        return f"access: every machine that reaches {self.host}, with the link from the terminal"
+
+    def is_token(self, given: str | None) -> bool:
+        """Return True for the token, in a time that does not depend on `given`."""
+        return hmac.compare_digest((given or "").encode(errors="replace"), self.token.encode())
+
+
+def protect(server: Flask, access: Access, script_hashes: list[str]) -> None:
+    """Refuse strangers, bound requests, and let pages load nothing from outside.
+
+    Strangers are foreign hosts and origins, and requests without the token.
     """
     server.config["MAX_CONTENT_LENGTH"] = MAX_REQUEST
     policy = _build_policy(script_hashes)
 
     @server.before_request
     def refuse_strangers() -> Response | None:
-        if not is_own_host(request.host, host):
+        if not is_own_host(request.host, access.host):
             return make_refusal(421, f"this server does not answer to the name {request.host!r}")
-        origin = request.headers.get("Origin")
-        foreign = origin is not None and urlsplit(origin).netloc != request.host
-        if foreign or request.headers.get("Sec-Fetch-Site") == "cross-site":
+        if _is_cross_site():
             return make_refusal(403, "this request comes from another site")
-        return None
+        return _admit(access)
 
     @server.after_request
     def close_in(response: Response) -> Response:
@@ -46,6 +80,32 @@ def protect(server: Flask, host: str, script_hashes: list[str]) -> None:
     def render_refusal(error: HTTPException) -> Response:
         too_large = f"a request may have {MAX_REQUEST / 2**20:.0f} MB"
         return make_refusal(error.code or 500, too_large if error.code == 413 else error.name)
+
+
+def _is_cross_site() -> bool:
+    """Return True if a page of another site made the request; links to the page may be anywhere."""
+    origin = request.headers.get("Origin")
+    if origin is not None:
+        try:
+            return urlsplit(origin).netloc != request.host
+        except ValueError:
+            return True
+    if request.method == "GET" and request.headers.get("Sec-Fetch-Mode") == "navigate":
+        return False
+    return request.headers.get("Sec-Fetch-Site") == "cross-site"
+
+
+def _admit(access: Access) -> Response | None:
+    """Return None for holders of the cookie, the cookie for holders of the link, else a refusal."""
+    if request.path == "/" and access.is_token(request.args.get(_TOKEN_FIELD)):
+        response = redirect("/")  # the token leaves the address bar
+        response.set_cookie(_COOKIE, access.token, httponly=True, samesite="Lax")
+        return cast(Response, response)
+    if access.is_token(request.cookies.get(_COOKIE)):
+        return None
+    return make_refusal(
+        403, "no access without the link -> open the link that `drivetwin app` printed when started"
+    )
 
 
 def is_own_host(named: str, host: str) -> bool:

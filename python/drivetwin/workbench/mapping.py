@@ -58,6 +58,10 @@ def apply_entries(survey: Survey, entries: Sequence[Entry]) -> dict[str, Channel
     Raises MappingError where two columns have one role or a column that is recognised by its name
     is set aside while no other takes its role, UnitError for a unit that does not fit the role.
     """
+    if len(entries) != len(survey.columns):
+        raise MappingError(
+            f"{len(entries)} rows for {len(survey.columns)} columns", "state a row for each column"
+        )
     found: dict[str, ChannelSpec] = {}
     every = [LogColumn(one.name, one.unit, one.group) for one in survey.columns]
     for column, entry in zip(survey.columns, entries, strict=True):

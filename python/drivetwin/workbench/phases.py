@@ -67,6 +67,8 @@ def parse_times(shift: Shift, times: Sequence[float | None]) -> dict[Boundary, f
     unrounded time, and so its uncertainty. Raises InputError where a field holds no time.
     """
     shown = get_display_times(shift)
+    if len(times) != len(Boundary):
+        raise InputError(f"{len(times)} times for {len(Boundary)} boundaries", "state each once")
     found: dict[Boundary, float] = {}
     for one, time in zip(Boundary, times, strict=True):
         if time is None:

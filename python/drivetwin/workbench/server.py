@@ -15,17 +15,18 @@ from werkzeug.serving import BaseWSGIServer, make_server
 
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.workbench import jobs
-from drivetwin.workbench.access_control import make_refusal, protect
+from drivetwin.workbench.access_control import Access, make_refusal, protect
 from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.uploads import LIMITS
+from drivetwin.workbench.views.fields import check_callback_requests, escape_callback_responses
 from drivetwin.workbench.views.page import Start, build_page
 from drivetwin.workbench.workspace_folder import Folder
 
 SESSION_HEADER = "X-Drivetwin-Session"
 
 
-def build_server(folder: Folder, start: Start, host: str = "127.0.0.1") -> tuple[Dash, Sessions]:
-    """The application and its sessions, ready to be served on `host`."""
+def build_server(folder: Folder, start: Start, access: Access) -> tuple[Dash, Sessions]:
+    """Build the application and its sessions, to be served under the rules of `access`."""
     sessions = Sessions(folder)
     app = Dash(
         "drivetwin",
@@ -36,9 +37,11 @@ def build_server(folder: Folder, start: Start, host: str = "127.0.0.1") -> tuple
         suppress_callback_exceptions=True,
         add_log_handler=False,
     )
-    build_page(app, sessions, start)
+    build_page(app, sessions, start, access)
     _register_uploads(app, sessions)
-    protect(app.server, host, list(app.csp_hashes()))
+    protect(app.server, access, list(app.csp_hashes()))
+    check_callback_requests(app.server, app)
+    escape_callback_responses(app.server)
     return app, sessions
 
 

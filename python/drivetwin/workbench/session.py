@@ -267,11 +267,11 @@ class Sessions:
         return key
 
     def __contains__(self, key: object) -> bool:
-        return key in self._held
+        return isinstance(key, str) and key in self._held
 
-    def get(self, key: str | None) -> Session:
+    def get(self, key: object) -> Session:
         """A session by its key. Raises RefusedError for one that is not held."""
-        session = self._held.get(key or "")
+        session = self._held.get(key) if isinstance(key, str) else None
         if session is None:
             raise RefusedError("this session has ended", "load the page again")
         session.used = time.monotonic()

@@ -24,8 +24,11 @@ LIMITS = {
 """Bytes that an upload may have, by what it is for."""
 _CHUNK = 2**18
 _LONGEST_NAME = 200
-_FORMULA = re.compile(rb"""(?:^|[,;\t])[ ]*"?'?(?:[=@]|[+-](?=[A-Za-z(]|[^,;\t\r\n"]*[|!(]))""")
-"""A cell that a spreadsheet would compute: it begins with =, @, or a sign before no number."""
+_FORMULA = re.compile(rb"""(?:^|[,;\t])[ ]*"?(?:[=@]|[+-](?=[A-Za-z(]|[^,;\t\r\n"]*[|!(]))""")
+"""A cell that a spreadsheet would compute: it begins with =, @, or a sign before no number.
+
+An apostrophe in front makes it a text.
+"""
 _SIGNED_WORD = re.compile(rb"[+-](?:nan|inf|infinity)\b", re.IGNORECASE)
 _BINARY = re.compile(rb"\x00")
 _HEAD = 4096

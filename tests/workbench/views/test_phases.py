@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from drivetwin._util.display_units import format_significant
+from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import build_server
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views.page import Start
@@ -13,7 +14,7 @@ from drivetwin.workbench.workspace_folder import Folder
 
 
 def test_shift_quality_is_told_in_units_of_engineers(identified: Session, tmp_path: Path) -> None:
-    app, sessions = build_server(Folder.from_path(tmp_path), Start())
+    app, sessions = build_server(Folder.from_path(tmp_path), Start(), Access())
     key = sessions.create()
     sessions.get(key).work = identified.work
     (drawn,) = [one for name, one in app.callback_map.items() if "phases-content" in name]

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import re
 from importlib import resources
 from pathlib import Path
 
 from drivetwin._util.atomic import write_bytes
+from drivetwin._util.visible_text import escape_text
 from drivetwin.export.checks import check_exportable
 from drivetwin.export.entries import Entry, get_lock_index, list_entries, start_entries
 from drivetwin.export.subject import Subject
@@ -81,12 +83,13 @@ def format_c_string(text: str) -> str:
     def literal(byte: int) -> str:
         return chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?*' else f"\\{byte:03o}"
 
-    return '"' + "".join(map(literal, text.encode())) + '"'
+    return '"' + "".join(map(literal, text.encode(errors="backslashreplace"))) + '"'
 
 
 def _format_comment(text: str) -> str:
     """Text that can neither begin nor end a comment, nor break its line."""
-    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
+    plain = " ".join(escape_text(text).split())
+    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)", " ", plain)
 
 
 def _format_initialiser(entry: Entry) -> str:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin._util.csv_text import format_csv_row
 from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.variables import Role, Variable, list_variables
 from drivetwin.export.fmu.version import FmiVersion
@@ -117,10 +118,9 @@ _SPEEDS = ("engine_speed", "output_speed", "wheel_speed", "twist", "shaft_torque
 
 def _format_csv(variables: Sequence[Variable], time: FloatArray, table: FloatArray) -> bytes:
     """Rows that read back as the same doubles."""
-    lines = [",".join(("time", *(one.name for one in variables)))]
     rows = np.column_stack((time, table)).tolist()
-    lines += [",".join(map(repr, row)) for row in rows]
-    return ("\n".join(lines) + "\n").encode()
+    head = ("time", *(one.name for one in variables))
+    return "".join(map(format_csv_row, (head, *rows))).encode()
 
 
 def _build_manifest(related: Sequence[tuple[str, str, str]], files: dict[str, bytes]) -> bytes:

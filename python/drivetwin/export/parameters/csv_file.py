@@ -7,10 +7,10 @@ name,axis,at,axis_unit,value,unit,text
 from __future__ import annotations
 
 import csv
-import io
 from itertools import groupby, takewhile
 from pathlib import Path
 
+from drivetwin._util.csv_text import NumberText, format_csv_row, parse_csv_row, restore_cell
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
     Axis,
@@ -38,26 +38,24 @@ def convert_for_csv(parameters: ParameterSet) -> ParameterSet:
 def format_csv(parameters: ParameterSet) -> str:
     """Contents of the file."""
     content = convert_for_csv(parameters)
-    out = io.StringIO()
-    for line in (f"{_TITLE}{content.name}", *(f"# {note}" for note in content.notes)):
-        out.write(f"{line}\n")
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(_COLUMNS)
+    heads = (f"{_TITLE}{content.name}", *(f"# {note}" for note in content.notes))
+    rows: list[tuple[object, ...]] = [*((head,) for head in heads), _COLUMNS]
     for one in content.scalars:
-        table.writerow((one.name, "", "", "", format_number(one.value), one.unit, one.text))
+        rows.append((one.name, "", "", "", _to_cell(one.value), one.unit, one.text))
     for curve in content.curves:
         axis = curve.axis
         for at, value in zip(axis.points, curve.values, strict=True):
-            point = (curve.name, axis.name, format_number(at), axis.unit, format_number(value))
-            table.writerow((*point, curve.unit, curve.text))
-    return out.getvalue()
+            point = (curve.name, axis.name, _to_cell(at), axis.unit, _to_cell(value))
+            rows.append((*point, curve.unit, curve.text))
+    return "".join(map(format_csv_row, rows))
 
 
 def parse_csv(text: str, source: str) -> ParameterSet:
     """Read the file. Raises FileFormatError where columns are missing or a row is damaged."""
     lines = text.splitlines()
-    head = list(takewhile(lambda line: line.startswith("#"), lines))
-    named = next((line for line in head if line.startswith(_TITLE)), "")
+    head = list(takewhile(lambda line: line.startswith(("#", '"#')), lines))
+    heads = ["".join(parse_csv_row(line)[:1]) if line[0] == '"' else line for line in head]
+    named = next((line for line in heads if line.startswith(_TITLE)), "")
     rows = csv.DictReader(lines[len(head) :], strict=True)
     scalars, curves = [], []
     for name, group in groupby(_read_rows(rows, source), key=lambda row: row["name"]):
@@ -88,7 +86,11 @@ def _read_rows(reader: csv.DictReader[str], source: str) -> list[_Row]:
                 "separate columns by commas and quote texts that hold some",
                 Where(file=source, key=row["name"]),
             )
-    return rows
+    return [{key: restore_cell(text) for key, text in row.items()} for row in rows]
+
+
+def _to_cell(value: float) -> NumberText:
+    return NumberText(format_number(value))
 
 
 def _parse_scalar(row: _Row, source: str) -> Scalar:

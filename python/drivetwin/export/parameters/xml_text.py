@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
+from drivetwin._util.visible_text import escape_line, escape_text
 from drivetwin.errors import FileFormatError, Where
 
 
@@ -18,12 +20,19 @@ def add_child(parent: ET.Element, tag: str, text: str = "", **attributes: str) -
 
 def format_comment(lines: Iterable[str]) -> str:
     """The lines as one XML comment, which may not hold two hyphens; nothing without lines."""
-    text = "\n".join(f"  {line}" for line in lines).replace("--", "- -")
+    text = "\n".join(f"  {escape_line(line)}" for line in lines)
+    text = re.sub("-(?=-)", "- ", text)
     return f"<!--\n{text}\n-->" if text else ""
 
 
 def format_document(root: ET.Element, *heads: str) -> str:
-    """The tree as indented UTF-8 text, behind the declaration and further `heads`."""
+    """Return the tree as indented UTF-8 text, behind the declaration and further `heads`.
+
+    Characters without a glyph, most of which XML cannot hold, are written as escapes.
+    """
+    for element in root.iter():
+        element.text = element.text and escape_text(element.text)
+        element.attrib.update({key: escape_line(text) for key, text in element.attrib.items()})
     ET.indent(root)
     body = ET.tostring(root, encoding="unicode")
     declaration = '<?xml version="1.0" encoding="UTF-8"?>'

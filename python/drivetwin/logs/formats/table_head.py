@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
+from drivetwin._util.csv_text import restore_cell
 from drivetwin.channels.names import is_time_name, split_name_and_unit
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.units import find_unit, is_unit
@@ -150,8 +151,8 @@ def split_strictly(line: str, separator: str) -> list[str]:
 def split_line(line: str, separator: str) -> list[str]:
     """Fields of a line without blanks around them; quotes that do not close are text."""
     with contextlib.suppress(csv.Error):
-        return [cell.strip() for cell in split_strictly(line, separator)]
-    return [cell.strip() for cell in line.split(separator)]
+        return [restore_cell(cell.strip()) for cell in split_strictly(line, separator)]
+    return [restore_cell(cell.strip()) for cell in line.split(separator)]
 
 
 def is_value(cell: str) -> bool:

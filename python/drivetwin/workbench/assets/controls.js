@@ -35,7 +35,9 @@
   window.fetch = async (...request) => {
     try {
       const answer = await ask(...request);
-      if (answer.status >= 500) {
+      if (answer.status === 403) {
+        say("the workbench was started anew -> open the link that its terminal shows", true);
+      } else if (answer.status >= 500) {
         say("the workbench met a fault of its own -> its terminal has the details", true);
       }
       return answer;

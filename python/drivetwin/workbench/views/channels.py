@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
@@ -36,7 +36,7 @@ def register(page: ui.Page) -> None:
     @page.callback(
         Output("channels-content", "children"), Input(ui.make_due_id("channels"), "data")
     )
-    def show(session: Session, _: int) -> list[Component]:
+    def show(session: Session, _: object) -> list[Component]:
         """Columns, faults and the channels over time."""
         opened = session.work.opened
         return [ui.make_hint("No log is open.")] if opened is None else _build_content(opened)
@@ -53,7 +53,7 @@ def register(page: ui.Page) -> None:
         clicks: int | None,
         roles: Sequence[str],
         units: Sequence[str | None],
-        signs: Sequence[str],
+        signs: Sequence[Literal["+", "-"]],
     ) -> None:
         """Read the log with the mapping as it stands in the table."""
         if not clicks:

@@ -37,7 +37,7 @@ def register(page: ui.Page) -> None:
     """Drawing on demand: the figures of three methods take seconds."""
 
     @page.callback(Output("compare-content", "children"), Input(ui.make_due_id("compare"), "data"))
-    def tables(session: Session, _: int) -> list[Component]:
+    def tables(session: Session, _: object) -> list[Component]:
         """The parameters side by side, as soon as there are two results."""
         work = session.work
         refusals = [
@@ -54,7 +54,7 @@ def register(page: ui.Page) -> None:
         Input("draw-comparison", "n_clicks"),
         busy="draw-comparison",
     )
-    def draw(session: Session, _: int) -> list[Component]:
+    def draw(session: Session, _: object) -> list[Component]:
         """All of it: agreement, every shift by every method, friction."""
         work = session.work
         candidates = _collect_candidates(work)

@@ -9,10 +9,12 @@ from typing import Any
 from dash import ALL, Input, Output, ctx, dcc, html, no_update
 from dash.development.base_component import Component
 
+from drivetwin.errors import RefusedError
 from drivetwin.export.targets import Target
 from drivetwin.workbench.exports import Record, make_product
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import get_triggered_part
 
 TARGETS = {
     Target.C: ("C sources", "C99 model of the shift for a controller, as an archive"),
@@ -69,10 +71,10 @@ def register(page: ui.Page) -> None:
     @page.callback(Output("download", "data"), Input({"export": ALL}, "n_clicks"))
     def hand_over(session: Session, clicks: list[int | None]) -> Any:
         """Write the file and send it to the browser."""
-        if not isinstance(ctx.triggered_id, dict) or not any(clicks):
+        if not ctx.triggered_id or not any(clicks):
             return no_update
         product = make_product(
-            session.work, _parse_choice(ctx.triggered_id["export"]), session.scratch
+            session.work, _parse_choice(get_triggered_part("export")), session.scratch
         )
         ui.notify(f"{product.name}: {len(product.content) / 1e3:.0f} kB")
         content = base64.b64encode(product.content).decode()
@@ -80,4 +82,8 @@ def register(page: ui.Page) -> None:
 
 
 def _parse_choice(name: str) -> Target | Record:
-    return Record(name) if name in set(Record) else Target(name)
+    if name in set(Record):
+        return Record(name)
+    if name in set(Target):
+        return Target(name)
+    raise RefusedError("there is no such export", "press one of the buttons")

@@ -17,6 +17,7 @@ from drivetwin.workbench.gearboxes import (
 )
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import UploadField
 
 _ROUND_OFF = 1e-12
 _FIRST = "three-set-4000cr"
@@ -56,19 +57,19 @@ def register(page: ui.Page) -> None:
         State("gearbox-path", "value"),
     )
     def choose(
-        session: Session, _: int, upload: dict[str, str] | None, builtin: str, path: str | None
+        session: Session, _: object, upload: UploadField | None, builtin: str, path: str | None
     ) -> None:
         """Load a card: the one typed, else the upload, else the built-in one."""
         if path:
             session.open_gearbox(session.get_folder_source(path))
         elif upload is not None:
-            session.open_gearbox(session.get_uploaded(upload["key"]))
+            session.open_gearbox(session.get_uploaded(upload.key))
         else:
             session.open_gearbox(builtin)
         ui.notify_topic(ui.Topic.GEARBOX)
 
     @page.callback(Output("gearbox-content", "children"), Input(ui.make_due_id("gearbox"), "data"))
-    def show(session: Session, _: int) -> list[Component]:
+    def show(session: Session, _: object) -> list[Component]:
         """All of the gearbox."""
         box = session.gearbox
         return [] if box is None else _build_content(box)

@@ -67,15 +67,15 @@ def register(page: ui.Page) -> None:
 
 def _register_buttons(page: ui.Page) -> None:
     @page.callback(Input("identify", "n_clicks"), State("methods", "data-value"))
-    def start(session: Session, _: int, up_to: str) -> None:
+    def start(session: Session, _: object, up_to: Method) -> None:
         """Begin the identification."""
         order = list(Method)
-        session.identify(order[: order.index(Method(up_to)) + 1])
+        session.identify(order[: order.index(up_to) + 1])
         ui.notify("")
         ui.notify_topic(ui.Topic.RESULTS)
 
     @page.callback(Input("cancel", "n_clicks"))
-    def cancel(session: Session, _: int) -> None:
+    def cancel(session: Session, _: object) -> None:
         """Stop it."""
         session.cancel()
         ui.notify("The identification was cancelled")
@@ -88,7 +88,7 @@ def _register_progress(page: ui.Page) -> None:
         Output("progress-text", "children"),
         Input("tick", "n_intervals"),
     )
-    def follow(session: Session, _: int) -> tuple[object, object]:
+    def follow(session: Session, _: object) -> tuple[object, object]:
         """Take in results as they come."""
         try:
             if session.collect_job_results():
@@ -108,7 +108,7 @@ def _register_progress(page: ui.Page) -> None:
         Output("cancel", "disabled"),
         Input(ui.make_topic_id(ui.Topic.RESULTS), "data"),
     )
-    def follow_on(session: Session, _: int) -> tuple[bool, bool, bool, bool]:
+    def follow_on(session: Session, _: object) -> tuple[bool, bool, bool, bool]:
         """Look at the job for as long as there is one."""
         busy = session.job is not None
         return not busy, not busy, busy, not busy
@@ -116,7 +116,7 @@ def _register_progress(page: ui.Page) -> None:
     @page.callback(
         Output("identify-content", "children"), Input(ui.make_due_id("identify"), "data")
     )
-    def show(session: Session, _: str) -> list[Component]:
+    def show(session: Session, _: object) -> list[Component]:
         """Render the present results."""
         return _build_content(session.work)
 

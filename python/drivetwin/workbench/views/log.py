@@ -14,6 +14,7 @@ from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import UploadField
 
 _CARDS = (".toml",)
 _UPLOADED = "uploaded: "
@@ -54,14 +55,12 @@ def register(page: ui.Page) -> None:
 
     for name in ("log", "card"):
 
-        @page.app.callback(
-            Output(f"{name}-path", "value", allow_duplicate=True),
-            Input(f"{name}-upload", "data"),
-            prevent_initial_call=True,
+        @page.callback(
+            Output(f"{name}-path", "value", allow_duplicate=True), Input(f"{name}-upload", "data")
         )
-        def arrived(upload: dict[str, str]) -> str:
+        def arrived(session: Session, upload: UploadField) -> str:  # noqa: ARG001
             """Put the name of an upload into the path field."""
-            return _UPLOADED + upload["name"]
+            return _UPLOADED + upload.name
 
     @page.callback(
         Input("open", "n_clicks"),
@@ -72,7 +71,12 @@ def register(page: ui.Page) -> None:
         busy="open",
     )
     def open_files(
-        session: Session, _: int, log: str | None, card: str | None, log_up: Any, card_up: Any
+        session: Session,
+        _: object,
+        log: str | None,
+        card: str | None,
+        log_up: UploadField | None,
+        card_up: UploadField | None,
     ) -> None:
         """Read log and card."""
         session.open(_get_source(session, log, log_up), _get_source(session, card, card_up))
@@ -99,10 +103,10 @@ def register(page: ui.Page) -> None:
         return content, _format_source(work.log), _format_source(work.card), *names
 
 
-def _get_source(session: Session, typed: str | None, upload: dict[str, str] | None) -> Source:
+def _get_source(session: Session, typed: str | None, upload: UploadField | None) -> Source:
     """The file that a field names: an upload, or a path in the folder."""
-    if upload is not None and typed == _UPLOADED + upload["name"]:
-        return session.get_uploaded(upload["key"])
+    if upload is not None and typed == _UPLOADED + upload.name:
+        return session.get_uploaded(upload.key)
     return session.get_folder_source(typed or "")
 
 

@@ -23,6 +23,13 @@ from drivetwin.workbench.locks import Lock, LockKind, can_fix, parse_lock
 from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import (
+    ControlId,
+    Index,
+    get_place,
+    get_triggered_part,
+    parse_positions,
+)
 from drivetwin.workbench.what_if import Slider, collect_changes, get_display, list_sliders
 
 _KINDS = {kind.value: kind.value for kind in LockKind}
@@ -61,7 +68,7 @@ def register(page: ui.Page) -> None:
 
 def _register_bench(page: ui.Page) -> None:
     @page.callback(Output("model-content", "children"), Input(ui.make_due_id("model"), "data"))
-    def show(session: Session, _: int) -> list[Component]:
+    def show(session: Session, _: object) -> list[Component]:
         """Render the sliders next to the figure."""
         if session.work.method is None or not session.work.shifts:
             return [ui.make_hint("Nothing is identified yet.")]
@@ -79,11 +86,11 @@ def _register_bench(page: ui.Page) -> None:
             ui.notify_topic(ui.Topic.LIVE)
 
     @page.callback(Input("model-method", "data-value"), Input("model-shift", "data-value"))
-    def choose(session: Session, method: str | None, shift: str | None) -> None:
+    def choose(session: Session, method: Method | None, shift: Index | None) -> None:
         """Another result or shift."""
         work = session.work
-        if method is not None and Method(method) is not work.method:
-            session.choose_method(Method(method))
+        if method is not None and method is not work.method:
+            session.choose_method(method)
             ui.notify_topic(ui.Topic.LIVE)
         if shift is not None and int(shift) != work.shift:
             session.choose_shift(int(shift))
@@ -107,14 +114,11 @@ def _register_sliders(page: ui.Page) -> None:
         State({"part": "range", "id": ALL}, "id"),
     )
     def slide(
-        session: Session, values: Sequence[float | str | None], ids: Sequence[dict[str, str]]
+        session: Session, values: Sequence[float | str | None], ids: Sequence[ControlId]
     ) -> tuple[Any, Any]:
         """Simulate with the parameters of the sliders."""
         begun = time.perf_counter()
-        positions = {
-            one["id"]: float(value) for one, value in zip(ids, values, strict=True)
-            if value is not None
-        }  # fmt: skip
+        positions = parse_positions(values, [one.id for one in ids])
         work = session.work
         sliders = list_sliders(work.require_twin(), work.require_shift())
         changes = collect_changes(sliders, positions)
@@ -132,7 +136,7 @@ def _register_sliders(page: ui.Page) -> None:
 
 def _register_locks(page: ui.Page) -> None:
     @page.callback(Output("locks-content", "children"), Input(ui.make_due_id("model"), "data"))
-    def show(session: Session, _: int) -> list[Component]:
+    def show(session: Session, _: object) -> list[Component]:
         """One row for each parameter."""
         work = session.work
         return _build_locks(work) if work.shifts else [ui.make_hint("No shift is open.")]
@@ -145,17 +149,17 @@ def _register_locks(page: ui.Page) -> None:
     )
     def lock(
         session: Session,
-        kinds: Sequence[str],
+        kinds: Sequence[LockKind],
         values: Sequence[float | None],
         stds: Sequence[float | None],
-        ids: Sequence[dict[str, str]],
+        ids: Sequence[ControlId],
     ) -> None:
         """A lock was changed by hand."""
-        if not isinstance(ctx.triggered_id, dict):
+        if not ctx.triggered_id:
             return
-        name = ctx.triggered_id["id"]
-        place = [one["id"] for one in ids].index(name)
-        wanted = parse_lock(name, LockKind(kinds[place]), values[place], stds[place])
+        name = get_triggered_part("id")
+        place = get_place(name, ids)
+        wanted = parse_lock(name, kinds[place], values[place], stds[place])
         if _is_same(wanted, session.work.get_lock(name)):
             ui.notify("")
             return

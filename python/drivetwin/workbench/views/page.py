@@ -9,6 +9,7 @@ from pathlib import Path
 from dash import Dash, Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
+from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.session import Session, Sessions
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import (
@@ -92,14 +93,14 @@ The view stands in the address, for the browser's way back and for loading the p
 """
 
 
-def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
+def build_page(app: Dash, sessions: Sessions, start: Start, access: Access) -> None:
     """Give the application its layout and the callbacks of all views."""
     app.index_string = _INDEX
     app.layout = _build_layout
     _register_view_switch(app)
     _register_drawing(app)
     _register_entry(app, sessions, start)
-    _show_status(app, sessions)
+    _show_status(app, sessions, access)
     for _, view in VIEWS.values():
         view.register(Page(app, sessions))
 
@@ -172,7 +173,7 @@ def _register_entry(app: Dash, sessions: Sessions, start: Start) -> None:
         Output("session", "data"), Input("session", "modified_timestamp"), State("session", "data")
     )
     @show_errors
-    def enter(_: int, key: str | None) -> object:
+    def enter(_: object, key: object) -> object:
         """Go on with the session of this tab, or begin one with what the command line named."""
         if key in sessions:
             notify_topic(Topic.LOG)
@@ -190,7 +191,7 @@ def _open_first(session: Session, start: Start) -> None:
         session.open(start.log, start.card, start.mapping)
 
 
-def _show_status(app: Dash, sessions: Sessions) -> None:
+def _show_status(app: Dash, sessions: Sessions, access: Access) -> None:
     @app.callback(
         Output("status", "children"),
         Input(make_topic_id(Topic.LOG), "data"),
@@ -198,16 +199,16 @@ def _show_status(app: Dash, sessions: Sessions) -> None:
         State("session", "data"),
         prevent_initial_call=True,
     )
-    def status(_log: int, _results: int, key: str | None) -> list[Component | str]:
-        """Format the status line: open files and available results."""
+    def status(_log: object, _results: object, key: object) -> list[Component | str]:
+        """Format the status line: open files, available results, and who may connect."""
         if key not in sessions:
             return []
         work = sessions.get(key).work
         if work.log is None or work.card is None:
-            return ["no log is open"]
+            return [f"no log is open · {access.describe()}"]
         parts: list[Component | str] = [html.B(work.log.name), f" · card {work.card.name}"]
         for shift in work.shifts:
             parts.append(f" · shift {shift.start_gear}→{shift.end_gear}")
         if work.results:
             parts.append(f" · identified: {', '.join(method.value for method in work.results)}")
-        return parts
+        return [*parts, f" · {access.describe()}"]

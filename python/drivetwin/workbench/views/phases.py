@@ -24,6 +24,7 @@ from drivetwin.workbench.phases import (
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import Index
 
 
 def layout() -> list[Component]:
@@ -45,7 +46,7 @@ def register(page: ui.Page) -> None:
 
 def _register_figure(page: ui.Page) -> None:
     @page.callback(Output("phases-content", "children"), Input(ui.make_due_id("phases"), "data"))
-    def show(session: Session, _: int) -> list[Component]:
+    def show(session: Session, _: object) -> list[Component]:
         """The shift that is chosen."""
         work = session.work
         return _build_content(work) if work.shifts else [ui.make_hint("No shift is open.")]
@@ -87,7 +88,7 @@ def _register_fields(page: ui.Page) -> None:
         ui.notify("The phases are as detected")
 
     @page.callback(Input("phases-shift", "data-value"))
-    def choose(session: Session, shift: str | None) -> None:
+    def choose(session: Session, shift: Index | None) -> None:
         """Another shift of the log."""
         if shift is not None and int(shift) != session.work.shift:
             session.choose_shift(int(shift))

@@ -23,6 +23,7 @@ from dash.development.base_component import Component
 from drivetwin.errors import DrivetwinError, Where
 from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.uploads import LIMITS
+from drivetwin.workbench.views.fields import check_fields
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -123,7 +124,7 @@ class Page:
         def register(callback: Callable[..., R]) -> Callable[..., R]:
             def act(*values: Any) -> R:
                 *given, key = values
-                return callback(self.sessions.get(key), *given)
+                return callback(self.sessions.get(key), *check_fields(callback, given))
 
             self.app.callback(
                 *arguments,

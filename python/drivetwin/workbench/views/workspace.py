@@ -8,6 +8,7 @@ from dash.development.base_component import Component
 
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import UploadField
 from drivetwin.workbench.workspace import ENDING
 
 
@@ -45,7 +46,7 @@ def register(page: ui.Page) -> None:
         Input("save", "n_clicks"),
         State("save-name", "value"),
     )
-    def save(session: Session, _: int, name: str | None) -> list[Component]:
+    def save(session: Session, _: object, name: str | None) -> list[Component]:
         """Write the file."""
         ui.notify(f"saved as {session.save(name or '')}")
         return _build_names(session)
@@ -54,23 +55,23 @@ def register(page: ui.Page) -> None:
         Output("workspace-names", "children", allow_duplicate=True),
         Input(ui.make_due_id("workspace"), "data"),
     )
-    def offer(session: Session, _: int) -> list[Component]:
+    def offer(session: Session, _: object) -> list[Component]:
         """Workspaces of the folder, for completion."""
         return _build_names(session)
 
     @page.callback(Input("reopen", "n_clicks"), State("reopen-name", "value"), busy="reopen")
-    def reopen(session: Session, _: int, name: str | None) -> None:
+    def reopen(session: Session, _: object, name: str | None) -> None:
         """Go on with a file of the folder."""
         session.reopen(session.get_folder_source(name or ""))
         ui.notify_topic(ui.Topic.LOG)
         ui.notify(f"{name} is reopened")
 
     @page.callback(Input("workspace-upload", "data"))
-    def reopen_upload(session: Session, upload: dict[str, str]) -> None:
+    def reopen_upload(session: Session, upload: UploadField) -> None:
         """Go on with an upload."""
-        session.reopen(session.get_uploaded(upload["key"]))
+        session.reopen(session.get_uploaded(upload.key))
         ui.notify_topic(ui.Topic.LOG)
-        ui.notify(f"{upload['name']} is reopened")
+        ui.notify(f"{upload.name} is reopened")
 
 
 def _build_names(session: Session) -> list[Component]:

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""What a file system holds besides logs: one bad log each, named; the run and its store go on."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from drivetwin.errors import INTERRUPTED, StoreError
+from drivetwin.fleet.events import Event
+from drivetwin.fleet.run import run_fleet
+from drivetwin.fleet.sources import Sources
+from drivetwin.fleet.store import Store
+from drivetwin.fleet.task import State
+from tests.fleet.toys import make_logs, names, request, run_toys
+
+
+def _spoil(logs: Path) -> list[str]:
+    """Put files among the logs that are none; returns their names as events show them."""
+    os.mkfifo(logs / "pipe.csv")
+    with socket.socket(socket.AF_UNIX) as bound:
+        bound.bind(str(logs / "socket.csv"))
+    (logs / "device.csv").symlink_to("/dev/zero")
+    (logs / "loop.csv").symlink_to(logs / "loop.csv")
+    (logs / "gone.csv").symlink_to(logs / "nowhere.csv")
+    Path(os.fsdecode(os.fsencode(logs) + b"/name\xff.csv")).write_text("n")
+    (logs / "inner").symlink_to(logs)
+    return ["device", "gone", "loop", "name\\udcff", "pipe", "socket"]
+
+
+@pytest.mark.parametrize("pattern", ["", "/**/*.csv"])
+def test_what_is_no_file_is_one_bad_log_each(tmp_path: Path, pattern: str) -> None:
+    logs = make_logs(tmp_path / "logs", 2)
+    spoilt = _spoil(logs)
+    asked = replace(request(logs, tmp_path / "store"), sources=Sources([f"{logs}{pattern}"]))
+    events: list[Event] = []
+    summary = run_fleet(asked, events.append)
+    assert (summary.done, summary.bad) == (2, len(spoilt))
+    assert names(events, state=State.BAD) == spoilt
+
+
+def test_a_device_of_a_list_is_a_bad_log(tmp_path: Path) -> None:
+    logs = make_logs(tmp_path / "logs", 1)
+    listed = tmp_path / "list.txt"
+    listed.write_text(f"/dev/zero\n/dev/null\n{tmp_path}\n{logs}/unit_0/log_0000.csv\n")
+    asked = replace(request(logs, tmp_path / "store"), sources=Sources([], listed))
+    summary = run_fleet(asked, lambda _: None)
+    assert (summary.done, summary.bad) == (1, 3)
+
+
+def test_many_tiny_logs_with_clocks_set_back(tmp_path: Path) -> None:
+    logs = make_logs(tmp_path / "logs", 200)
+    run_toys(logs, tmp_path / "store")
+    changed = logs / "unit_0" / "log_0000.csv"
+    changed.write_text("changed\n")
+    os.utime(changed, (1e9, 1e9))  # years before it was scanned
+    summary, _ = run_toys(logs, tmp_path / "store")
+    assert (summary.done, summary.computed) == (200, 1)
+
+
+def test_a_store_that_was_copied_goes_on(tmp_path: Path) -> None:
+    logs = make_logs(tmp_path / "logs", 5)
+    run_toys(logs, tmp_path / "store")
+    shutil.copytree(tmp_path / "store", tmp_path / "elsewhere" / "copy")
+    shutil.move(logs, tmp_path / "elsewhere" / "logs")
+    summary, _ = run_toys(tmp_path / "elsewhere" / "logs", tmp_path / "elsewhere" / "copy")
+    assert (summary.done, summary.computed) == (5, 0)
+
+
+def test_a_truncated_large_part_ends_the_run_and_is_named(tmp_path: Path) -> None:
+    logs = make_logs(tmp_path / "logs", 5)
+    run_toys(logs, tmp_path / "store")
+    (part,) = (tmp_path / "store" / "rows").iterdir()
+    for size in (part.stat().st_size - 1, part.stat().st_size // 2, 4, 0):
+        os.truncate(part, size)
+        with pytest.raises(StoreError, match=part.name):
+            run_toys(logs, tmp_path / "store")
+    part.unlink()
+    assert run_toys(logs, tmp_path / "store")[0].computed == 5
+
+
+def test_sigterm_while_large_files_are_scanned(tmp_path: Path) -> None:
+    logs = make_logs(tmp_path / "logs", 3)
+    for number in range(20):
+        with (logs / f"large_{number}.csv").open("wb") as file:
+            file.truncate(8 * 2**30)
+    command = [sys.executable, "-m", "drivetwin", "fleet", str(logs), "--vehicle",
+               str(logs / "card.toml"), "-o", str(tmp_path / "store"), "--json"]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.send_signal(signal.SIGTERM)
+        started = time.monotonic()
+        process.communicate(timeout=60.0)
+    assert time.monotonic() - started < 2.0
+    assert process.returncode == INTERRUPTED
+    with Store(tmp_path / "store") as store:
+        assert store.list_parts() == []

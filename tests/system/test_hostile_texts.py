@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: MIT
+"""Hostile texts through every output: terminal, JSON, C, FMU, parameters, Modelica, HTML, CSV."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import unicodedata
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+from rich.text import Text
+
+from drivetwin.cli import main
+from drivetwin.cli.output import (
+    make_console,
+    make_table,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_error,
+)
+from drivetwin.errors import InputError, Where
+from drivetwin.export.c.write import generate_twin_source
+from drivetwin.export.fmu.describe import Header, build_description
+from drivetwin.export.fmu.variables import list_variables
+from drivetwin.export.fmu.version import FmiVersion
+from drivetwin.export.modelica.text import format_string, make_identifier
+from drivetwin.export.parameters.content import ParameterSet, Scalar
+from drivetwin.export.parameters.files import CODECS, ParameterFormat
+from drivetwin.export.subject import Subject
+from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.read import read_raw
+from drivetwin.logs.write import write_log
+from drivetwin.report.html import render_page
+from drivetwin.report.notebook import Summary, Table
+from drivetwin.report.sections.blocks import Cell, FigureBlock, NotesBlock, Section, TableBlock
+from tests.export.cases import paper_subject
+
+HOSTILE = {
+    "clear screen": "\x1b[2J\x1b[H",
+    "colour": "\x1b[31merror\x1b[0m",
+    "title of window": "\x1b]0;owned\x07",
+    "link": "\x1b]8;;http://evil\x1b\\click\x1b]8;;\x1b\\",
+    "clipboard": "\x1b]52;c;ZXZpbA==\x07",
+    "C1 CSI": "\x9b2J",
+    "C1 OSC": "\x9d0;owned\x9c",
+    "DCS": "\x1bP+q544e\x1b\\",
+    "backspaces": "evil\b\b\b\bgood",
+    "carriage return": "evil\rgood",
+    "line feed": "a\nerror: forged",
+    "vertical": "a\x0b\x0cb",
+    "NUL": "a\0b",
+    "DEL": "a\x7fb",
+    "bidi override": "gpj.\u202eexe",
+    "bidi isolate": "\u2066a\u2069",
+    "marks": "a\u200e\u200f\u061cb",
+    "zero width": "P\u200b0\u200d\ufeff",
+    "separators": "a\u2028b\u2029c",
+    "tags": "a\U000e0041\U000e007f",
+    "surrogate": "log\udcff",
+    "comment end C": "*/ int main; /*",
+    "overlapping comment": "*//*/ **/ /*/",
+    "trigraph": "??/\n??)",
+    "comment end XML": "--->",
+    "many hyphens": "-----> <!--",
+    "CDATA": "]]><![CDATA[",
+    "entity": "&lt;&#27;&evil;",
+    "markup": "<script>alert(1)</script>",
+    "attribute": '" onmouseover="alert(1)',
+    "template": "{{ 7*7 }}{% raw %}",
+    "rich markup": "[bold red]x[/] [link=http://evil]y[/link] :smile:",
+    "format": "%s%n{0}",
+    "path": "../../etc/passwd",
+    "device": "CON.csv\\\\.\\pipe",
+    "homograph": "оutput_tоrque",
+    "formula": "=cmd|' /C calc'!A0",
+    "dots": "...",
+    "long": "x" * 10_000,
+    "long escapes": "\x1b[7m" * 2_500,
+    "empty": "",
+    "blank": " ",
+}  # fmt: skip
+BAD = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+
+hostile = pytest.mark.parametrize("text", HOSTILE.values(), ids=list(HOSTILE))
+
+
+def find_hidden(output: str) -> set[str]:
+    """Return characters without a glyph, other than line end and tab."""
+    return {one for one in output if unicodedata.category(one) in BAD and one not in "\n\t"}
+
+
+@hostile
+def test_terminal(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    print_line(text)
+    print_line(text, stderr=True)
+    print_paragraph(f"warning: channel {text}")
+    table = make_table(text, text, "value", right=("value",))
+    table.add_row(text, text)
+    print_table(table)
+    show_error(InputError(text, text, Where(text, text, 1.0, text)), as_json=False)
+    printed = capsys.readouterr()
+    assert not find_hidden(printed.out + printed.err)
+
+
+def test_colours_are_the_programs_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    console = make_console()
+    with console.capture() as shown:
+        console.print(Text("x\x1b[2J", style="bold red"))
+    assert shown.get() == "\x1b[1;31mx\\x1b[2J\x1b[0m\n"
+
+
+@hostile
+def test_json(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    print_json({text: [text]})
+    printed = capsys.readouterr().out
+    assert not find_hidden(printed)
+    assert json.loads(printed) == {text: [text]}
+
+
+@hostile
+def test_usage_errors(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in ([text], ["inspect", "a", text], ["inspect", f"--x{text}"], ["fleet", text],
+                      ["simulate", "a", "--input", text], ["inspect", f"{text}.csv"]):  # fmt: skip
+        main(arguments)
+        printed = capsys.readouterr()
+        assert not find_hidden(printed.out + printed.err), arguments
+
+
+def make_subject(text: str) -> Subject:
+    """A model whose names and remarks are the text."""
+    subject = paper_subject()
+    first, second = subject.model.elements
+    elements = (replace(first, name=f"{text}1"), replace(second, name=f"{text}2"))
+    model = replace(subject.model, elements=elements)
+    start = replace(subject.start, locked=(f"{text}1",))
+    return Subject(name=text, model=model, start=start, note=text)
+
+
+@hostile
+def test_c_source(text: str) -> None:
+    source = generate_twin_source(make_subject(text))
+    assert not find_hidden(source)
+    comments = re.findall(r"/\*.*?\*/", source, re.DOTALL)
+    assert comments[1].count("/*") == comments[1].count("*/") == 1
+    assert comments[1].endswith("written by drivetwin. */")
+
+
+@hostile
+@pytest.mark.parametrize("version", FmiVersion)
+def test_fmu_description(text: str, version: FmiVersion) -> None:
+    header = Header(text, "model", "{token}", text, 0.0, 1.0, 1e-3, ("a.c",))
+    document = build_description(version, header, list_variables(make_subject(text))).decode()
+    assert not find_hidden(document)
+    ET.fromstring(document)
+
+
+@hostile
+@pytest.mark.parametrize("kind", sorted(set(ParameterFormat) - {ParameterFormat.JSON}))
+def test_parameter_files(text: str, kind: ParameterFormat) -> None:
+    numbers = (Scalar(f"{text}.k", -1.5, "N*m", text), Scalar("c", 2.0, "1", text))
+    parameters = ParameterSet(text, numbers, (), (text, text))
+    document = CODECS[kind].text(parameters)
+    assert not find_hidden(document)
+    back = CODECS[kind].parse(document, f"file.{kind}")
+    assert [one.value for one in back.scalars] == [-1.5, 2.0]
+
+
+@hostile
+def test_csv_cells(text: str) -> None:
+    parameters = ParameterSet(text, (Scalar("k", -1.5, "-", text),))
+    document = CODECS[ParameterFormat.CSV].text(parameters)
+    for row in csv.reader(document.splitlines()):
+        assert not [c for c in row if c[:1] in ("=", "+", "@") or (c[:1] == "-" and c != "-1.5")]
+
+
+@pytest.mark.parametrize("name", ["=torque", "@torque", "+a", "-a", "=a,b", "'=x", "-"])
+def test_names_of_channels_read_back_from_csv(name: str, tmp_path: Path) -> None:
+    time = np.arange(20) / 10.0
+    path = tmp_path / "log.csv"
+    write_log(path, [RawChannel(name, "-", time, np.sin(time) - 0.5)])
+    lines = path.read_text().splitlines()
+    assert not any(
+        cell[:1] in ("=", "+", "-", "@") for row in csv.reader(lines[:2]) for cell in row
+    )
+    assert name in [one.name for one in read_raw(path).channels]
+
+
+@hostile
+def test_modelica(text: str) -> None:
+    assert re.fullmatch(r"[A-Za-z]\w*", make_identifier(text))
+    assert re.fullmatch(r'"[ !#-\[\]-~]*"', format_string(text))
+
+
+@hostile
+def test_html(text: str) -> None:
+    figure = go.Figure(layout={"title": {"text": text}})
+    blocks = (
+        NotesBlock(text, (text,)),
+        TableBlock(text, (Cell(text),), ((Cell(text),),)),
+        FigureBlock(figure, text),
+    )
+    page = render_page(text, text, [Section("anchor", text, text, blocks)], library="plotly.js")
+    assert not find_hidden(page)
+    assert "<script>alert" not in page
+    for document in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', page):
+        assert not find_hidden(json.dumps(json.loads(document), ensure_ascii=False))
+
+
+@hostile
+def test_notebook(text: str) -> None:
+    summary = Summary(text, [Table((text,), [(text,)])], [text])
+    assert not find_hidden(summary.html + str(summary))
+    assert "<script>alert" not in summary.html
