@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from drivetwin.cli.card import card
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
@@ -54,7 +55,12 @@ for command in (
     app.command()(command)
 app.command(name="app")(workbench)
 app.add_typer(fleet, name="fleet")
-for entry in (*app.registered_commands, *fleet.registered_commands):
+app.add_typer(card, name="card")
+for entry in (
+    *app.registered_commands,
+    *fleet.registered_commands,
+    *card.registered_commands,
+):
     if entry.callback is not None:
         entry.callback = protect_inputs(entry.callback)
 

@@ -91,14 +91,14 @@ def _read_as_mapped_log(
 ) -> tuple[tuple[Finding, ...], DrivetwinError | None, str]:
     """Read a log as for use, missing roles allowed; return findings, error and who refuses it."""
     from drivetwin.channels.roles import FOR_SHIFTS
-    from drivetwin.logs.read import read_recording
+    from drivetwin.logs.read import Demands, read_recording
 
     try:
-        return read_recording(recording, log, card, stated, needed=()).findings, None, ""
+        return read_recording(recording, log, card, stated, Demands(())).findings, None, ""
     except DrivetwinError as fault:
         refusal = fault
     try:
-        found = read_recording(recording, log, card, stated, needed=(), sound=FOR_SHIFTS)
+        found = read_recording(recording, log, card, stated, Demands((), FOR_SHIFTS))
     except DrivetwinError as fault:
         return (), fault, "shifts and identify refuse"
     return found.findings, refusal, "identify refuses"
