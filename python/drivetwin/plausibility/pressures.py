@@ -12,6 +12,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import BAR
 from drivetwin.findings import Code, Finding, report
 from drivetwin.plausibility.entries import find_entry
+from drivetwin.plausibility.ratios import find_log_ratios, is_held
 from drivetwin.plausibility.spans import sample_span
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -25,7 +26,10 @@ DRAG = 0.3
 def check_pressures(
     log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift], doubted: frozenset[str]
 ) -> list[Finding]:
-    """Report each P0 that the pressures of the log exclude; `doubted` elements are left out."""
+    """Report each P0 that the pressures of the log exclude; `doubted` elements are left out.
+
+    An element is looked at where the log holds its gear or shifts to it.
+    """
     findings = {
         element: finding
         for element, finding in (*_check_largest(log, card), *_check_open(log, card, shifts))
@@ -35,9 +39,11 @@ def check_pressures(
 
 
 def _check_largest(log: ShiftLog, card: VehicleCard) -> Iterator[tuple[str, Finding]]:
+    held = find_log_ratios(log, card)
     for name, element in card.elements.items():
         role = make_pressure_role(name)
-        if role not in log:
+        engages = any(name in gear.elements and is_held(gear.ratio, held) for gear in card.gears)
+        if role not in log or not engages:
             continue
         largest, P0 = float(np.nanmax(log[role].values)), element.P0.value
         if largest < ABOVE * P0:

@@ -81,21 +81,17 @@ def find_log_ratios(log: ShiftLog, card: VehicleCard) -> list[HeldRatio]:
         return []
 
 
+def is_held(ratio: float, held: Sequence[HeldRatio]) -> bool:
+    """Return True if one of the ratios that are held is this one."""
+    return any(abs(one.ratio / ratio - 1) <= PLAUSIBILITY.ratio_tolerance for one in held)
+
+
 def check_ratios(log: ShiftLog, card: VehicleCard) -> list[Finding]:
     """Report each gear of the card that the log does not hold, if it holds one not on the card."""
-    tolerance = PLAUSIBILITY.ratio_tolerance
     held = find_log_ratios(log, card)
     gears = dict(enumerate(card.gears))
-    free = [
-        one
-        for one in held
-        if all(abs(one.ratio / gear.ratio - 1) > tolerance for gear in gears.values())
-    ]
-    absent = {
-        index: gear
-        for index, gear in gears.items()
-        if all(abs(one.ratio / gear.ratio - 1) > tolerance for one in held)
-    }
+    free = [one for one in held if not any(is_held(gear.ratio, [one]) for gear in card.gears)]
+    absent = {index: gear for index, gear in gears.items() if not is_held(gear.ratio, held)}
     findings: list[Finding] = []
     while free and absent:
         index, nearest = min(
