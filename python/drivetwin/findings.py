@@ -154,6 +154,8 @@ class Code(StrEnum):
     CARD_FRICTION_BOUND = auto()
     CARD_INERTIA_DIFFERS = auto()
     CARD_NOT_COMPARED = auto()
+    NO_SENSOR_TOLERANCES = auto()
+    MAPPED_COLUMN_ABSENT = auto()
 
 
 @dataclass(frozen=True)

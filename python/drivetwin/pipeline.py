@@ -15,6 +15,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
 from drivetwin.estimation.multi_log.fit import identify_joint
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.findings import Code, report
 from drivetwin.plausibility.check import check_card
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -65,4 +66,5 @@ def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -
     """Prepare a log, with what is implausible on the card among its findings."""
     prepared = prepare(log, card, shifts)
     doubts = check_card(card, log, shifts.shifts)
-    return replace(prepared, findings=(*prepared.findings, *doubts))
+    noise_only = () if card.sensors else (report(Code.NO_SENSOR_TOLERANCES),)
+    return replace(prepared, findings=(*prepared.findings, *doubts, *noise_only))
