@@ -76,3 +76,21 @@ def test_identify_shows_findings_before_it_refuses(
         if ("no usable gear shift" in errors)
         else errors.index("gears[1].ratio") < errors.index("no gear shift")
     )
+
+
+def test_mapping_beside_the_log_is_used_without_an_option(
+    made: Synthetic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "renamed.csv"
+    text = made.log.read_text(encoding="utf-8").replace("SpdIn", "ColumnA", 1)
+    log.write_text(text, encoding="utf-8")
+    assert main(["shifts", str(log), "--vehicle", str(made.card)]) == 2
+    capsys.readouterr()
+    mapping = '[channels.input_speed]\nsource = "ColumnA"\n[channels.gear]\nsource = "Gear"\n'
+    (tmp_path / "channels.toml").write_text(mapping, encoding="utf-8")
+    assert main(["shifts", str(log), "--vehicle", str(made.card)]) == 0
+    assert "'Gear'" in capsys.readouterr().out
+    assert main(["card", "check", str(made.card), str(log), "--strict"]) == 0
+    assert main(["inspect", str(log), "--vehicle", str(made.card), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out.split("implausible")[-1])
+    assert found["mapping"]["input_speed"]["source"] == "ColumnA"

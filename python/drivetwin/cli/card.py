@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile
+from drivetwin.cli.arguments import ChannelsFile, find_mapping
 from drivetwin.cli.output import (
     JsonFlag,
     print_findings,
@@ -86,7 +86,8 @@ def _compare(
         return check_card(vehicle), None
     try:
         with show_step(f"reading {log.name}"):
-            recording = read_log(log, vehicle, channels, needed=(), sound=(), gearing=False)
+            mapping = find_mapping(channels, log)
+            recording = read_log(log, vehicle, mapping, needed=(), sound=(), gearing=False)
     except DrivetwinError as refusal:
         return check_card(vehicle), refusal
     remarks = list(select_card_findings(vehicle, recording.findings))
@@ -110,7 +111,7 @@ def _describe_ratios(log: Path | None, channels: Path | None) -> str:
     if log is None:
         return ""
     try:
-        recording = read_log(log, None, channels, needed=(), sound=())
+        recording = read_log(log, None, find_mapping(channels, log), needed=(), sound=())
         held = find_held_ratios(resample_geared(recording, 1.0, 1.0))
     except DrivetwinError:
         return ""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drivetwin.cli.arguments import find_mapping
 from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
 from drivetwin.cli.holdout_args import parse_holdouts
 from drivetwin.cli.identify_run import REPORT, RESULT, TWIN, Request
@@ -72,7 +73,7 @@ def identify_logs(
     refuse_same_names(logs, "rename one of them")
     card = how.load_card()
     with show_step(f"reading {len(logs)} logs"):
-        read = tuple(read_log(log, card, how.channels) for log in logs)
+        read = tuple(read_log(log, card, find_mapping(how.channels, log)) for log in logs)
         shifts = [detect_shifts(log, card) for log in read]
         pairs = list(zip(read, shifts, strict=True))
         doubts = [one for log, each in pairs for one in check_card(card, log, each.shifts)]

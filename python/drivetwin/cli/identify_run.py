@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drivetwin.cli.arguments import find_mapping
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_findings, show_step
 from drivetwin.estimation.result.method import Method
@@ -35,7 +36,7 @@ class Request:
         from drivetwin.logs.read import read_log
 
         card = self.load_card()
-        return read_log(log, card, self.channels), card
+        return read_log(log, card, find_mapping(self.channels, log)), card
 
     def load_card(self) -> VehicleCard:
         """Read the card with the priors of effects."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile
+from drivetwin.cli.arguments import ChannelsFile, LogFile, find_mapping
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -60,7 +60,8 @@ def inspect(
     from drivetwin.vehicle.card import load_card
 
     card = None if vehicle is None else load_card(vehicle)
-    stated = Mapped({}) if channels is None else read_mapping(channels)
+    mapping = find_mapping(channels, log)
+    stated = Mapped({}) if mapping is None else read_mapping(mapping)
     with show_step(f"reading {log.name}"), open_recording(log, stated.options) as opened:
         recording = Remembered(opened)
         found = survey_recording(recording, str(log), card, stated)
