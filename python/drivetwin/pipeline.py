@@ -4,15 +4,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.data.compare_logs import require_compatible
 from drivetwin.estimation.data.prepare import DetectedShifts, prepare
+from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
 from drivetwin.estimation.multi_log.fit import identify_joint
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.findings import Code, report
+from drivetwin.plausibility.check import check_card
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -38,7 +42,7 @@ def identify(
     IdentificationError
         If the data cannot carry the method.
     """
-    return identify_prepared(prepare(log, card, shifts), method)
+    return identify_prepared(_prepare_checked(log, card, shifts), method)
 
 
 def identify_jointly(
@@ -52,6 +56,15 @@ def identify_jointly(
     """
     require_compatible(logs)
     with scale_progress(0.0, 0.05, "preparing the logs"):
-        prepared = [prepare(log, card, found) for log, found in zip(logs, shifts, strict=True)]
+        pairs = zip(logs, shifts, strict=True)
+        prepared = [_prepare_checked(log, card, found) for log, found in pairs]
     with scale_progress(0.05, 1.0):
         return identify_joint(prepared)
+
+
+def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> PreparedLog:
+    """Prepare a log, with what is implausible on the card among its findings."""
+    prepared = prepare(log, card, shifts)
+    doubts = check_card(card, log, shifts.shifts)
+    noise_only = () if card.sensors else (report(Code.NO_SENSOR_TOLERANCES),)
+    return replace(prepared, findings=(*prepared.findings, *doubts, *noise_only))

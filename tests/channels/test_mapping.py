@@ -218,3 +218,13 @@ def test_a_strange_sender_counts_where_no_other_has_numbers() -> None:
     assert strange in mapped.findings[0].text
     never = Column("EngSpeed", group=own.group, empty=True)
     assert infer_candidates([never, other], {}) == {"engine_speed": [other]}
+
+
+def test_absent_column_of_an_optional_role_is_a_finding() -> None:
+    columns = [Column("EngTrq", "Nm"), Column("SpdIn", "rpm"), Column("SpdOut", "rpm")]
+    stated = {"throttle": ChannelSpec("Pedal"), "gear": ChannelSpec("Gear")}
+    mapped = resolve_roles(columns, stated, {}, (), "log.csv")
+    assert [one.names["column"] for one in mapped.findings] == ["Pedal", "Gear"]
+    assert not stated.keys() & mapped.channels.keys()
+    with pytest.raises(MappingError, match="Pedal"):
+        resolve_roles(columns, stated, {}, ("throttle",), "log.csv")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from drivetwin._util.spelling import suggest_spelling
@@ -183,7 +183,7 @@ def resolve_roles(
     """Decide the column of every role from the `columns` of a file.
 
     The `stated` specs take precedence; other roles are inferred. Raises MappingError
-    where a stated column does not exist or a role has several candidates (only a warning where the
+    where a stated column does not exist or a role has several candidates (only a finding where the
     role is neither `needed` nor `sound`, by default all measured ones), MissingChannelError where a
     needed role and its stand-in have none.
     """
@@ -191,9 +191,9 @@ def resolve_roles(
     measured = [*MEASURED, *map(make_pressure_role, elements)]
     strict = needed.union(measured if sound is None else sound)
     _refuse_unknown_elements(stated, elements, file)
+    stated, findings = _drop_absent_optional(stated, columns, strict)
     channels = {role: _require_column(role, spec, columns, file) for role, spec in stated.items()}
     free = [one for one in columns if not any(spec.matches(one) for spec in stated.values())]
-    findings: list[Finding] = []
     for role, candidates in infer_candidates(free, elements).items():
         if role in channels:
             continue
@@ -215,6 +215,23 @@ def resolve_roles(
     return Mapped(
         {role: channels[role] for role in order if role in channels}, findings=tuple(findings)
     )
+
+
+def _drop_absent_optional(
+    stated: Mapping[str, ChannelSpec], columns: Sequence[Column], strict: Collection[str]
+) -> tuple[dict[str, ChannelSpec], list[Finding]]:
+    """Drop the stated roles outside `strict` whose column is absent, with a finding for each."""
+    names = {column.name for column in columns}
+    absent = {
+        role: spec.source
+        for role, spec in stated.items()
+        if role not in strict and spec.source not in names
+    }
+    findings = [
+        report(Code.MAPPED_COLUMN_ABSENT, role=role, column=source)
+        for role, source in absent.items()
+    ]
+    return {role: spec for role, spec in stated.items() if role not in absent}, findings
 
 
 def _suggest_choice(role: str, candidates: Sequence[Column]) -> str:

@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from drivetwin._util.visible_text import escape_line
 from drivetwin.cli.calibrate import calibrate
+from drivetwin.cli.card import card
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
@@ -74,7 +75,12 @@ for command in (
     app.command()(command)
 app.command(name="app")(workbench)
 app.add_typer(fleet, name="fleet")
-for entry in (*app.registered_commands, *fleet.registered_commands):
+app.add_typer(card, name="card")
+for entry in (
+    *app.registered_commands,
+    *fleet.registered_commands,
+    *card.registered_commands,
+):
     if entry.callback is not None:
         entry.callback = protect_inputs(entry.callback)
 

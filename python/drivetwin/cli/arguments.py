@@ -24,8 +24,24 @@ OptionalVehicleFile = Annotated[
 ]
 ChannelsFile = Annotated[
     Path | None,
-    typer.Option("--channels", metavar="MAP", help="Channel mapping file (TOML)."),
+    typer.Option(
+        "--channels",
+        metavar="MAP",
+        help="Channel mapping file (TOML); without it channels.toml beside the log, if any.",
+    ),
 ]
+
+
+PROJECT_MAPPING = "channels.toml"
+"""Channel mapping of a project folder, for the logs beside it."""
+
+
+def find_mapping(channels: Path | None, log: Path) -> Path | None:
+    """Return the mapping file that was given, else `channels.toml` beside the log, else None."""
+    if channels is not None:
+        return channels
+    beside = log.parent / PROJECT_MAPPING
+    return beside if beside.is_file() else None
 
 
 def load_inputs(log: Path, vehicle: Path, channels: Path | None) -> tuple[ShiftLog, VehicleCard]:
@@ -35,4 +51,4 @@ def load_inputs(log: Path, vehicle: Path, channels: Path | None) -> tuple[ShiftL
     from drivetwin.vehicle.card import load_card
 
     card = load_card(vehicle)
-    return read_log(log, card, channels, sound=FOR_SHIFTS), card
+    return read_log(log, card, find_mapping(channels, log), sound=FOR_SHIFTS), card

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile
+from drivetwin.cli.arguments import ChannelsFile, find_mapping
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
 from drivetwin.errors import InputError
 from drivetwin.export.fmu.version import FmiVersion
@@ -136,7 +136,9 @@ def _load_subject(
     from drivetwin.export.fmu.measured import build_measured_subject
     from drivetwin.logs.read import read_log
 
-    return build_measured_subject(twin, read_log(log, twin.build_card(), channels), gears)
+    return build_measured_subject(
+        twin, read_log(log, twin.build_card(), find_mapping(channels, log)), gears
+    )
 
 
 def parse_gears(text: str) -> tuple[str, str]:

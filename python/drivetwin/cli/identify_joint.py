@@ -8,11 +8,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drivetwin.cli.arguments import find_mapping
 from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
 from drivetwin.cli.holdout_args import parse_holdouts
 from drivetwin.cli.identify_run import REPORT, RESULT, TWIN, Request
 from drivetwin.cli.numbers import format_percent, format_quantity
-from drivetwin.cli.output import make_table, print_line, print_paragraph, print_table, show_step
+from drivetwin.cli.output import (
+    make_table,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_findings,
+    show_step,
+)
 from drivetwin.report.labels import get_channel_unit
 
 if TYPE_CHECKING:
@@ -58,14 +66,20 @@ def identify_logs(
     """
     from drivetwin.estimation.analysis.experiment_design import rank_experiments
     from drivetwin.logs.read import read_log
-    from drivetwin.shifts.detect import require_shifts
+    from drivetwin.plausibility.check import check_card
+    from drivetwin.shifts.detect import detect_shifts, refuse_without_shifts
     from drivetwin.validation.multi_log import Source, identify_together
 
     refuse_same_names(logs, "rename one of them")
     card = how.load_card()
     with show_step(f"reading {len(logs)} logs"):
-        read = tuple(read_log(log, card, how.channels) for log in logs)
-        shifts = [require_shifts(log, card) for log in read]
+        read = tuple(read_log(log, card, find_mapping(how.channels, log)) for log in logs)
+        shifts = [detect_shifts(log, card) for log in read]
+        pairs = list(zip(read, shifts, strict=True))
+        doubts = [one for log, each in pairs for one in check_card(card, log, each.shifts)]
+    show_findings(dict.fromkeys(doubts))
+    for log, each in pairs:
+        refuse_without_shifts(log, each)
     held = parse_holdouts(wanted, logs, shifts)
     sources = [
         Source(log, found, each) for log, found, each in zip(read, shifts, held, strict=True)

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drivetwin.cli.arguments import find_mapping
 from drivetwin.cli.atomic_outputs import write_atomically
-from drivetwin.cli.output import show_step
+from drivetwin.cli.output import show_findings, show_step
 from drivetwin.estimation.result.method import Method
 from drivetwin.vehicle.effects import parse_priors
 
@@ -35,7 +36,7 @@ class Request:
         from drivetwin.logs.read import read_log
 
         card = self.load_card()
-        return read_log(log, card, self.channels), card
+        return read_log(log, card, find_mapping(self.channels, log)), card
 
     def load_card(self) -> VehicleCard:
         """Read the card with the priors of effects."""
@@ -62,13 +63,17 @@ def run_identification(log: Path, how: Request) -> Outcome:
     """
     from drivetwin.estimation.analysis.experiment_design import rank_experiments
     from drivetwin.pipeline import identify
-    from drivetwin.shifts.detect import require_shifts
+    from drivetwin.plausibility.check import check_card
+    from drivetwin.shifts.detect import detect_shifts, refuse_without_shifts
     from drivetwin.twin.build import build_twin
     from drivetwin.validation.simulate_log import attach_validation
 
     with show_step(f"reading {log.name}"):
         recording, card = how.load(log)
-        shifts = require_shifts(recording, card)
+        shifts = detect_shifts(recording, card)
+        doubts = check_card(card, recording, shifts.shifts)
+    show_findings(doubts)
+    refuse_without_shifts(recording, shifts)
     with show_step(f"identifying by the {how.method} method"):
         found = identify(recording, card, shifts, how.method)
         twin = build_twin(found, card)

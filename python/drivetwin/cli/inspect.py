@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile
+from drivetwin.cli.arguments import ChannelsFile, LogFile, find_mapping
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -60,7 +60,8 @@ def inspect(
     from drivetwin.vehicle.card import load_card
 
     card = None if vehicle is None else load_card(vehicle)
-    stated = Mapped({}) if channels is None else read_mapping(channels)
+    mapping = find_mapping(channels, log)
+    stated = Mapped({}) if mapping is None else read_mapping(mapping)
     with show_step(f"reading {log.name}"), open_recording(log, stated.options) as opened:
         recording = Remembered(opened)
         found = survey_recording(recording, str(log), card, stated)
@@ -91,14 +92,14 @@ def _read_as_mapped_log(
 ) -> tuple[tuple[Finding, ...], DrivetwinError | None, str]:
     """Read a log as for use, missing roles allowed; return findings, error and who refuses it."""
     from drivetwin.channels.roles import FOR_SHIFTS
-    from drivetwin.logs.read import read_recording
+    from drivetwin.logs.read import Demands, read_recording
 
     try:
-        return read_recording(recording, log, card, stated, needed=()).findings, None, ""
+        return read_recording(recording, log, card, stated, Demands(())).findings, None, ""
     except DrivetwinError as fault:
         refusal = fault
     try:
-        found = read_recording(recording, log, card, stated, needed=(), sound=FOR_SHIFTS)
+        found = read_recording(recording, log, card, stated, Demands((), FOR_SHIFTS))
     except DrivetwinError as fault:
         return (), fault, "shifts and identify refuse"
     return found.findings, refusal, "identify refuses"

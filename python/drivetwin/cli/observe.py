@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
+from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile, find_mapping
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -70,7 +70,7 @@ def observe(
     model = load_twin(twin)
     with show_step(f"reading {log.name}"):
         card = model.build_card() if vehicle is None else load_card(vehicle)
-        recording = read_log(log, card, channels)
+        recording = read_log(log, card, find_mapping(channels, log))
         shifts = require_shifts(recording, card)
     found, left_out = _observe_shifts(
         shifts.shifts, lambda shift: estimate_torques(model, recording, shift, by), by

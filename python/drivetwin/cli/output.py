@@ -115,6 +115,12 @@ def print_findings(findings: Iterable[Finding]) -> None:
         print_paragraph(f"{one.severity}: {one.text}")
 
 
+def show_findings(findings: Iterable[Finding]) -> None:
+    """Display findings on stderr, before a computation that takes its time."""
+    for one in findings:
+        make_console(stderr=True).print(f"{one.severity}: {one.text}", soft_wrap=True)
+
+
 def show_error(error: DrivetwinError, *, as_json: bool) -> None:
     """Report an error: as text on stderr, or as JSON on stdout if requested."""
     if not as_json:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile
+from drivetwin.cli.arguments import ChannelsFile, find_mapping
 from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
 from drivetwin.errors import InputError, ResultFileError, Where
 
@@ -145,5 +145,5 @@ def _simulate_trials(twins: Mapping[str, Twin], log: Path, channels: Path | None
 
     card = next(iter(twins.values())).build_card()
     with show_step(f"simulating {log.name}"):
-        recording = read_log(log, card, channels)
+        recording = read_log(log, card, find_mapping(channels, log))
         return simulate_trials(twins, recording, require_shifts(recording, card).shifts, log.name)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile
+from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile, find_mapping
 from drivetwin.cli.output import (
     JsonFlag,
     print_findings,
@@ -75,7 +75,7 @@ def simulate(
     )
     with show_step(f"simulating {log.name}"):
         card = model.build_card() if vehicle is None else load_card(vehicle)
-        recording = read_log(log, card, channels)
+        recording = read_log(log, card, find_mapping(channels, log))
         shifts = require_shifts(recording, card)
         runs = [simulate_shift(model, recording, shift) for shift in shifts.shifts]
         if step_size is not None or input_kind is InputKind.HOLD:

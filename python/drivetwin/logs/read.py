@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Set
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivetwin._util.progress import notify_progress
@@ -45,6 +45,18 @@ from drivetwin.logs.raw import RawChannel, RawLog, Recording, Window
 from drivetwin.vehicle.card import VehicleCard
 
 
+@dataclass(frozen=True)
+class Demands:
+    """Roles that are `needed`, roles to be `sound`, and whether speeds must fit the gearing.
+
+    See `read_log`.
+    """
+
+    needed: Iterable[str] = FOR_SHIFTS
+    sound: Iterable[str] | None = None
+    gearing: bool = True
+
+
 def read_log(
     path: Path | str,
     card: VehicleCard | None,
@@ -52,6 +64,8 @@ def read_log(
     needed: Iterable[str] = FOR_SHIFTS,
     window: Window | None = None,
     sound: Iterable[str] | None = None,
+    *,
+    gearing: bool = True,
 ) -> ShiftLog:
     """Read a shift log: every mapped channel on its own time base, SI inside.
 
@@ -59,7 +73,8 @@ def read_log(
     are the roles that must exist (or their stand-in: engine for input speed, wheel for output
     speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
     last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
-    `card` no column is a pressure, and nothing is compared with the gearing.
+    `card` no column is a pressure, and nothing is compared with the gearing. With `gearing` False a
+    log whose speeds contradict the gearing of the card is not refused.
 
     A channel that cannot be used refuses the log if its role is needed or one of `sound`, else it
     is left out and listed in `findings`. By default `sound` are all measured roles, without an
@@ -72,7 +87,7 @@ def read_log(
     path = Path(path)
     stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
     with open_recording(path, stated.options) as recording:
-        log = read_recording(recording, path, card, stated, needed, window, sound)
+        log = read_recording(recording, path, card, stated, Demands(needed, sound, gearing), window)
     mappings = {} if mapping is None else {Path(mapping).name: _compute_digest(Path(mapping))}
     return replace(log, mappings=mappings)
 
@@ -82,9 +97,8 @@ def read_recording(
     path: Path,
     card: VehicleCard | None,
     stated: Mapped,
-    needed: Iterable[str] = FOR_SHIFTS,
+    demands: Demands,
     window: Window | None = None,
-    sound: Iterable[str] | None = None,
 ) -> ShiftLog:
     """Return the log of an open `recording` of the file `path` with the mapping `stated`.
 
@@ -93,7 +107,7 @@ def read_recording(
     elements = {} if card is None else card.elements
     kinds = {name: element.kind for name, element in elements.items()}
     specs = {**({} if card is None else card.channels), **stated.channels}
-    needed = frozenset(needed)
+    needed, sound = frozenset(demands.needed), demands.sound
     mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path), sound)
     strict = _select_strict_roles(mapped.channels, card, specs, needed, sound)
     _refuse_unitless(recording, mapped.channels, strict, str(path))
@@ -112,7 +126,9 @@ def read_recording(
             continue
         channels[role] = checked.channel
         findings += checked.findings
-    channels, dropped = _drop_inconsistent(channels, strict, card, str(path))
+    channels, dropped = _drop_inconsistent(
+        channels, strict, card if demands.gearing else None, str(path)
+    )
     findings += [*dropped, *check_coverage(channels)]
     if card is not None:
         findings += [*check_torque_balance(channels, card), *check_final_drive(channels, card)]

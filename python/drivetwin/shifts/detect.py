@@ -170,8 +170,14 @@ def _limit_phases(shifts: list[Shift], settings: ShiftSettings) -> list[Shift]:
 def require_shifts(log: ShiftLog, card: VehicleCard) -> FoundShifts:
     """Detect shifts like `detect_shifts`; raise NoShiftError with the rejections if all are."""
     found = detect_shifts(log, card)
+    refuse_without_shifts(log, found)
+    return found
+
+
+def refuse_without_shifts(log: ShiftLog, found: FoundShifts) -> None:
+    """Raise NoShiftError with the rejected candidates if no shift was found."""
     if found.shifts:
-        return found
+        return
     reasons = "; ".join(
         f"{one.time[0]:.3f} s to {one.time[1]:.3f} s: {one.reason}" for one in found.rejected
     )

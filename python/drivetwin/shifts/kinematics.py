@@ -69,6 +69,11 @@ def compute_gear_ratios(card: VehicleCard) -> dict[str, float]:
 
 
 def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
+    """Bring both speeds to one time base with the ratios of a card; see `resample_geared`."""
+    return resample_geared(log, card.i_in, card.final_drive)
+
+
+def resample_geared(log: ShiftLog, i_in: float, final_drive: float) -> GearboxSpeeds:
     """Bring both speeds to the time base of the input speed (linear between output samples).
 
     Input samples inside a gap of the output speed are left out.
@@ -82,7 +87,7 @@ def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
     if "input_speed" in log:
         source, scale = log["input_speed"], 1.0
     elif "engine_speed" in log:
-        source, scale = log["engine_speed"], 1.0 / card.i_in
+        source, scale = log["engine_speed"], 1.0 / i_in
         findings.append(report(Code.INPUT_SPEED_SUBSTITUTED))
     else:
         raise _describe_substitute("input_speed", "engine_speed", log)
@@ -90,7 +95,7 @@ def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
     if "output_speed" in log:
         sink, factor = log["output_speed"], 1.0
     elif "wheel_speed" in log:
-        sink, factor = log["wheel_speed"], card.final_drive
+        sink, factor = log["wheel_speed"], final_drive
         findings.append(report(Code.OUTPUT_SPEED_SUBSTITUTED))
     else:
         raise _describe_substitute("output_speed", "wheel_speed", log)

@@ -13,7 +13,7 @@ from drivetwin.channels.units import BAR, RPM
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.effects import EffectPrior
-from drivetwin.vehicle.spec import ElementSpec, PriorValue, SensorTolerance
+from drivetwin.vehicle.spec import ClutchGeometry, ElementSpec, PriorValue, SensorTolerance
 
 
 class PriorTable(StrictModel):
@@ -89,12 +89,19 @@ class ElementTable(StrictModel):
         return self
 
     @property
+    def geometry(self) -> ClutchGeometry | None:
+        """Geometry of the clutch; None if the gain is stated as one number."""
+        if self.gain_m3 is not None:
+            return None
+        return ClutchGeometry(
+            self.surfaces or 0, self.derating or 0.0, self.area_m2 or 0.0, self.radius_m or 0.0
+        )
+
+    @property
     def gain(self) -> float:
         """N·D·A·r [m^3]."""
-        if self.gain_m3 is not None:
-            return self.gain_m3
-        surfaces, area = self.surfaces or 0, self.area_m2 or 0.0
-        return surfaces * (self.derating or 0.0) * area * (self.radius_m or 0.0)
+        geometry = self.geometry
+        return (self.gain_m3 or 0.0) if geometry is None else geometry.gain
 
     def to_spec(self, name: str) -> ElementSpec:
         """Return the element in SI."""
@@ -107,6 +114,7 @@ class ElementTable(StrictModel):
             drum_inertia=self.drum_inertia_kgm2.to_prior(),
             i_c=self.i_c,
             i_out=self.i_out,
+            geometry=self.geometry,
         )
 
 
@@ -118,10 +126,18 @@ class InertiaTable(StrictModel):
     J_out_kgm2: PriorEntry | None = None
 
 
+def _refuse_percent(tolerance: float) -> float:
+    if tolerance >= 1.0:
+        raise ValueError(
+            f"a gain tolerance is relative and below 1: {tolerance:g} % is {tolerance / 100:g}"
+        )
+    return tolerance
+
+
 class SensorTable(StrictModel):
     """`[sensors.<role>]`: standard deviations of a sensor's constant gain and offset errors."""
 
-    gain_tolerance: float = Field(default=0.0, ge=0, lt=1)
+    gain_tolerance: Annotated[float, Field(ge=0), AfterValidator(_refuse_percent)] = 0.0
 
 
 class EngineTorqueSensor(SensorTable):

@@ -40,13 +40,29 @@ class Gear:
 
 
 @dataclass(frozen=True)
+class ClutchGeometry:
+    """Friction surfaces N, de-rating D, area A [m^2] and effective radius r [m] of a clutch."""
+
+    surfaces: int
+    derating: float
+    area: float
+    radius: float
+
+    @property
+    def gain(self) -> float:
+        """N·D·A·r [m^3]."""
+        return self.surfaces * self.derating * self.area * self.radius
+
+
+@dataclass(frozen=True)
 class ElementSpec:
     """A clutch or brake that makes a gear.
 
     `gain` = N·D·A·r [m^3] (N friction surfaces, D de-rating, A area, r effective radius);
     capacity = μ·gain·(P - P0), static capacity `peak` times that at zero slip (THEORY section 1).
     `P0` [Pa] ends the fill; `drum_inertia` [kg m^2] runs with the slip (THEORY section 2).
-    `i_c`, `i_out` are the ratios of eq. 15 where the card states them.
+    `i_c`, `i_out` are the ratios of eq. 15 where the card states them, `geometry` is what the gain
+    is computed from where the card states it.
     """
 
     name: str
@@ -57,6 +73,7 @@ class ElementSpec:
     drum_inertia: PriorValue = PriorValue(0.0)
     i_c: float | None = None
     i_out: float | None = None
+    geometry: ClutchGeometry | None = None
 
 
 def compute_brake_ratios(ratio: float) -> tuple[float, float]:

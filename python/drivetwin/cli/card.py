@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin card`: vehicle cards: check one against physics and a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from drivetwin.cli.arguments import ChannelsFile, find_mapping
+from drivetwin.cli.output import (
+    JsonFlag,
+    print_findings,
+    print_json,
+    print_line,
+    show_error,
+    show_step,
+    to_error_document,
+)
+from drivetwin.errors import CardError, DrivetwinError
+from drivetwin.findings import Code, Finding, report, select_warnings
+
+if TYPE_CHECKING:
+    from drivetwin.vehicle.vehicle_card import VehicleCard
+
+IMPLAUSIBLE = 3
+"""Exit code of a card with findings, with --strict."""
+
+card = typer.Typer(help="Check a vehicle card, or write one.", no_args_is_help=True)
+
+
+@card.command()
+def check(
+    card_file: Annotated[Path, typer.Argument(metavar="CARD", help="Vehicle card (TOML).")],
+    log: Annotated[
+        Path | None,
+        typer.Argument(metavar="LOG", help="Log of the vehicle: CSV, MDF, MAT, Parquet, bus log."),
+    ] = None,
+    channels: ChannelsFile = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit with 3 if anything is implausible.")
+    ] = False,
+    as_json: JsonFlag = False,
+) -> None:
+    """Report what is implausible on a vehicle card, before an identification.
+
+    Each finding names the entry, its value, the value or range expected, the reason and the remedy.
+    With LOG the entries are compared with the speeds, pressures and torques of the log too.
+    The exit code is 0; with --strict 3 if anything is implausible; 2 for a card or log that cannot
+    be read.
+    """
+    from drivetwin.files.records import dump_findings
+    from drivetwin.vehicle.card import load_card
+
+    try:
+        vehicle = load_card(card_file)
+    except CardError as fault:
+        fault.remedy += _describe_ratios(log, channels)
+        raise
+    findings, refusal = _compare(vehicle, log, channels)
+    warnings = select_warnings(findings)
+    if as_json:
+        error = None if refusal is None else to_error_document(refusal)["error"]
+        print_json({"findings": dump_findings(findings), "refusal": error})
+    else:
+        print_findings(findings)
+        print_line(f"{card_file}: {len(warnings) or 'nothing'} implausible")
+        if refusal is not None:
+            show_error(refusal, as_json=False)
+    if refusal is not None:
+        raise typer.Exit(refusal.exit_code)
+    if strict and warnings:
+        raise typer.Exit(IMPLAUSIBLE)
+
+
+def _compare(
+    vehicle: VehicleCard, log: Path | None, channels: Path | None
+) -> tuple[tuple[Finding, ...], DrivetwinError | None]:
+    """Check a card with its log; return the findings, and the error of a log that is unusable."""
+    from drivetwin.logs.read import read_log
+    from drivetwin.plausibility.check import check_card, select_card_findings
+    from drivetwin.shifts.detect import detect_shifts
+
+    if log is None:
+        return check_card(vehicle), None
+    try:
+        with show_step(f"reading {log.name}"):
+            mapping = find_mapping(channels, log)
+            recording = read_log(log, vehicle, mapping, needed=(), sound=(), gearing=False)
+    except DrivetwinError as refusal:
+        return check_card(vehicle), refusal
+    remarks = list(select_card_findings(vehicle, recording.findings))
+    try:
+        shifts = detect_shifts(recording, vehicle).shifts
+        if not shifts:
+            why = "no shift of the card's gears was found, so torques and friction are unchecked"
+            remarks.append(report(Code.CARD_NOT_COMPARED, why=why))
+    except DrivetwinError as error:
+        shifts = ()
+        remarks.append(report(Code.CARD_NOT_COMPARED, why=error.what))
+    return (*check_card(vehicle, recording, shifts), *remarks), None
+
+
+def _describe_ratios(log: Path | None, channels: Path | None) -> str:
+    """Describe the ratios that a log holds, as a help to correct a card that cannot be read."""
+    from drivetwin.logs.read import read_log
+    from drivetwin.plausibility.ratios import find_held_ratios
+    from drivetwin.shifts.kinematics import resample_geared
+
+    if log is None:
+        return ""
+    try:
+        recording = read_log(log, None, find_mapping(channels, log), needed=(), sound=())
+        held = find_held_ratios(resample_geared(recording, 1.0, 1.0))
+    except DrivetwinError:
+        return ""
+    ratios = ", ".join(f"{one.ratio:.4g}" for one in held)
+    return f"; {log.name} holds the ratios {ratios} of input and output speed" if held else ""

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""All plausibility checks of a vehicle card, with or without a log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.findings import Code, Finding
+from drivetwin.plausibility.entries import check_entries, find_entry
+from drivetwin.plausibility.friction import check_friction
+from drivetwin.plausibility.inertias import check_inertias
+from drivetwin.plausibility.pressures import check_pressures
+from drivetwin.plausibility.ratios import check_ratios
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+FROM_READING = {Code.FINAL_DRIVE_DIFFERS: "final_drive", Code.TORQUES_DIFFER: "gears"}
+"""Findings of the log reader that concern the card, and the entry that they concern."""
+ENGINE_INERTIA, OUTPUT_INERTIA = "inertia.J_prime_kgm2", "inertia.J_out_kgm2"
+
+
+def check_card(
+    card: VehicleCard, log: ShiftLog | None = None, shifts: Sequence[Shift] = ()
+) -> tuple[Finding, ...]:
+    """Return what is implausible on a vehicle card.
+
+    Parameters
+    ----------
+    card : design data of a vehicle
+    log : recording of the vehicle; without it the entries are compared with usual ranges only
+    shifts : the shifts detected in `log`
+
+    Returns
+    -------
+    Findings with the key of the entry as place and the numbers `found` and `low`, `high` or
+    `expected` in the unit of the entry. What the reader of the log found is not repeated.
+    """
+    found = check_entries(card)
+    if log is None:
+        return tuple(found)
+    if OUTPUT_INERTIA in {one.place.key for one in found}:
+        card = replace(card, J_out=None)
+    found += check_ratios(log, card)
+    found += check_pressures(log, card, shifts, list_doubted_elements(card, found))
+    sound = [one for one in shifts if not _has_doubted_gear(one, card, found)]
+    known = "output_torque" in log or ENGINE_INERTIA not in {one.place.key for one in found}
+    if known:
+        found += check_friction(log, card, sound, list_doubted_elements(card, found))
+    keys = frozenset(one.place.key or "" for one in found)
+    found += check_inertias(log, card, sound, keys)
+    return tuple({one.place.key: one for one in found}.values())  # the log decides
+
+
+def select_card_findings(card: VehicleCard, findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings of the log reader that concern the card, at the place of the entry."""
+    return tuple(
+        replace(one, place=find_entry(card, FROM_READING[one.code]))
+        for one in findings
+        if one.code in FROM_READING
+    )
+
+
+def list_doubted_elements(card: VehicleCard, found: Iterable[Finding]) -> frozenset[str]:
+    """Return the elements of which an entry is in doubt already, other than the whole gain."""
+    keys = [one.place.key or "" for one in found if one.code is not Code.CARD_GAIN_UNUSUAL]
+    return frozenset(
+        name for name in card.elements if any(key.startswith(f"elements.{name}.") for key in keys)
+    )
+
+
+def _has_doubted_gear(shift: Shift, card: VehicleCard, found: Iterable[Finding]) -> bool:
+    keys = {one.place.key for one in found}
+    return any(
+        f"gears[{index}].ratio" in keys
+        for index, gear in enumerate(card.gears)
+        if gear.name in (shift.start_gear, shift.end_gear)
+    )

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: MIT
+"""Friction that follows from the card's gain and P0 and the torques of a shift."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.arrays import Span
+from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.shiftlog import Channel, ShiftLog
+from drivetwin.channels.units import BAR
+from drivetwin.findings import Code, Finding, report
+from drivetwin.plausibility.entries import find_entry, get_gain_key
+from drivetwin.plausibility.settings import PLAUSIBILITY
+from drivetwin.plausibility.spans import (
+    compute_engine_rate,
+    compute_mean,
+    compute_output_rate,
+    sample_span,
+)
+from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+LEAST_POINTS = 15
+"""Fewest of the sampled instants of an inertia phase at which one element acts alone."""
+P0_ERROR = 0.1 * BAR
+"""Error of a pressure above P0 [Pa]: sensor offset and rounding of the design value."""
+
+
+@dataclass(frozen=True)
+class FrictionProduct:
+    """Product of μ and gain [m^3] of an element in a shift, from `low` to `high`."""
+
+    element: str
+    low: float
+    high: float
+    shift: str
+
+    @property
+    def middle(self) -> float:
+        """Geometric mean [m^3]."""
+        return float(np.sqrt(self.low * self.high))
+
+
+def get_slipping(shift: Shift) -> tuple[str, str]:
+    """Return the element that slips in the inertia phase, and the other one."""
+    if shift.kind.has_torque_phase_first:
+        return shift.oncoming, shift.offgoing
+    return shift.offgoing, shift.oncoming
+
+
+def find_products(
+    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
+) -> list[FrictionProduct]:
+    """Compute μ·gain in the inertia phases: clutch torque over pressure above P0.
+
+    The torque follows from the output torque with the usual efficiencies, without it from the
+    engine torque with the design range of J'. Shifts with small torque or pressure, or in which
+    two elements act at once, are left out.
+    """
+    found = []
+    for shift, label in zip(shifts, make_shift_labels(shifts), strict=True):
+        element = get_slipping(shift)[0]
+        span = find_single_slip(log, card, shift)
+        if span is None:
+            continue
+        pressure = _compute_pressure(log, card, element, span)
+        P0 = card.get_element(element).P0
+        error = max(P0_ERROR, 2.0 * P0.std)
+        torques = _bound_torque(log, card, element, span)
+        if torques is not None and pressure > 2.0 * error:
+            low, high = torques[0] / (pressure + error), torques[1] / (pressure - error)
+            found.append(FrictionProduct(element, low, high, label))
+    return found
+
+
+def find_single_slip(log: ShiftLog, card: VehicleCard, shift: Shift) -> Span | None:
+    """Find the longest part of the inertia phase in which the slipping element acts alone.
+
+    Its pressure is above P0 and that of the other element below. A fifth is left out at both ends,
+    where pressures change. None without such a part or without a pressure.
+    """
+    element, other = get_slipping(shift)
+    roles = [make_pressure_role(one) for one in (element, other)]
+    if roles[0] not in log or element == other:
+        return None
+    span = shift.inertia_phase
+    pressure = sample_span(log[roles[0]], span) - card.get_element(element).P0.value
+    alone = pressure > PLAUSIBILITY.least_pressure * BAR
+    if roles[1] in log:
+        rest = sample_span(log[roles[1]], span) - card.get_element(other).P0.value
+        alone &= rest < P0_ERROR
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], alone, [False])).astype(int)))
+    if edges.size == 0:
+        return None
+    starts, stops = edges[::2], edges[1::2]
+    longest = int(np.argmax(stops - starts))
+    first, stop = int(starts[longest]), int(stops[longest])
+    if stop - first < LEAST_POINTS:
+        return None
+    time = np.linspace(*span, pressure.size)
+    margin = 0.2 * (time[stop - 1] - time[first])
+    return float(time[first] + margin), float(time[stop - 1] - margin)
+
+
+def _compute_pressure(log: ShiftLog, card: VehicleCard, element: str, span: Span) -> float:
+    """Mean pressure above P0 [Pa]; NaN without the channel."""
+    role = make_pressure_role(element)
+    if role not in log:
+        return float("nan")
+    return compute_mean(log[role], span) - card.get_element(element).P0.value
+
+
+def _bound_torque(
+    log: ShiftLog, card: VehicleCard, element: str, span: Span
+) -> tuple[float, float] | None:
+    """Least and largest torque of the slipping element [N m]; None if it is small or unknown."""
+    i_c, i_out = card.get_clutch_ratios(element)
+    if "output_torque" in log:
+        channel = log["output_torque"]
+        torque = compute_mean(channel, span)
+        if not _is_large(torque, channel):
+            return None
+        inertia = 0.0 if card.J_out is None else card.J_out.value
+        rate = compute_output_rate(log, card, span)
+        torque += inertia * rate if np.isfinite(rate) else 0.0
+        low, high = (abs(torque / (eta * i_out)) for eta in PLAUSIBILITY.efficiency[::-1])
+        return low, high
+    if "engine_torque" not in log or card.converter is not None:
+        return None
+    driving = compute_mean(log["engine_torque"], span)
+    rate = compute_engine_rate(log, card, span)
+    bounds = sorted(i_c * card.i_in * (driving - inertia * rate) for inertia in card.J_prime_range)
+    if not np.isfinite(bounds).all() or min(bounds) <= 0.0:
+        return None
+    return bounds[0], bounds[1]
+
+
+def _is_large(torque: float, channel: Channel) -> bool:
+    return abs(torque) > PLAUSIBILITY.least_torque * float(np.abs(channel.values).max())
+
+
+def check_friction(
+    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift], doubted: frozenset[str]
+) -> list[Finding]:
+    """Report the gains that make an implausible μ; elements in `doubted` are left out.
+
+    Each element is reported once, by its first shift. Elements without a μ are compared with those
+    whose μ is plausible.
+    """
+    found: dict[str, Finding] = {}
+    sound: set[str] = set()
+    for product in find_products(log, card, shifts):
+        if product.element in doubted | found.keys():
+            continue
+        sound.add(product.element)
+        for finding in _judge_product(card, product):
+            found[product.element] = finding
+    for shift, label in zip(shifts, make_shift_labels(shifts), strict=True):
+        for element, finding in _check_bounds(log, card, shift, label):
+            if element not in doubted | found.keys():
+                found[element] = finding
+    sound -= found.keys()
+    rest = card.elements.keys() - sound - found.keys() - doubted
+    return [*found.values(), *_compare_gains(card, sorted(rest), sorted(sound))]
+
+
+def _compare_gains(
+    card: VehicleCard, elements: Sequence[str], sound: Sequence[str]
+) -> Iterator[Finding]:
+    """Compare the gains of elements with the geometric mean of the `sound` ones."""
+    if not sound:
+        return
+    usual = float(np.exp(np.mean([np.log(card.get_element(name).gain) for name in sound])))
+    limit = PLAUSIBILITY.unequal_gains
+    for name in elements:
+        factor = card.get_element(name).gain / usual
+        if not 1.0 / limit <= factor <= limit:
+            numbers = {"factor": factor}
+            factors = (1.0 / limit / factor, limit / factor)
+            code = Code.CARD_GAINS_UNEQUAL
+            yield _report_gain(card, name, code, factors, numbers, others=", ".join(sound))
+
+
+def _judge_product(card: VehicleCard, product: FrictionProduct) -> Iterator[Finding]:
+    gain = card.get_element(product.element).gain
+    middle = product.middle / gain
+    for code, (low, high), limits in (
+        (
+            Code.CARD_FRICTION_IMPLAUSIBLE,
+            (product.low / gain, product.high / gain),
+            PLAUSIBILITY.friction,
+        ),
+        (Code.CARD_FRICTION_UNUSUAL, (middle, middle), PLAUSIBILITY.usual_friction),
+    ):
+        if high < limits[0] or low > limits[1]:
+            factors = (middle / limits[1], middle / limits[0])
+            numbers = {"mu": middle, "product": product.middle}
+            yield _report_gain(card, product.element, code, factors, numbers, shift=product.shift)
+            return
+
+
+def _report_gain(
+    card: VehicleCard,
+    element: str,
+    code: Code,
+    factors: tuple[float, float],
+    numbers: dict[str, float],
+    **names: str,
+) -> Finding:
+    """Report a gain, or the surfaces that it is computed from, and `factors` times it."""
+    spec = card.get_element(element)
+    found = spec.gain if spec.geometry is None else float(spec.geometry.surfaces)
+    unit = "m³" if spec.geometry is None else "friction surfaces"
+    shown = {"found": found, "low": found * factors[0], "high": found * factors[1], **numbers}
+    place = find_entry(card, get_gain_key(spec))
+    return report(code, "", place, element=element, unit=unit, **shown, **names)
+
+
+def _check_bounds(
+    log: ShiftLog, card: VehicleCard, shift: Shift, label: str
+) -> Iterator[tuple[str, Finding]]:
+    """Bound μ of the off-going element: it holds the engine torque before the shift, and slips
+    at break-away with no more than that torque.
+    """
+    role = make_pressure_role(shift.offgoing)
+    usable = role in log and "engine_torque" in log and card.converter is None
+    if not usable or shift.offgoing == shift.oncoming:
+        return
+    spec = card.get_element(shift.offgoing)
+    i_c = abs(card.get_clutch_ratios(shift.offgoing)[0])
+    low, high = PLAUSIBILITY.friction
+    before = (shift.before[0], shift.torque_phase[0])
+    held = sample_span(log["engine_torque"], before)
+    pressure = sample_span(log[role], before) - spec.P0.value
+    rate = max(compute_engine_rate(log, card, before), 0.0)
+    torque = i_c * card.i_in * (held - card.J_prime_range[1] * rate)
+    ready = np.isfinite(torque) & (pressure > PLAUSIBILITY.least_pressure * BAR)
+    if np.count_nonzero(ready) > 5:
+        least = float(np.median(torque[ready] / pressure[ready])) / spec.gain / spec.peak
+        if least > high:
+            numbers = {"mu": least}
+            names = {"side": "at least", "event": "holds", "shift": label}
+            factors = (least / high, least / low)
+            code = Code.CARD_FRICTION_BOUND
+            yield shift.offgoing, _report_gain(card, spec.name, code, factors, numbers, **names)
