@@ -109,8 +109,9 @@ docs: $(venv)/.dev native ## build the documentation site into out/docs, warning
 	cp out/docs/README.html out/docs/index.html
 
 .PHONY: notices
-notices: $(venv)/.dev ## write the licences of the linked crates, after a change of Cargo.lock
+notices: $(venv)/.dev native ## write licences of crates and Python packages, and the versions for CI
 	$(bin)/python -m tools.notices
+	$(bin)/python -m tools.python_packages
 
 .PHONY: reference
 reference: $(venv)/.dev native ## solve the reference problems anew with SciPy
