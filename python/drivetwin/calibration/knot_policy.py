@@ -54,12 +54,16 @@ class KnotProfile:
         """Return the knots as parameters of the policy."""
         return tuple(
             PolicyParameter(
-                f"{name}_{number}", unit, self.low, self.high, value, f"value {time - request:.3g} s after the request"
+                f"{name}_{number}", unit, self.low, self.high, value, _describe(time - request)
             )
             for number, (time, value) in enumerate(
                 zip(self.times, self.start, strict=True), start=1
             )
         )
+
+
+def _describe(after: float) -> str:
+    return f"value {after:.3g} s after the request"
 
 
 @dataclass(frozen=True)
