@@ -88,7 +88,7 @@ def run_cma(task: Task, fresh: Scenarios, limit: float) -> Entry:
             search_minima(evaluate, start, alone, seed)
             seed += 1
 
-    return _run_within("CMA-ES alone", task, fresh, limit, search)
+    return _run_within("CMA-ES alone", task, (make_quick_plant(task), fresh), limit, search)
 
 
 def run_lbfgs(task: Task, fresh: Scenarios, limit: float) -> Entry:
@@ -114,7 +114,7 @@ def run_lbfgs(task: Task, fresh: Scenarios, limit: float) -> Entry:
             minimize(slope, at, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * at.size)
             at = np.clip(start + 0.12 * random.standard_normal(start.size), 0.0, 1.0)
 
-    return _run_within("L-BFGS", task, fresh, limit, search)
+    return _run_within("L-BFGS", task, (plant, fresh), limit, search)
 
 
 def run_start(task: Task, fresh: Scenarios) -> Entry:
@@ -135,12 +135,12 @@ def _soften(objective: Objective, outcome: Outcome) -> float:
 def _run_within(
     name: str,
     task: Task,
-    fresh: Scenarios,
+    tried: tuple[Plant, Scenarios],
     limit: float,
     search: Callable[[Callable[[FloatArray], float], FloatArray], None],
 ) -> Entry:
-    """Run a search until its CPU time [s] is used up."""
-    space, plant = Space(task.policy), make_quick_plant(task)
+    """Run a search until its CPU time [s] is used up; `tried` are plant and fresh draws."""
+    space, (plant, fresh) = Space(task.policy), tried
     watch = Watch(limit, time.process_time())
     draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
     objective = build_objective(task, plant)

@@ -72,6 +72,7 @@ def make_policy() -> KnotPolicy:
             600.0,
             TORQUE,
         ),
+        request=REQUEST,
     )
 
 

@@ -50,11 +50,11 @@ class KnotProfile:
         fixed = [v for _, v in self.head], [v for _, v in self.tail]
         return Signal(np.array(time), np.array([*fixed[0], *values.tolist(), *fixed[1]]))
 
-    def list_parameters(self, name: str, unit: str) -> tuple[PolicyParameter, ...]:
+    def list_parameters(self, name: str, unit: str, request: float) -> tuple[PolicyParameter, ...]:
         """Return the knots as parameters of the policy."""
         return tuple(
             PolicyParameter(
-                f"{name}_{number}", unit, self.low, self.high, value, f"value at {time:g} s"
+                f"{name}_{number}", unit, self.low, self.high, value, _describe(time - request)
             )
             for number, (time, value) in enumerate(
                 zip(self.times, self.start, strict=True), start=1
@@ -62,13 +62,21 @@ class KnotProfile:
         )
 
 
+def _describe(after: float) -> str:
+    return f"value {after:.3g} s after the request"
+
+
 @dataclass(frozen=True)
 class KnotPolicy:
-    """Knots of on-coming pressure, off-going pressure [Pa] and engine torque [N m]."""
+    """Knots of on-coming pressure, off-going pressure [Pa] and engine torque [N m].
+
+    `request` [s] as in `Maneuver`.
+    """
 
     oncoming: KnotProfile
     offgoing: KnotProfile
     engine_torque: KnotProfile
+    request: float
 
     def __post_init__(self) -> None:
         check_parameters(self.parameters)
@@ -77,9 +85,9 @@ class KnotPolicy:
     def parameters(self) -> tuple[PolicyParameter, ...]:
         """Knots in the order of on-coming, off-going and engine torque."""
         return (
-            *self.oncoming.list_parameters("oncoming_pressure", "Pa"),
-            *self.offgoing.list_parameters("offgoing_pressure", "Pa"),
-            *self.engine_torque.list_parameters("engine_torque", "N*m"),
+            *self.oncoming.list_parameters("oncoming_pressure", "Pa", self.request),
+            *self.offgoing.list_parameters("offgoing_pressure", "Pa", self.request),
+            *self.engine_torque.list_parameters("engine_torque", "N*m", self.request),
         )
 
     def set_start(self, values: Mapping[str, float]) -> KnotPolicy:
@@ -91,6 +99,7 @@ class KnotPolicy:
             replace(self.oncoming, start=tuple(starts[:first])),
             replace(self.offgoing, start=tuple(starts[first:second])),
             replace(self.engine_torque, start=tuple(starts[second:])),
+            self.request,
         )
 
     def build_profiles(self, values: FloatArray) -> Profiles:
@@ -132,4 +141,5 @@ def build_knot_policy(maneuver: Maneuver, start: Profiles, system_pressure: floa
         build(start.oncoming, _ONCOMING, pressures, (0.0, system_pressure)),
         build(start.offgoing, _OFFGOING, pressures, (system_pressure, 0.0)),
         build(start.engine_torque, _TORQUE, bounds, (torque, torque)),
+        maneuver.request,
     )
