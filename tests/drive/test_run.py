@@ -57,7 +57,8 @@ def test_a_drive_begins_without_a_jerk(drive: DriveRun, gearbox: Gearbox) -> Non
 
 def test_all_four_kinds_of_shift_end_in_their_gear(drive: DriveRun, gearbox: Gearbox) -> None:
     shifts = [each for each in drive.maneuvers if each.action.kind in list(ShiftKind)]
-    assert {each.action.kind for each in shifts} == set(ShiftKind)
+    known = {kind for kind in ShiftKind if "unknown" not in kind.value}
+    assert {each.action.kind for each in shifts} == known
     for each in shifts:
         gear = each.action.label.rpartition("→")[2]
         at = np.searchsorted(drive.time, each.action.end)
