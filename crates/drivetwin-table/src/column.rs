@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Cells of one column.
 
-/// What a cell holds: a number, nothing, or the text at an index.
+/// Content of a cell: a number, nothing, or the text at an index.
 pub type Kind = u8;
 
 /// A number.

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-/// What stands between the fields of a line.
+/// Separator of the fields of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Separator {
     /// One byte; fields may be quoted.

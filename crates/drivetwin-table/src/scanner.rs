@@ -11,7 +11,7 @@ const MOST_REMARKS: usize = 1000;
 /// Layout of a table.
 #[derive(Clone, Debug)]
 pub struct Layout {
-    /// What stands between the fields.
+    /// Separator of the fields.
     pub separator: Separator,
     /// Number of columns.
     pub width: usize,

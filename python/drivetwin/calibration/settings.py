@@ -33,7 +33,7 @@ class CalibrationSettings:
     search_share: float = 0.9
     """Quantile beyond which peak jerk is averaged in search and polish."""
     tail_share: float = 0.98
-    """The same in the last polish."""
+    """Quantile beyond which peak jerk is averaged in the last polish."""
     polish_iterations: int = 12
     """Largest number of linear programs of the polish."""
     tail_iterations: int = 8

@@ -34,7 +34,7 @@ DEFAULT_LIMITS = {
 
 @dataclass(frozen=True)
 class Request:
-    """What to calibrate: gears, operating point (None: from the twin), policy, limits, effort.
+    """Task of a calibration: gears, operating point (None: from the twin), policy, limits, effort.
 
     `wheel_radius` [m]; `system_pressure` [Pa], by default the largest that the twin's log has;
     `engine_torque` [N m] and `engine_speed` [rad/s] at the request; `start` holds starting values

@@ -78,7 +78,7 @@ class FillingSettings:
     """Misfit relative to that of instants half a period away, below which the record is
     reproduced whatever its rounding: that of untouched channels is near one."""
     significant: float = 0.85
-    """The same where rounding alone explains the misfit ..."""
+    """Such a misfit where rounding alone explains it ..."""
     significant_between: float = 0.7
     """... and where the knots lie between samples: their raster was searched for the least ..."""
     as_good: float = 1.2

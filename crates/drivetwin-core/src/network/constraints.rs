@@ -20,7 +20,7 @@ pub struct Coordinates<T> {
 /// Speeds and twists that members without mass follow.
 #[derive(Clone, Debug)]
 pub struct Followers<T> {
-    /// What node speeds have beside the independent ones, nodes × basis without channels.
+    /// Part of the node speeds beside the independent ones, nodes × basis without channels.
     pub speeds: Matrix<T>,
     /// Twists in balance, springs × (twists, 1), where a member has springs only.
     pub twists: Option<Matrix<T>>,

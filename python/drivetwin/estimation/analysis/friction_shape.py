@@ -118,12 +118,12 @@ def fit_friction_shape(
             "the fit with friction of free shape does not converge",
             "use the Stribeck law, which the identification has",
         )
-    told = correct_fit(best, priors) or keep_fit(best)
+    corrected = correct_fit(best, priors) or keep_fit(best)
     gain = base.chi2 * base.problem.size - best.chi2 * best.problem.size
     return ShapedFriction(
         shape,
         {
-            name: _build_curve(told, (name, table, shape), found.friction[name])
+            name: _build_curve(corrected, (name, table, shape), found.friction[name])
             for name, table in tables.items()
         },
         gain,
@@ -235,16 +235,16 @@ def _compute_evidence(
 
 
 def _build_curve(
-    told: Correction, one: tuple[str, KnotTable, FrictionShape], seen: FrictionCurve
+    corrected: Correction, one: tuple[str, KnotTable, FrictionShape], seen: FrictionCurve
 ) -> FrictionCurve:
     """Interpolate μ between the knots over the observed slips, with the band of noise, sensors
     and effects."""
     name, table, shape = one
-    first = told.mean.names.index(table.list_names(name)[0])
+    first = corrected.mean.names.index(table.list_names(name)[0])
     part = slice(first, first + table.knots.size)
     slip = np.linspace(float(seen.slip[0]), float(seen.slip[-1]), POINTS)
     between = np.array([np.interp(slip, table.knots, row) for row in np.eye(table.knots.size)]).T
-    at_knots, spread = project_shape(shape, told.mean.values[part], told.covariance[part, part])
+    at_knots, spread = project_shape(shape, corrected.mean.values[part], corrected.covariance[part, part])
     mu = between @ at_knots
     half = Z95 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
     return replace(

@@ -86,7 +86,7 @@ def compute_slow_power(part: ShiftTerm, out: Output, rows: slice, white: FloatAr
     means of its residual `white` (n,) may as well be those of white noise.
 
     Input noise that explains a part of any residual takes it from slow errors too. How much is
-    told by probes: one of random sign for each block, weighted as the residual was. What is slower
+    found by probes: one of random sign for each block, weighted as the residual was. What is slower
     than a block, as a drift, counts with its power over a block, which is less than it does.
     """
     _, means = compute_block_means(part.record.time[out.place], white)

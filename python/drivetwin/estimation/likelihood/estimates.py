@@ -79,13 +79,13 @@ def build_estimates(
     leaves out; where these are too large for that, no value is identified.
     """
     correction = correct_fit(fit, priors)
-    told = correction or keep_fit(fit)
-    own = _fit_parameters(fit, told, signals, drivelines)
+    corrected = correction or keep_fit(fit)
+    own = _fit_parameters(fit, corrected, signals, drivelines)
     sensors = None if correction is None else correct_fit(fit, priors.drop_effects())
     if sensors is not None:
         plain = _fit_parameters(fit, sensors, signals, drivelines)
-        if _is_card_likelier(plain.fitted, told):
-            told, own = sensors, plain
+        if _is_card_likelier(plain.fitted, corrected):
+            corrected, own = sensors, plain
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
     limits = [
@@ -95,36 +95,36 @@ def build_estimates(
     ]
     labels = collect_shift_labels(signals)
     disagreements = (
-        *check_residuals(fit, labels, told.residuals),
+        *check_residuals(fit, labels, corrected.residuals),
         *check_weighting(fit, labels),
         *(() if correction is not None else (report(Code.EFFECTS_OMITTED),)),
-        *(withdrawn := find_unreliable(told, ids, matrix, std)),
+        *(withdrawn := find_unreliable(corrected, ids, matrix, std)),
     )
-    doubt = dict(zip(ids, compute_doubt(told, matrix).tolist(), strict=True))
+    doubt = dict(zip(ids, compute_doubt(corrected, matrix).tolist(), strict=True))
     subjects = {one.subject for one in withdrawn}
     for name in ids if "" in subjects else subjects:
         estimates[name] = add_systematic(estimates[name], doubt[name])
     estimates = apply_errors(estimates, (*limits, *disagreements))
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
-    cause = find_cause(told, priors)
+    cause = find_cause(corrected, priors)
     return EstimateSet(
         estimates,
-        build_friction_curves(fit, linear, told),
+        build_friction_curves(fit, linear, corrected),
         ids,
         compute_correlation(own.covariance),
         (
             *dict.fromkeys(fitted.notes.values()),
             *(one.finding for one in fitted.conflicts),
             *limits,
-            *(() if cause is None else (report_cause(cause, told, values, matrix, std),)),
+            *(() if cause is None else (report_cause(cause, corrected, values, matrix, std),)),
             *(one for one in disagreements if one.subject not in estimates),
             *find_null_directions(fit),
             *report_different_loads(collect_loads(fit)),
             *_check_other_law(fit, signals, matrix),
         ),
-        _build_load_law(fit, told),
+        _build_load_law(fit, corrected),
         collect_loads(fit),
-        predict_spread(fit, told),
+        predict_spread(fit, corrected),
         cause,
     )
 
@@ -154,20 +154,20 @@ class _ReportedParameters:
 
 def _fit_parameters(
     fit: LikelihoodFit,
-    told: Correction,
+    corrected: Correction,
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[KnownDriveline],
 ) -> _ReportedParameters:
     """Compute the reported parameters with their noise and total covariance."""
-    values = compute_parameters(fit.problem, told.mean, signals)
-    matrix = compute_jacobian(fit.problem, told.mean, np.sqrt(np.diag(fit.covariance)), signals)
-    covariance = matrix @ told.covariance @ matrix.T
+    values = compute_parameters(fit.problem, corrected.mean, signals)
+    matrix = compute_jacobian(fit.problem, corrected.mean, np.sqrt(np.diag(fit.covariance)), signals)
+    covariance = matrix @ corrected.covariance @ matrix.T
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    noise = np.minimum(_compute_std(matrix, told.noise), std)
+    noise = np.minimum(_compute_std(matrix, corrected.noise), std)
     fitted = FittedParameters(
         ids=tuple(values),
         values=np.array([*values.values()]),
-        covariance=matrix @ told.noise @ matrix.T,
+        covariance=matrix @ corrected.noise @ matrix.T,
         std=noise,
         driveline=drivelines[0],
         systematic=dict(zip(values, np.sqrt(std**2 - noise**2).tolist(), strict=True)),
@@ -210,14 +210,14 @@ def _estimate_fixed(
     return found
 
 
-def _build_load_law(fit: LikelihoodFit, told: Correction) -> LoadLaw | None:
+def _build_load_law(fit: LikelihoodFit, corrected: Correction) -> LoadLaw | None:
     """Build the load law with its growth with speed; None if the fit has a constant load."""
     if AERO not in fit.point.names:
         return None
     k, part = fit.point.names.index(AERO), fit.problem.parts[0]
-    std = float(np.sqrt(told.covariance[k, k]))
+    std = float(np.sqrt(corrected.covariance[k, k]))
     mean_speed = part.structure.mean_speed
-    return LoadLaw(told.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
+    return LoadLaw(corrected.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
 
 
 def _estimate_without_scale(

@@ -144,9 +144,9 @@ pub enum Bound<L, const N: usize> {
         limit: AffineForm<L>,
         /// 1 or -1.
         side: L,
-        /// What `side · form` rises by in a third of a sample at the rate of the states, over these.
+        /// Rise of `side · form` in a third of a sample at the rate of the states, over these.
         third: Form<L, N>,
-        /// The same over the inputs that act on the state.
+        /// Rise of `side · form` over the inputs that act on the state.
         inputs: [L; MAX_INPUTS],
     },
 }

@@ -14,7 +14,7 @@ const STEP_WINDOW: usize = 10_000;
 
 /// Steps of a run that the motion itself ends, neither an event nor a sample: some seconds of work.
 const MAX_STEPS: usize = 300_000;
-/// The same for every second of the run.
+/// Further such steps for every second of the run.
 const MAX_STEPS_PER_SECOND: f64 = 1000.0;
 
 /// Counters of the advance of a run over its last steps.
