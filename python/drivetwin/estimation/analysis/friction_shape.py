@@ -244,7 +244,9 @@ def _build_curve(
     part = slice(first, first + table.knots.size)
     slip = np.linspace(float(seen.slip[0]), float(seen.slip[-1]), POINTS)
     between = np.array([np.interp(slip, table.knots, row) for row in np.eye(table.knots.size)]).T
-    at_knots, spread = project_shape(shape, corrected.mean.values[part], corrected.covariance[part, part])
+    at_knots, spread = project_shape(
+        shape, corrected.mean.values[part], corrected.covariance[part, part]
+    )
     mu = between @ at_knots
     half = Z95 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
     return replace(

@@ -160,7 +160,9 @@ def _fit_parameters(
 ) -> _ReportedParameters:
     """Compute the reported parameters with their noise and total covariance."""
     values = compute_parameters(fit.problem, corrected.mean, signals)
-    matrix = compute_jacobian(fit.problem, corrected.mean, np.sqrt(np.diag(fit.covariance)), signals)
+    matrix = compute_jacobian(
+        fit.problem, corrected.mean, np.sqrt(np.diag(fit.covariance)), signals
+    )
     covariance = matrix @ corrected.covariance @ matrix.T
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     noise = np.minimum(_compute_std(matrix, corrected.noise), std)
