@@ -90,12 +90,12 @@ class CsvRecording:
         self._contents = list_contents(table, text)
         self._kept: dict[int, Numbers] = {}
         stamps = _TimeColumns(self._header, self._lines, time, file)
-        told: tuple[str, ...] = ()
+        notices: tuple[str, ...] = ()
         if is_text:
             self._stamps = stamps.parse_texts(table, text, bool(dates))
         else:
-            self._stamps, told = self._count_stamps(stamps, self._take_numbers(table, clocks))
-        self.warnings: tuple[str, ...] = (*notes, *told)
+            self._stamps, notices = self._count_stamps(stamps, self._take_numbers(table, clocks))
+        self.warnings: tuple[str, ...] = (*notes, *notices)
         others = [index for index in range(len(self._header.names)) if self._is_channel(index)]
         sound = [index for index in others if self._contents[index].fault is None]
         faulty = [index for index in others if self._contents[index].fault is not None]
@@ -154,14 +154,14 @@ class CsvRecording:
             time.require_numbers(clock, self._contents[clock].fault)
         if len(numbers) == 1:
             return time.count_single(numbers)
-        stamps, told = time.count_several(numbers)
+        stamps, notices = time.count_several(numbers)
         channels = (index for index in range(len(self._header.names)) if index not in numbers)
         for index in channels:
             known = stamps[self._header.times[index]].known
             if not known.all() and self._contents[index].count:
                 column = self._take_numbers(self._reader.scan([index], (), self._rows), [index])
                 time.require_stamps(index, ~known & np.isfinite(column[index].values))
-        return stamps, told
+        return stamps, notices
 
 
 class _TimeColumns:

@@ -128,9 +128,9 @@ class _Search:
                 continue
             time = times[index - 1]
             assert time is not None
-            told = unit if unit is not None and is_time_unit(unit) else "s"
+            stated = unit if unit is not None and is_time_unit(unit) else "s"
             factor = get_time_factor(
-                self._stated.unit or told, Where(file=self._file, channel=name)
+                self._stated.unit or stated, Where(file=self._file, channel=name)
             )
             self._add_channel(name, _get_struct_unit(one), (time, values), factor)
         return frozenset(("X", "Y"))
@@ -255,8 +255,8 @@ class _Search:
         A time series keeps another one in `TimeInfo`.
         """
         info = tree.get("TimeInfo")
-        told = _get_struct_unit(info) if isinstance(info, Mapping) else None
-        unit = self._stated.unit or _get_unit(name, tree) or told or "s"
+        listed = _get_struct_unit(info) if isinstance(info, Mapping) else None
+        unit = self._stated.unit or _get_unit(name, tree) or listed or "s"
         return get_time_factor(unit, Where(file=self._file, channel=name))
 
     def _add_channel(

@@ -120,5 +120,5 @@ def _select_unit(beside: str | None, under: str) -> str | None:
 
     If the row below has no unit, or a placeholder such as `-`, the unit in the name is used.
     """
-    tells = is_physical_unit(under)
-    return under if tells or (beside is None and under) else beside
+    is_unit = is_physical_unit(under)
+    return under if is_unit or (beside is None and under) else beside
