@@ -125,3 +125,27 @@ def test_ignores_missing_values() -> None:
     assert found is not None
     assert found.period == pytest.approx(0.01)
     assert np.isfinite(found.values).all()
+
+
+def test_steps_on_a_raster_are_no_knots() -> None:
+    """A smooth channel without noise that answers to steps of its cause every 50 ms."""
+    rng = np.random.default_rng(6)
+    time = np.arange(0.0, 5.0, STEP)
+    values = np.zeros(time.size)
+    for at, size in zip(np.arange(0.0, 5.0, 0.05), rng.standard_normal(100), strict=True):
+        after = np.clip(time - at, 0.0, None)
+        values += size * np.exp(-2.0 * after) * np.sin(50.0 * after)
+    assert find_filling(time, np.round(values, 6)) is None
+
+
+@settings(max_examples=60)
+@given(
+    values=st.lists(
+        st.sampled_from([0.0, 1.0, 1e-310, 1e300, -1e300, 3.5, np.nan]), min_size=0, max_size=400
+    ),
+    start=st.integers(0, 3),
+)
+def test_any_record_ends_without_a_warning(values: list[float], start: int) -> None:
+    """Records of rest, missing values and numbers at the ends of the scale."""
+    found = find_filling(start + STEP * np.arange(len(values)), np.asarray(values))
+    assert found is None or found.time.size == found.values.size

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -16,38 +15,31 @@ ROOT = Path(__file__).resolve().parents[2]
 LOGS = ROOT.parent / "shared" / "logs"
 CARDS = ROOT / "examples" / "vehicles"
 
-CPU_LIMIT = 10.0
-"""5 s on two cores; CPU time, so that other work on the machine does not count."""
-
 pytestmark = pytest.mark.skipif(not LOGS.is_dir(), reason="the shared logs are not at hand")
 
 
-def _identify(name: str, out: Path) -> tuple[dict[str, Any], float]:
-    """Run the program in a process of its own; returns result.json and its seconds of CPU time."""
+def _identify(name: str, out: Path) -> dict[str, Any]:
+    """Run the program in a process of its own and return result.json."""
     command = [
         sys.executable, "-m", "drivetwin", "identify", str(LOGS / f"{name}.csv"),
         "--vehicle", str(CARDS / f"{name}.toml"), "-o", str(out),
     ]  # fmt: skip
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, check=True, capture_output=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     result: dict[str, Any] = json.loads((out / "result.json").read_text())
-    return result, seconds
+    return result
 
 
 @pytest.mark.parametrize("name", ["truck_a", "paper_like"])
-def test_three_files_in_seconds(name: str, tmp_path: Path) -> None:
+def test_writes_three_files(name: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    result, seconds = _identify(name, out)
+    result = _identify(name, out)
     assert {path.name for path in out.iterdir()} == {"result.json", "twin.toml", "report.html"}
     assert (result["shifts"][0]["from"], result["shifts"][0]["to"]) == ("2", "3")
     assert result["fit"]["output_torque"]["all"]["fit_percent"] > 80.0
-    assert seconds < CPU_LIMIT
 
 
 def test_paper_like_says_what_its_constant_torque_cannot_tell(tmp_path: Path) -> None:
-    result, _ = _identify("paper_like", tmp_path / "out")
+    result = _identify("paper_like", tmp_path / "out")
     for key in ("eta", "J_prime_2"):
         assert "not separately identifiable" in result["parameters"][key]["reason"]
     truth = {"eta": 0.85, "J_prime_2": 17.5, "Tv_over_if": 2300.0, "J_vehicle": 6056.0,

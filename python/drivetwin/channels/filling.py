@@ -74,11 +74,13 @@ class FillingSettings:
     """Most periods tried [count]."""
     chance: float = 1e-9
     """Probability from which on chance may have made a line of the spectrum of bends."""
-    exact: float = 0.1
-    """Misfit relative to that of instants half a period away, below which the record is
+    exact: float = 0.01
+    """Contrast of the misfit to that of instants half a period away, below which the record is
     reproduced whatever its rounding: that of untouched channels is near one."""
+    plain: float = 0.1
+    """Contrast of a raster that was found, below which no other is tried."""
     significant: float = 0.85
-    """Such a misfit where rounding alone explains it ..."""
+    """Such a contrast where rounding alone explains the misfit ..."""
     significant_between: float = 0.7
     """... and where the knots lie between samples: their raster was searched for the least ..."""
     as_good: float = 1.2
@@ -123,8 +125,9 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
         return None
     for part in _list_windows(time, values):
         found = _find_in_window(time[part], values[part])
-        if found is not None:
-            return _extend_filling(time, values, found)
+        filling = None if found is None else _extend_filling(time, values, found)
+        if filling is not None:
+            return filling
     return None
 
 
@@ -161,7 +164,7 @@ def _find_in_window(time: FloatArray, values: FloatArray) -> KnotFit | Filling |
             if good:
                 break
         passed += good
-        if any(one.misfit < FILLING.exact * one.misfit_between for one in passed):
+        if any(one.contrast < FILLING.plain for one in passed):
             break
     if not passed:
         return find_uneven_knots(time, values)
@@ -239,9 +242,9 @@ def _snap_period(period: float) -> float:
 def _is_reproduced(fit: KnotFit, values: FloatArray) -> bool:
     """Return True if the knots explain the record, and instants half a period away do not."""
     significant = FILLING.significant if fit.on_grid else FILLING.significant_between
-    if not fit.misfit < significant * fit.misfit_between:
+    if not fit.contrast < significant:
         return False
-    if fit.misfit < FILLING.exact * fit.misfit_between:
+    if fit.contrast < FILLING.exact:
         return True
     step = estimate_lattice(values)
     explained = fit.misfit**2 < FILLING.rounding * step**2 / 12.0
@@ -268,8 +271,13 @@ def estimate_lattice(values: FloatArray) -> float:
     return step if float(np.quantile(off, 0.9)) < 0.05 else 0.0
 
 
-def _extend_filling(time: FloatArray, values: FloatArray, found: KnotFit | Filling) -> Filling:
-    """Return the knots of the whole record; `found` are those of a window."""
+def _extend_filling(
+    time: FloatArray, values: FloatArray, found: KnotFit | Filling
+) -> Filling | None:
+    """Return the knots of the whole record; `found` are those of a window.
+
+    None where the rest of the record does not bear them out.
+    """
     if isinstance(found, Filling):
         return find_uneven_knots(time, values) or found
     step = float(np.median(np.diff(time)))
@@ -279,7 +287,7 @@ def _extend_filling(time: FloatArray, values: FloatArray, found: KnotFit | Filli
         at = np.abs(time - found.start - count * found.period) < 0.5 * step
         return Filling(kind, found.period, step, time[at], values[at])
     knots, heights = extend_knots(time, values, found)
-    return Filling(kind, found.period, step, knots, heights)
+    return Filling(kind, found.period, step, knots, heights) if knots.size else None
 
 
 def find_uneven_knots(time: FloatArray, values: FloatArray) -> Filling | None:

@@ -23,6 +23,8 @@ _CONTRAST = 0.9
 """Least misfit of these relative to the largest that suggests knots."""
 _ENDS = 4
 """Periods at each end where an interpolant depends on samples outside the record [count]."""
+_BLOCKS = 32
+"""Parts of a record that are compared one by one [count]."""
 
 
 class Interpolant(StrEnum):
@@ -40,7 +42,9 @@ class KnotFit:
     """Knots at `start` + k·`period` [s], the record's `values` (m,) there, and misfits.
 
     `misfit` is the root mean square of record minus interpolant, `misfit_between` the same with
-    knots half a period later. `on_grid` where each knot is a sample of the record.
+    knots half a period later, and `contrast` the median of their ratio over parts of the record:
+    a few steps of a smooth signal that fall on knots leave it near one. `on_grid` where each knot
+    is a sample of the record.
     """
 
     start: float
@@ -49,7 +53,27 @@ class KnotFit:
     values: FloatArray
     misfit: float
     misfit_between: float
+    contrast: float
     on_grid: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Misfit:
+    """Record minus interpolant `left` (n,), NaN where none is counted; root mean square `size`."""
+
+    left: FloatArray
+    size: float
+
+    def compare(self, other: _Misfit) -> float:
+        """Return the median ratio of misfits over parts of the record, this one to `other`."""
+        ratios = []
+        for ours, theirs in zip(
+            np.array_split(self.left, _BLOCKS), np.array_split(other.left, _BLOCKS), strict=True
+        ):
+            left, right = ours[np.isfinite(ours)], theirs[np.isfinite(theirs)]
+            if left.size and right.size and right.any():
+                ratios.append(np.sqrt(np.mean(left**2) / np.mean(right**2)))
+        return float(np.median(ratios)) if ratios else 1.0
 
 
 def fit_on_grid(
@@ -80,27 +104,29 @@ def fit_on_grid(
         return None
     # A cubic one shows where the knots are also by lines, which are fast.
     lines = [
-        _compute_grid_misfit(values, first, samples, Interpolant.LINEAR) for first in range(samples)
+        _compute_grid_misfit(values, first, samples, Interpolant.LINEAR).size
+        for first in range(samples)
     ]
     firsts = np.argsort(lines)[: samples if samples < _FEW else _FEW]
     misfits = {int(k): _compute_grid_misfit(values, int(k), samples, interpolant) for k in firsts}
-    first = min(misfits, key=lambda one: misfits[one])
+    first = min(misfits, key=lambda one: misfits[one].size)
     between = _compute_grid_misfit(values, (first + samples // 2) % samples, samples, interpolant)
     return KnotFit(
         start=float(time[first]),
         period=samples * step,
         interpolant=interpolant,
         values=values[first::samples],
-        misfit=misfits[first],
-        misfit_between=between,
+        misfit=misfits[first].size,
+        misfit_between=between.size,
+        contrast=misfits[first].compare(between),
         on_grid=True,
     )
 
 
 def _compute_grid_misfit(
     values: FloatArray, first: int, samples: int, interpolant: Interpolant
-) -> float:
-    """Compute the root mean square between every `samples`-th value, interpolated, and the rest."""
+) -> _Misfit:
+    """Compare every `samples`-th value, interpolated, with the rest of the record."""
     index = np.arange(values.size, dtype=float)
     if interpolant is Interpolant.HERMITE:
         knots = index[first::samples]
@@ -110,7 +136,9 @@ def _compute_grid_misfit(
     inner = index[low:high]
     between = (inner - first) % samples != 0
     modelled = _make_interpolant(at, values[first::samples], interpolant)(inner)
-    return float(np.sqrt(np.mean((values[low:high] - modelled)[between] ** 2)))
+    left = np.full(values.size, np.nan)
+    left[low:high][between] = (values[low:high] - modelled)[between]
+    return _Misfit(left, float(np.sqrt(np.nanmean(left**2))))
 
 
 def _make_interpolant(
@@ -122,9 +150,11 @@ def _make_interpolant(
 
     if interpolant is Interpolant.SPLINE:
         return CubicSpline(at, values)
-    if interpolant is Interpolant.PCHIP:
-        return PchipInterpolator(at, values)
-    return Akima1DInterpolator(at, values, method="makima")
+    # Slopes of numbers next to zero overflow on the way to a slope of zero.
+    with np.errstate(all="ignore"):
+        if interpolant is Interpolant.PCHIP:
+            return PchipInterpolator(at, values)
+        return Akima1DInterpolator(at, values, method="makima")
 
 
 def fit_off_grid(
@@ -145,7 +175,16 @@ def fit_off_grid(
         return None
     heights, misfit = _fit_spline(time, values, knots, interpolant)
     _, between = _fit_spline(time, values, knots + 0.5 * period, interpolant)
-    return KnotFit(start, period, interpolant, heights, misfit, between, on_grid=False)
+    return KnotFit(
+        start=start,
+        period=period,
+        interpolant=interpolant,
+        values=heights,
+        misfit=misfit.size,
+        misfit_between=between.size,
+        contrast=misfit.compare(between),
+        on_grid=False,
+    )
 
 
 def place_knots(time: FloatArray, start: float, period: float) -> FloatArray:
@@ -171,7 +210,7 @@ def refine_raster(
         knots = place_knots(time[part], start, period)
         if knots.size < 2 * _ENDS:
             return np.inf
-        return _fit_spline(time[part], values[part], knots, interpolant)[1]
+        return _fit_spline(time[part], values[part], knots, interpolant)[1].size
 
     starts = start + period * np.arange(_PHASES) / _PHASES
     misfits = [compute_misfit(one, period, short) for one in starts]
@@ -200,10 +239,11 @@ def refine_raster(
 
 def _fit_spline(
     time: FloatArray, values: FloatArray, knots: FloatArray, interpolant: Interpolant
-) -> tuple[FloatArray, float]:
+) -> tuple[FloatArray, _Misfit]:
     """Fit a spline with these knots; return its values there and the misfit per freedom."""
     from scipy.interpolate import make_lsq_spline
 
+    none = _Misfit(np.full(time.size, np.nan), np.inf)
     inside = (time >= knots[0]) & (time <= knots[-1])
     x, y = time[inside], values[inside]
     order = 1 if interpolant is Interpolant.LINEAR else 3
@@ -212,15 +252,19 @@ def _fit_spline(
     try:
         spline = make_lsq_spline(x, y, grid, order)
     except (ValueError, np.linalg.LinAlgError):  # a piece without samples
-        return np.empty(0), np.inf
+        return np.empty(0), none
     freedom = x.size - (grid.size - order - 1)
     if freedom < 0.1 * x.size:
-        return np.empty(0), np.inf
+        return np.empty(0), none
     left = y - spline(x)
     edge = _ENDS * max(int(x.size / knots.size), 1)
-    part = left[edge:-edge] if left.size > 4 * edge else left
-    misfit = float(np.sqrt(np.mean(part**2) * x.size / freedom))
-    return np.asarray(spline(np.clip(knots, x[0], x[-1]))), misfit
+    if left.size > 4 * edge:
+        left[:edge] = left[-edge:] = np.nan
+    left *= np.sqrt(x.size / freedom)
+    whole = none.left
+    whole[inside] = left
+    heights = np.asarray(spline(np.clip(knots, x[0], x[-1])))
+    return heights, _Misfit(whole, float(np.sqrt(np.nanmean(left**2))))
 
 
 def extend_knots(
@@ -229,7 +273,7 @@ def extend_knots(
     """Return instants [s] (m,) and values (m,) of the knots of a whole record.
 
     From the window of `fit` the raster is followed both ways, as the clocks of sender and logger
-    drift apart. Stretches without enough samples have no knots.
+    drift apart. Stretches without enough samples have no knots; both are empty where all are such.
     """
     reach = _ENDS * fit.period
     length = max(_SHORT * float(np.median(np.diff(time))), 4.0 * reach)
@@ -253,7 +297,7 @@ def extend_knots(
             inner = (knots >= low) & (knots < high)
             if heights.size:
                 found[k] = knots[inner], heights[inner]
-    parts = [found[k] for k in sorted(found)]
+    parts = [found[k] for k in sorted(found)] or [(np.empty(0), np.empty(0))]
     return np.concatenate([at for at, _ in parts]), np.concatenate([one for _, one in parts])
 
 
@@ -267,7 +311,7 @@ def _follow_start(time: FloatArray, values: FloatArray, start: float, fit: KnotF
         knots = place_knots(time, base + late, fit.period)
         if knots.size < 2 * _ENDS:
             return 0.0
-        return _fit_spline(time, values, knots, fit.interpolant)[1]
+        return _fit_spline(time, values, knots, fit.interpolant)[1].size
 
     reach = 0.1 * fit.period
     found = minimize_scalar(

@@ -86,6 +86,8 @@ def find_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | None:
     squares so that clock drift does not add up. Where stamps jitter or messages are lost, it is the
     distance that most changes have.
     """
+    if time.size <= MIN_CHANGES:
+        return None
     raster = _find_stamp_raster(time, values)
     if raster is None:
         period = estimate_repeat_period(time, values)
