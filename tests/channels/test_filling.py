@@ -147,6 +147,6 @@ def test_steps_on_a_raster_are_no_knots() -> None:
 )
 def test_any_record_ends_without_a_warning(values: list[float], start: int) -> None:
     """Records of rest, missing values and numbers at the ends of the scale."""
-    time = np.arange(start, start + len(values)) * STEP
+    time = STEP * np.arange(float(start), float(start + len(values)))
     found = find_filling(time, np.asarray(values))
     assert found is None or found.time.size == found.values.size
