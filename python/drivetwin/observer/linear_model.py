@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from drivetwin.estimation.likelihood.noise.linear_response import (
     build_output_row,
     build_slip_row,
-    compute_exponential,
+    compute_exponentials,
 )
 from drivetwin.observer.result import FloatArray
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement
@@ -96,7 +96,7 @@ def build_linear_model(model: DualClutch, course: Course) -> Linear:
     rate[:, TORQUE_ERROR, TORQUE_ERROR] = -course.error_rate
     push = np.zeros((step.size, STATES))
     push[:, :SPEEDS] = np.einsum("kij,kj->ki", moving, known)
-    transition, mean = compute_exponential(rate * step[:, None, None])
+    transition, mean = compute_exponentials(rate * step[:, None, None])
     shaft = np.zeros(STATES)
     shaft[:4] = build_output_row(model, "output_torque")
     rows = {"output_torque": np.broadcast_to(shaft, (step.size, STATES))}

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import Output
+from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.optimize.objective import NormalEquations
 
@@ -32,6 +34,9 @@ class ColouredNoiseSettings:
 
 
 COLOURED_NOISE = ColouredNoiseSettings()
+
+_PROBED: WeakKeyDictionary[Whitener, dict[str, tuple[float, float]]] = WeakKeyDictionary()
+"""Result of the probes by weighting and name of the output: they do not depend on the residual."""
 
 
 def split_whitened(
@@ -93,7 +98,10 @@ def compute_slow_power(part: ShiftTerm, out: Output, rows: slice, white: FloatAr
     if means.size == 0:
         return 1.0
     power = float(np.mean(means**2))
-    usual, own = _by_probes(part, rows, _block(part.record.time[out.place]))
+    known = _PROBED.setdefault(part.weighting, {})
+    if out.name not in known:
+        known[out.name] = _by_probes(part, rows, _block(part.record.time[out.place]))
+    usual, own = known[out.name]
     if power < usual * (1.0 + COLOURED_NOISE.significant * np.sqrt(2.0 / means.size)):
         return 1.0
     return 1.0 + (power - usual) / own

@@ -44,6 +44,11 @@ class LikelihoodFit:
             anew = self.problem.update_weighting(self.point)
             return anew.cost(self.point) + anew.log_determinant
 
+    @cached_property
+    def noise_covariance(self) -> FloatArray:
+        """Covariance (p, p) of the unknowns from noise and slow errors."""
+        return compute_covariance(self.problem, self.normal, self.chi2)
+
 
 def compute_covariance(
     problem: LikelihoodObjective, normal: NormalEquations, chi2: float
@@ -68,7 +73,7 @@ def compute_variance_inflation(fit: LikelihoodFit, rows: FloatArray) -> float:
     """Compute the ratio of residual power, slow errors included, to sensor noise: the mean over
     the independent directions of the unknowns that `rows` (k, p) span."""
     covariance = rows @ invert_information(fit.normal.information) @ rows.T
-    spread = rows @ compute_covariance(fit.problem, fit.normal, fit.chi2) @ rows.T
+    spread = rows @ fit.noise_covariance @ rows.T
     scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
     inverse = np.linalg.pinv(covariance / scale, hermitian=True)
     return float(np.sum(inverse * (spread / scale))) / len(rows)

@@ -15,6 +15,7 @@ their correlation (structured total least squares; Van Huffel and Vandewalle 199
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -251,13 +252,12 @@ def _estimate_spurious_information(
     inverse = point.factor.solve(np.eye(point.residual.size))
     cross = np.zeros((size, point.residual.size, point.residual.size))
     own = np.zeros((size, size))
+    overlap = functools.cache(Quadrature.compute_overlap)  # terms of a channel share quadratures
     for t in terms:
         for p, (f, k) in t.slopes.items():
-            cross[p] += t.sigma**2 * np.outer(f, t.factor) * k.compute_overlap(t.quadrature)
+            cross[p] += t.sigma**2 * np.outer(f, t.factor) * overlap(k, t.quadrature)
             for q, (g, h) in t.slopes.items():
-                own[p, q] += t.sigma**2 * float(
-                    np.sum(inverse * np.outer(f, g) * k.compute_overlap(h))
-                )
+                own[p, q] += t.sigma**2 * float(f @ (inverse * overlap(k, h)) @ g)
     shared = np.empty((size, size))
     for p, block in enumerate(cross):
         weighted = inverse @ block @ inverse

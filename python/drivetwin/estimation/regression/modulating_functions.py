@@ -64,7 +64,7 @@ def _compute_sample_weights(time: FloatArray) -> FloatArray:
     return weights
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Quadrature:
     """A sparse matrix (m, n): one weighted sum of a channel's samples per window."""
 

@@ -16,14 +16,11 @@ from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoi
 from drivetwin.estimation.likelihood.noise.linear_response import (
     STATES,
     LinearRates,
-    compute_exponential,
+    compute_exponentials,
     compute_rates,
     iterate_jumps,
 )
 from drivetwin.simulation.dual_clutch import DualClutch
-
-EQUAL = 1e-9
-"""Difference of the matrices of successive steps, over the largest entry, that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,29 +66,14 @@ def solve_extended(
 ) -> FloatArray:
     """Solve for the states of the driveline (N, 4) from the `start` (m,) of all states."""
     step = np.diff(at.run.time)
-    transition, mean = _compute_transitions(rates.matrix, step)
+    with np.errstate(over="ignore", invalid="ignore"):
+        transition, mean = compute_exponentials(rates.matrix * step[:, None, None])
     push = np.einsum("kij,kj->ki", mean, rates.drive * step[:, None])
     for k, jump in iterate_jumps(reduced, at.run):
         whole = np.eye(start.size)
         whole[:STATES, :STATES] = jump
         transition[k], push[k] = whole @ transition[k], whole @ push[k]
     return _propagate(transition, push, start)[:, :STATES]
-
-
-def _compute_transitions(matrix: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Compute the exponential of each step and its mean, (N-1, m, m) each.
-
-    Successive steps of equal matrix, as those with all elements locked, share one computation.
-    """
-    scaled = matrix * step[:, None, None]
-    change = np.max(np.abs(np.diff(scaled, axis=0)), axis=(1, 2))
-    first = np.concatenate([[True], change > EQUAL * np.max(np.abs(scaled))])
-    largest = float(np.max(np.sum(np.abs(scaled[first]), axis=2)))
-    doublings = max(3, int(np.ceil(np.log2(max(largest, 1.0)))) + 1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        transition, mean = compute_exponential(scaled[first], doublings)
-    place = np.cumsum(first) - 1
-    return transition[place], mean[place]
 
 
 def _propagate(transition: FloatArray, push: FloatArray, start: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_banded
+from scipy.linalg.lapack import dtbtrs
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
@@ -29,6 +29,10 @@ from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Trajector
 BoolArray = NDArray[np.bool_]
 
 STATES = 4
+_LEAST_DOUBLINGS = 3
+"""Doublings after a Taylor series of fourth order [count]."""
+_SAME = 1e-10
+"""Difference of successive rates over their size that is rounding of the stamps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,26 +73,20 @@ class LinearResponse:
         """Compute z (N, 4, q) for q changes `push` (N-1, 4, q) over the steps, from z = 0."""
         start = np.zeros((1, *push.shape[1:]))
         pushed = np.concatenate([start, push])
-        columns = pushed.reshape(-1, push.shape[-1])
-        try:
-            with np.errstate(over="ignore", invalid="ignore"):
-                z = solve_banded((2 * STATES - 1, 0), self._banded, columns, check_finite=False)
-        except np.linalg.LinAlgError:
-            return np.full_like(pushed, np.inf)
-        return np.asarray(z.reshape(pushed.shape))
+        return self._substitute(pushed.reshape(-1, push.shape[-1]), "N").reshape(pushed.shape)
 
     def propagate_adjoint(self, pull: FloatArray) -> FloatArray:
         """Apply the transpose of `propagate_columns`: (N-1, 4, q) from weights `pull` (N, 4, q) on
         z.
         """
-        lower, count = self._banded, len(pull) * STATES
-        upper = np.zeros_like(lower)
-        for below, diagonal in enumerate(lower):
-            upper[-1 - below, below:] = diagonal[: count - below]
-        columns = pull.reshape(count, -1)
+        columns = pull.reshape(len(pull) * STATES, -1)
+        return self._substitute(columns, "T").reshape(pull.shape)[1:]
+
+    def _substitute(self, columns: FloatArray, way: str) -> FloatArray:
+        """Solve with the banded matrix of unit diagonal, or its transpose (`way` "T")."""
         with np.errstate(over="ignore", invalid="ignore"):
-            back = solve_banded((0, 2 * STATES - 1), upper, columns, check_finite=False)
-        return np.asarray(back.reshape(pull.shape)[1:])
+            found, _ = dtbtrs(self._banded, columns, uplo="L", trans=way, diag="U")
+        return np.asarray(found)
 
     def apply_torque_feedback(self, slope: FloatArray) -> LinearResponse:
         """The response where the engine torque follows the engine speed by `slope` (N-1,)
@@ -167,7 +165,7 @@ def linearise_run(model: DualClutch, run: Trajectory, record: ShiftRecord) -> Li
     step = np.diff(run.time)
     rates = compute_rates(model, run, record)
     with np.errstate(over="ignore", invalid="ignore"):
-        transition, mean = compute_exponential(rates.rate * step[:, None, None])
+        transition, mean = compute_exponentials(rates.rate * step[:, None, None])
     effect = mean @ rates.inverse * step[:, None, None]
     for k, jump in iterate_jumps(model, run):
         transition[k], effect[k] = jump @ transition[k], jump @ effect[k]
@@ -186,7 +184,24 @@ def build_output_row(model: DualClutch, name: str) -> FloatArray:
     return np.array(rows[name])
 
 
-def compute_exponential(matrix: FloatArray, doublings: int = 3) -> tuple[FloatArray, FloatArray]:
+def compute_exponentials(matrices: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Compute e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
+
+    Successive equal matrices share one computation: with all elements locked the rate is constant
+    and its steps differ by the rounding of the stamps.
+    """
+    flat = np.abs(matrices.reshape(len(matrices), -1))
+    changes = np.abs(np.diff(matrices.reshape(flat.shape), axis=0)).max(axis=1)
+    # Written so that a number that is not finite begins a new run.
+    starts = np.r_[True, ~(changes <= _SAME * flat[1:].max(axis=1))]
+    size = float(np.abs(matrices[starts]).sum(axis=2).max())
+    doublings = int(np.ceil(np.log2(max(size, 1.0)))) + 1 if np.isfinite(size) else 0
+    found, mean = compute_exponential(matrices[starts], max(doublings, _LEAST_DOUBLINGS))
+    run = np.cumsum(starts) - 1
+    return found[run], mean[run]
+
+
+def compute_exponential(matrix: FloatArray, doublings: int) -> tuple[FloatArray, FloatArray]:
     """Compute e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
 
     Taylor's series of M over 2^`doublings`, doubled so many times.

@@ -231,7 +231,8 @@ def _build_information(
     diagonal[:-1] += transition.transpose(0, 2, 1) @ through
     for out in record.outputs:
         row = build_output_row(model, out.name)
-        np.add.at(diagonal, out.centre, np.outer(row, row) / out.sigma**2)
+        seen = np.bincount(out.centre, minlength=count)
+        diagonal += seen[:, None, None] * (np.outer(row, row) / out.sigma**2)
     banded = np.zeros((2 * STATES, STATES * count))
     for i in range(STATES):
         for j in range(i + 1):
