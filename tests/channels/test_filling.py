@@ -87,17 +87,30 @@ def test_leaves_measured_samples_alone(seed: int, step: float, rate: int) -> Non
     assert find_filling(time, values) is None
 
 
-def test_finds_knots_of_messages_that_jitter() -> None:
+@pytest.mark.parametrize("decimals", [3, 6, 12])
+@pytest.mark.parametrize("apart", [(3.0, 5.0), (4.0, 9.0), (8.0, 12.0)])
+def test_finds_knots_of_messages_that_jitter(apart: tuple[float, float], decimals: int) -> None:
     """Messages arrive unevenly; lines meet where they arrived."""
-    rng = np.random.default_rng(3)
-    knots = np.arange(0.0, 5.0, 0.01) + rng.uniform(-2e-3, 2e-3, 500)
-    values = measure_speed(knots, 3)
+    rng = np.random.default_rng(1)
+    knots = np.cumsum(rng.uniform(*apart, 1700)) * STEP
+    knots = knots[knots < 5.0]
     time = np.arange(0.01, 4.9, STEP)
-    found = find_filling(time, np.interp(time, knots, values))
+    found = find_filling(time, np.round(np.interp(time, knots, measure_speed(knots, 3)), decimals))
     assert found is not None
     assert found.kind is FillKind.LINEAR
     nearest = np.abs(found.time[1:-1, np.newaxis] - knots).min(axis=1)
-    assert np.quantile(nearest, 0.95) < 1e-4
+    assert np.quantile(nearest, 0.95) < max(10.0**-decimals, 1e-12)
+
+
+def test_names_a_filling_without_lines() -> None:
+    """Of messages two to four rows apart too few straight parts are left to find the knots."""
+    rng = np.random.default_rng(4)
+    knots = np.cumsum(rng.uniform(2.0, 4.0, 1700)) * STEP
+    time = np.arange(0.01, 4.9, STEP)
+    found = find_filling(time, np.interp(time, knots, measure_speed(knots, 4)))
+    assert found is not None
+    assert found.kind is FillKind.UNKNOWN
+    assert found.time.size == 0
 
 
 def test_short_uneven_pieces_are_not_recognised() -> None:
@@ -107,6 +120,24 @@ def test_short_uneven_pieces_are_not_recognised() -> None:
     time = np.arange(0.01, 4.9, STEP)
     found = find_filling(time, np.interp(time, knots, measure_speed(knots, 4)))
     assert found is None
+
+
+@pytest.mark.parametrize("step", [0.5, 2.0])
+@pytest.mark.parametrize("rate", [1, 10])
+def test_rounding_makes_no_lines(step: float, rate: int) -> None:
+    """A measured channel that is rounded about as coarsely as it is noisy bends at few points."""
+    time = np.arange(0.0, 8.0, rate * STEP)
+    for seed, noise in enumerate((0.1, 0.3, 1.0)):
+        speed = measure_speed(time, seed, noise) + 5.0 * time**2
+        values = np.round(speed / step) * step
+        assert find_filling(time, values) is None
+
+
+def test_ramps_without_noise_are_not_filled() -> None:
+    """A simulated record with straight parts, curves and corners."""
+    time = np.arange(0.0, 6.0, STEP)
+    ramps = np.interp(time, np.arange(7.0), [0.0, 90.0, 50.0, 150.0, 150.0, 20.0, 60.0])
+    assert find_filling(time, ramps + np.where(time > 4.5, np.sin(9.0 * (time - 4.5)), 0.0)) is None
 
 
 def test_rest_is_not_filled() -> None:

@@ -17,6 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import find_true_runs
@@ -93,15 +94,25 @@ class FillingSettings:
     noise: float = 0.6
     """Least noise of the knots [rounding steps] for that. Below, rounding is the noise of the
     channel, and no filling can be seen behind it."""
-    gap: float = 10.0
-    """Least ratio of the bends at knots to those between them where knots are not periodic."""
     covered: float = 0.9
     """Least share of the record that straight lines of three samples cover."""
     share: float = 0.3
-    """Least share of samples without bend that shows such knots."""
+    """Least share of moving samples without bend that shows such knots."""
 
 
 FILLING = FillingSettings()
+
+_BENDS_OF_A_KNOT = 2
+"""Second differences of a record that a knot between two samples acts on [count]."""
+_ROUNDED_BENDS = 2.5
+"""Steps of rounding above which a second difference is no rounded straight line: it has up to two
+[count]."""
+_MANY_LINES = 0.05
+"""Straight parts over the samples from which a record is filled up."""
+_DEVIATION = 0.4
+"""Distance of samples from their line, over the bends that rounding makes: one step."""
+_ROUND_OFF = 1e-12
+"""Second differences over the largest value that are round-off of the interpolation."""
 
 
 def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
@@ -259,7 +270,7 @@ def estimate_lattice(values: FloatArray) -> float:
     The least change of the slope of a densely sampled signal is one step.
     """
     bends = np.abs(np.diff(values, 2))
-    floor = 1e-9 * float(np.abs(values).max(initial=0.0))
+    floor = 10.0 * _ROUND_OFF * float(np.abs(values).max(initial=0.0))
     bends = bends[bends > floor]
     if bends.size < FILLING.least_knots:
         return 0.0
@@ -294,18 +305,26 @@ def find_uneven_knots(time: FloatArray, values: FloatArray) -> Filling | None:
     """Find knots at uneven instants: messages that arrived with jitter, filled up linearly.
 
     Between knots lie at least three samples on a straight line; lines meet at the knots. Kind
-    UNKNOWN where bends are plainly of two sizes but the lines are too short.
+    UNKNOWN where many lines are shorter.
     """
-    bends = np.abs(np.diff(values, 2))
-    border = _split_bends(bends)
-    if border is None:
-        return None
     step = float(np.median(np.diff(time)))
-    lines = [_Line.fit(time, values, a, b + 2) for a, b in find_true_runs(bends <= border)]
-    covered = sum(one.end - one.first for one in lines)
-    if covered < FILLING.covered * time.size:
-        nothing = np.empty(0)
-        return Filling(FillKind.UNKNOWN, np.nan, step, nothing, nothing)
+    nothing = np.empty(0)
+    unknown = Filling(FillKind.UNKNOWN, np.nan, step, nothing, nothing)
+    bends, lattice = np.abs(np.diff(values, 2)), estimate_lattice(values)
+    # A rounded straight line has bends of up to two steps, another one those of round-off.
+    border = max(_ROUNDED_BENDS * lattice, _ROUND_OFF * float(np.abs(values).max()))
+    if not _has_straight_parts(values, bends, border):
+        return None
+    parts = find_true_runs(bends <= border)
+    if not _bends_at_points(bends > border):
+        # Nothing that is measured alternates between lines without noise and bends.
+        return unknown if lattice == 0.0 and len(parts) > _MANY_LINES * time.size else None
+    lines = [_Line.fit(time, values, a, b + 2) for a, b in parts]
+    straight = [one.measure_deviation(time, values) < _DEVIATION * border for one in lines]
+    if np.mean(straight) < FILLING.covered:
+        return None
+    if sum(one.end - one.first for one in lines) < FILLING.covered * time.size:
+        return unknown
     instants = [float(time[lines[0].first])]
     heights = [float(values[lines[0].first])]
     usual = float(np.median([one.stop - one.start for one in lines])) + step
@@ -322,17 +341,26 @@ def find_uneven_knots(time: FloatArray, values: FloatArray) -> Filling | None:
     return Filling(FillKind.LINEAR, float(np.median(np.diff(at))), step, at, np.asarray(heights))
 
 
-def _split_bends(bends: FloatArray) -> float | None:
-    """Return the border between bends at knots and those between; None if they are of one kind."""
-    largest = float(bends.max(initial=0.0))
-    least = bends[bends > 1e-12 * largest].min(initial=largest)
-    sizes = np.sort(np.maximum(bends, least))
-    low, high = int(FILLING.share * sizes.size), int(0.98 * sizes.size)
-    ratios = sizes[low + 1 : high] / sizes[low : high - 1]
-    if not ratios.size or ratios.max() < FILLING.gap or largest == 0.0:
-        return None
-    at = low + int(np.argmax(ratios))
-    return float(np.sqrt(sizes[at] * sizes[at + 1]))
+def _has_straight_parts(values: FloatArray, bends: FloatArray, border: float) -> bool:
+    """Return True if many bends are those of straight lines, and others are not.
+
+    Samples at rest have no bend whether they were measured or not, and do not count.
+    """
+    changes = np.diff(values) != 0.0
+    moving = bends[changes[1:] & changes[:-1]]
+    straight = np.count_nonzero(moving <= border)
+    return bool(FILLING.share * moving.size < straight < moving.size)
+
+
+def _bends_at_points(bent: NDArray[np.bool_]) -> bool:
+    """Return True if a record bends (n,) at single points: a knot lies at or between samples.
+
+    A measured record with straight parts, as a ramp of a noise-free speed, bends all along the
+    others.
+    """
+    lengths = np.array([end - first for first, end in find_true_runs(bent)])
+    few = lengths.size < FILLING.least_knots
+    return not few and float(np.mean(lengths <= _BENDS_OF_A_KNOT)) > FILLING.covered
 
 
 @dataclass(frozen=True)
@@ -353,6 +381,12 @@ class _Line:
         slope, level = np.polyfit(x, y, 1)
         ends = float(time[first]), float(time[end - 1])
         return cls(first, end, *ends, float(level), float(slope))
+
+    def measure_deviation(self, time: FloatArray, values: FloatArray) -> float:
+        """Return the largest distance of the samples from the line."""
+        part = slice(self.first, self.end)
+        line = self.level + self.slope * (time[part] - self.start)
+        return float(np.abs(values[part] - line).max())
 
     def compute(self, time: float) -> float:
         """Compute the height of the line at `time` [s]."""
