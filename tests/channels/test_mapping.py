@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from drivetwin.channels.mapping import ChannelSpec, infer_candidates, normalise_name, resolve_roles
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping import infer_candidates, normalise_name, resolve_roles
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.roles import NEEDED
 from drivetwin.errors import MappingError, MissingChannelError

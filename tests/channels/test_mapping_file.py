@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_file import ByRole, ChannelTable, format_mapping, read_mapping
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.channels.roles import ROLES

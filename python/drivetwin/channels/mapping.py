@@ -8,32 +8,13 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from drivetwin._util.spelling import suggest_spelling
+from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.recall import recall_channels
 from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS
 from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.findings import Code, Finding, report
-
-
-@dataclass(frozen=True)
-class ChannelSpec:
-    """Conversion of a column to a role: sign·(scale·column + offset) in `unit`, then in SI.
-
-    `unit` overrides the unit of the file (None: unit of the file). `time_shift` [s] is added to
-    the time stamps. `group` chooses among columns of one name (None: the name is unique).
-    """
-
-    source: str
-    unit: str | None = None
-    sign: int = 1
-    scale: float = 1.0
-    offset: float = 0.0
-    time_shift: float = 0.0
-    group: str | None = None
-
-    def matches(self, column: Column) -> bool:
-        """Return True if the spec refers to this column."""
-        return column.name == self.source and self.group in (None, column.group)
 
 
 @dataclass(frozen=True)
@@ -179,21 +160,29 @@ def resolve_roles(
     needed: Iterable[str],
     file: str,
     sound: Iterable[str] | None = None,
+    remembered: Mapping[str, RememberedChannel] | None = None,
 ) -> Mapped:
     """Decide the column of every role from the `columns` of a file.
 
-    The `stated` specs take precedence; other roles are inferred. Raises MappingError
+    The `stated` specs take precedence, then those `remembered` of an earlier log, as far as the
+    file has their columns; other roles are inferred. Raises MappingError
     where a stated column does not exist or a role has several candidates (only a finding where the
     role is neither `needed` nor `sound`, by default all measured ones), MissingChannelError where a
     needed role and its stand-in have none.
     """
+    remembered = remembered or {}
     needed = frozenset(needed)
     measured = [*MEASURED, *map(make_pressure_role, elements)]
     strict = needed.union(measured if sound is None else sound)
     _refuse_unknown_elements(stated, elements, file)
     stated, findings = _drop_absent_optional(stated, columns, strict)
     channels = {role: _require_column(role, spec, columns, file) for role, spec in stated.items()}
-    free = [one for one in columns if not any(spec.matches(one) for spec in stated.values())]
+    free = select_free(columns, stated.values())
+    open_roles = {role: one for role, one in remembered.items() if role not in stated}
+    recalled, remarks = recall_channels(open_roles, free, elements)
+    channels |= recalled
+    findings += remarks
+    free = select_free(free, recalled.values())
     for role, candidates in infer_candidates(free, elements).items():
         if role in channels:
             continue
@@ -206,8 +195,8 @@ def resolve_roles(
             what = f"{role!r} may be any of the columns {named}"
             raise MappingError(what, _suggest_choice(role, candidates), Where(file=file))
         findings.append(report(Code.COLUMN_AMBIGUOUS, role=role, columns=named))
-    _refuse_double_use(channels, stated, file)
-    _refuse_absent(needed, channels, columns, file)
+    _refuse_double_use(channels, {*stated, *recalled}, file)
+    _refuse_absent(needed, channels, columns, file, remembered)
     order = [*ROLES, *(make_pressure_role(element) for element in elements)]
     without = [element for element in elements if make_pressure_role(element) not in channels]
     if without:
@@ -215,6 +204,12 @@ def resolve_roles(
     return Mapped(
         {role: channels[role] for role in order if role in channels}, findings=tuple(findings)
     )
+
+
+def select_free(columns: Iterable[Column], specs: Iterable[ChannelSpec]) -> list[Column]:
+    """Return the columns that none of the `specs` refers to."""
+    specs = tuple(specs)
+    return [one for one in columns if not any(spec.matches(one) for spec in specs)]
 
 
 def _drop_absent_optional(
@@ -267,6 +262,7 @@ def _refuse_absent(
     channels: Mapping[str, ChannelSpec],
     columns: Sequence[Column],
     file: str,
+    remembered: Mapping[str, RememberedChannel],
 ) -> None:
     order = [*ROLES, *sorted(role for role in needed if role not in ROLES)]
     absent = [
@@ -276,10 +272,16 @@ def _refuse_absent(
     ]
     if absent:
         silent = ", ".join(dict.fromkeys(column.name for column in columns if column.silent))
+        earlier = ", ".join(
+            f"{remembered[role].spec.source!r} for {role!r}"
+            for role in absent
+            if role in remembered
+        )
         raise MissingChannelError(
             f"no column for {' nor '.join(map(repr, absent))} among "
             f"{', '.join(dict.fromkeys(one.name for one in columns if not one.silent))}"
-            + (f"; without a value throughout: {silent}" if silent else ""),
+            + (f"; without a value throughout: {silent}" if silent else "")
+            + (f"; the twin was identified with {earlier}" if earlier else ""),
             _suggest_remedy(absent[0]),
             Where(file=file),
         )
@@ -330,7 +332,7 @@ def _require_column(
 
 
 def _refuse_double_use(
-    channels: Mapping[str, ChannelSpec], stated: Mapping[str, ChannelSpec], file: str
+    channels: Mapping[str, ChannelSpec], stated: Collection[str], file: str
 ) -> None:
     """A guessed column must not serve two roles, as with two elements of one number."""
     roles_of: dict[tuple[str, str | None], list[str]] = {}

@@ -11,7 +11,8 @@ import tomlkit
 from pydantic import Field
 
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
-from drivetwin.channels.mapping import ChannelSpec, Mapped
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.channels.roles import ROLES, get_quantity

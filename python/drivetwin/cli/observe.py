@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile, find_mapping
+from drivetwin.cli.arguments import (
+    ChannelsFile,
+    LogFile,
+    OptionalVehicleFile,
+    find_mapping,
+    load_twin_card,
+)
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -65,11 +71,10 @@ def observe(
     from drivetwin.observer.observe import estimate_torques
     from drivetwin.report.observer import render_observations
     from drivetwin.shifts.detect import require_shifts
-    from drivetwin.vehicle.card import load_card
 
     model = load_twin(twin)
     with show_step(f"reading {log.name}"):
-        card = model.build_card() if vehicle is None else load_card(vehicle)
+        card = load_twin_card(model, vehicle)
         recording = read_log(log, card, find_mapping(channels, log))
         shifts = require_shifts(recording, card)
     found, left_out = _observe_shifts(

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile, find_mapping
+from drivetwin.cli.arguments import (
+    ChannelsFile,
+    LogFile,
+    OptionalVehicleFile,
+    find_mapping,
+    load_twin_card,
+)
 from drivetwin.cli.output import (
     JsonFlag,
     print_findings,
@@ -68,13 +74,12 @@ def simulate(
     from drivetwin.logs.read import read_log
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.simulate_log import simulate_shift
-    from drivetwin.vehicle.card import load_card
 
     model = (
         load_twin(twin) if parameters is None else _apply_parameters(load_twin(twin), parameters)
     )
     with show_step(f"simulating {log.name}"):
-        card = model.build_card() if vehicle is None else load_card(vehicle)
+        card = load_twin_card(model, vehicle)
         recording = read_log(log, card, find_mapping(channels, log))
         shifts = require_shifts(recording, card)
         runs = [simulate_shift(model, recording, shift) for shift in shifts.shifts]

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.filling import Filling, FillKind, find_filling
-from drivetwin.channels.mapping import ChannelSpec, Mapped, infer_candidates, make_spec
+from drivetwin.channels.mapping import Mapped, infer_candidates, make_spec
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions

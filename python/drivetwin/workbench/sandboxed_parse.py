@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from drivetwin._util.process_limits import limit_memory
-from drivetwin.channels.mapping import ChannelSpec, Mapped
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.mapping_file import format_mapping, read_mapping
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.shiftlog import ShiftLog
