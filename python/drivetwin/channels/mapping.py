@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -12,6 +11,7 @@ from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.recall import recall_channels
+from drivetwin.channels.recognition import infer_candidates, prefer_filled
 from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS
 from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.findings import Code, Finding, report
@@ -19,138 +19,26 @@ from drivetwin.findings import Code, Finding, report
 
 @dataclass(frozen=True)
 class Mapped:
-    """Channel specs by role, how to read the file, and what was left out on purpose."""
+    """Channel specs by role, how to read the file, and what was left out on purpose.
+
+    `names` by role are the user's, by which columns are recognised beside the built-in names.
+    """
 
     channels: Mapping[str, ChannelSpec]
     options: ReadOptions = field(default_factory=ReadOptions)
     findings: tuple[Finding, ...] = ()
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
-_ENGINE = "mot|motor|eng|engine|verbrennungsmotor|vm"
-_TORQUE = "m|md|mom|moment|t|tq|trq|torque|drehmoment"
-_SPEED = "n|w|om|omega|spd|speed|drehzahl|drz|rpm"
-_INPUT = (
-    "inputshaft|inshaft|in|inp|input|ein|eing|eingang|eingangs|getrein|gearboxin|trb|turb|turbine|"
-    "turbinen|trnsinp|transinput"
-)
-_OUTPUT = (
-    "out|outp|output|ab|abtr|abtrieb|abtriebs|aus|ausgang|ausgangs|outshaft|outputshaft|"
-    "abtriebswelle|kard|kardan|cardan|prop|propshaft|gelenkwelle|gelenkwellen|tailshaft"
-)
-_GEARBOX = "(getr|getriebe|gbx|gearbox|trans|transmission|at)?"
-_WHEEL = (
-    "whl|wheel|wheels|rad|raeder|rd|hinterrad|antriebsrad|drivenwheel|drivenwheels|rearwheel|"
-    "rearwheels|rearaxle"
-)
-_BESIDE = "(can|bus|xcp|ecu|tcu|mess|meas)*"
-_SIDE = "(h|v|f|r)(l|r)|left|right|links|rechts"
-_AFTER = "(ist|act|actual|can|bus|xcp|mess|meas|value|val|mean|avg|mittel|ha|rear|nm|rpm|bar)*"
-_STATE = "(ist|act|actual|mess|meas|val|c|avg|mw)*"
+@dataclass(frozen=True)
+class Fallback:
+    """Sources of the roles that are not stated: channels of an earlier log, then names."""
+
+    remembered: Mapping[str, RememberedChannel] = field(default_factory=dict)
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
-def _make_either_order(thing: str, measure: str) -> str:
-    return f"{_GEARBOX}(({thing})({measure})|({measure}){_GEARBOX}({thing})){_STATE}"
-
-
-_NAMES: dict[str, str] = {
-    "engine_torque": f"{_make_either_order(_ENGINE, _TORQUE)}|te|me|engnettorque",
-    "output_torque": f"{_make_either_order(_OUTPUT, _TORQUE)}|to",
-    "input_speed": _make_either_order(_INPUT, _SPEED),
-    "engine_speed": f"{_make_either_order(_ENGINE, _SPEED)}|we|ne|omegae",
-    "output_speed": _make_either_order(_OUTPUT, _SPEED),
-    "wheel_speed": f"({_make_either_order(_WHEEL, _SPEED)}|ww)({_SIDE})?",
-    "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung|wert)?" + _STATE,
-    "gear": "(trans)?(current|act|actual|ist|n)?(gear|gang)(engaged)?" + _STATE,
-    "requested_gear": "(trans|getr|tcu)?(((selected|requested|request|req|desired|target|ziel|soll)"
-    "(gear|gang))|((gear|gang)(selected|requested|request|req|desired|target|ziel|soll)))",
-    "shift_in_process": "(trans|getr)?(shift|schaltung)(inprocess|active|flag|aktiv)" + _STATE,
-    "lockup_engaged": "(trans)?(torqueconverter|tc|wandler)?(lockup|luc|wk)(engaged|closed|zu)?"
-    + _STATE,
-}
-"""Names of each role, in the form of `plain`: without case, separators, umlauts. Where no column
-has one, names with a source before them or more words after them count."""
-
-_PRESSURE_WORD = "p|prs|pres|press|pressure|druck"
-_KIND_WORD = {
-    "brake": "b|br|brk|brake|bremse|brems",
-    "clutch": "c|k|cl|clu|clt|clutch|kup|kuppl|kupplung|kupplungs",
-}
-
-
-def normalise_name(name: str) -> str:
-    """Reduce a column name to letters and digits for comparison: `n_Ab [1/min]` -> `nab`."""
-    text = re.sub(r"\\.*$|\[[^\]]*\]", "", name.casefold())
-    for umlaut, letters in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("ß", "ss"), ("ω", "w")):
-        text = text.replace(umlaut, letters)
-    return re.sub(r"[^a-z0-9]", "", text)
-
-
-def infer_candidates(
-    columns: Sequence[Column], elements: Mapping[str, str]
-) -> dict[str, list[Column]]:
-    """Return the candidate columns of each role; `elements` gives the kind of each by name.
-
-    A column without any number, or from a strange sender, is a candidate only where no other is, a
-    silent one never.
-    """
-    columns = [column for column in columns if not column.silent]
-    found = {
-        role: _select_first_match(columns, (pattern, f"{_BESIDE}({pattern}){_AFTER}"))
-        for role, pattern in _NAMES.items()
-    }
-    for element, kind in elements.items():
-        found[make_pressure_role(element)] = _find_pressure_candidates(columns, element, kind)
-    return {
-        role: _drop_secondary(_drop_empty(candidates))
-        for role, candidates in found.items()
-        if candidates
-    }
-
-
-def _select_first_match(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
-    """Return the columns that match the first pattern of `forms` that matches any column.
-
-    The last part of a name like `log.EngTrq` counts only where no whole name has any.
-    """
-    forms = tuple(forms)
-    for part in (normalise_name, lambda name: normalise_name(re.split(r"[./]", name)[-1])):
-        for form in forms:
-            if found := [column for column in columns if re.fullmatch(form, part(column.name))]:
-                return found
-    return []
-
-
-def _drop_secondary(candidates: list[Column]) -> list[Column]:
-    return [column for column in candidates if not column.aside] or candidates
-
-
-def _drop_empty(candidates: list[Column]) -> list[Column]:
-    return [column for column in candidates if not column.empty] or candidates
-
-
-def _drop_abbreviations(words: str) -> str:
-    """Drop the abbreviations from a pattern of alternatives."""
-    return "|".join(word for word in words.split("|") if len(word) > 2)
-
-
-def _find_pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> list[Column]:
-    """Columns for an element: its full name or kind and number first, its bare number last."""
-    label = normalise_name(element)
-    digits = re.sub(r"\D", "", label)
-    forms = [f"({_PRESSURE_WORD})({label}){_STATE}|({label})({_PRESSURE_WORD}){_STATE}"]
-    if digits:
-        numbered = f"({_KIND_WORD[kind]})0*{digits}"
-        forms.append(
-            f"({_PRESSURE_WORD})({numbered}){_STATE}|({numbered})({_PRESSURE_WORD}){_STATE}"
-        )
-        # Compounds name kind and pressure before number or label, in whole words: no `Kp2`.
-        compound = (
-            f"({_drop_abbreviations(_KIND_WORD[kind])})({_drop_abbreviations(_PRESSURE_WORD)})"
-        )
-        forms.append(f"{compound}({label}|0*{digits}){_STATE}")
-        forms.append(f"({_PRESSURE_WORD})({_KIND_WORD[kind]})({label}){_STATE}")
-        forms.append(f"({_PRESSURE_WORD})0*{digits}{_STATE}")
-    return _select_first_match(columns, forms)
+_NO_FALLBACK = Fallback()
 
 
 def resolve_roles(
@@ -160,17 +48,16 @@ def resolve_roles(
     needed: Iterable[str],
     file: str,
     sound: Iterable[str] | None = None,
-    remembered: Mapping[str, RememberedChannel] | None = None,
+    fallback: Fallback = _NO_FALLBACK,
 ) -> Mapped:
     """Decide the column of every role from the `columns` of a file.
 
-    The `stated` specs take precedence, then those `remembered` of an earlier log, as far as the
-    file has their columns; other roles are inferred. Raises MappingError
-    where a stated column does not exist or a role has several candidates (only a finding where the
-    role is neither `needed` nor `sound`, by default all measured ones), MissingChannelError where a
-    needed role and its stand-in have none.
+    The `stated` specs take precedence, then those remembered of an earlier log, as far as the file
+    has their columns; other roles are inferred from names. Raises MappingError where a stated
+    column does not exist or a role has several candidates (only a finding where the role is neither
+    `needed` nor `sound`, by default all measured ones), MissingChannelError where a needed role and
+    its stand-in have none.
     """
-    remembered = remembered or {}
     needed = frozenset(needed)
     measured = [*MEASURED, *map(make_pressure_role, elements)]
     strict = needed.union(measured if sound is None else sound)
@@ -178,12 +65,12 @@ def resolve_roles(
     stated, findings = _drop_absent_optional(stated, columns, strict)
     channels = {role: _require_column(role, spec, columns, file) for role, spec in stated.items()}
     free = select_free(columns, stated.values())
-    open_roles = {role: one for role, one in remembered.items() if role not in stated}
+    open_roles = {role: one for role, one in fallback.remembered.items() if role not in stated}
     recalled, remarks = recall_channels(open_roles, free, elements)
     channels |= recalled
     findings += remarks
     free = select_free(free, recalled.values())
-    for role, candidates in infer_candidates(free, elements).items():
+    for role, candidates in infer_candidates(free, elements, fallback.names).items():
         if role in channels:
             continue
         if len(candidates) == 1:
@@ -196,7 +83,7 @@ def resolve_roles(
             raise MappingError(what, _suggest_choice(role, candidates), Where(file=file))
         findings.append(report(Code.COLUMN_AMBIGUOUS, role=role, columns=named))
     _refuse_double_use(channels, {*stated, *recalled}, file)
-    _refuse_absent(needed, channels, columns, file, remembered)
+    _refuse_absent(needed, channels, columns, file, fallback.remembered)
     order = [*ROLES, *(make_pressure_role(element) for element in elements)]
     without = [element for element in elements if make_pressure_role(element) not in channels]
     if without:
@@ -304,7 +191,7 @@ def _refuse_unknown_elements(
 def _require_column(
     role: str, spec: ChannelSpec, columns: Sequence[Column], file: str
 ) -> ChannelSpec:
-    found = _drop_empty([column for column in columns if spec.matches(column)])
+    found = prefer_filled([column for column in columns if spec.matches(column)])
     if len(found) == 1:
         return spec
     where = Where(file=file)

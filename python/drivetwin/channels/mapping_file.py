@@ -13,11 +13,12 @@ from pydantic import Field
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.name_table import normalise_name
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.channels.roles import ROLES, get_quantity
 from drivetwin.channels.units import list_first_spellings
-from drivetwin.errors import MappingError
+from drivetwin.errors import MappingError, Where
 
 Entry = TypeVar("Entry")
 
@@ -93,6 +94,7 @@ class MappingFile(StrictModel):
     time: TimeTable = TimeTable()
     bus: BusTable = BusTable()
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
+    names: ByRole[list[str]] = ByRole[list[str]]()
 
 
 def read_mapping(path: Path) -> Mapped:
@@ -110,7 +112,21 @@ def read_mapping(path: Path) -> Mapped:
         tuple(path.parent / name for name in file.bus.dbc), file.bus.reference_torque_Nm
     )
     time = TimeColumn(file.time.source, file.time.unit, file.time.simultaneous)
-    return Mapped(channels, ReadOptions(time, bus))
+    names = dict(file.names.iterate_roles())
+    _refuse_blank_names(names, path)
+    return Mapped(channels, ReadOptions(time, bus), names=names)
+
+
+def _refuse_blank_names(names: Mapping[str, list[str]], path: Path) -> None:
+    """Raise MappingError for a name without letters and digits, which nothing can match."""
+    for role, some in names.items():
+        for name in some:
+            if not normalise_name(name):
+                raise MappingError(
+                    f"names.{role} has {name!r}, which has no letter or digit from a to z",
+                    f"map the column by [channels.{role}] with its `source`",
+                    Where(file=str(path)),
+                )
 
 
 def format_mapping(

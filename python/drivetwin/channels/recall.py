@@ -10,6 +10,7 @@ from pathlib import Path
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
 from drivetwin.channels.pressure_roles import get_pressure_element
 from drivetwin.channels.read_options import BusOptions, Column, ReadOptions, TimeColumn
+from drivetwin.channels.recognition import prefer_filled
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import Where
 from drivetwin.findings import Code, Finding, report
@@ -31,7 +32,7 @@ def recall_channels(
     for role, channel in remembered.items():
         element = get_pressure_element(role)
         found = [one for one in columns if channel.spec.matches(one) and not one.silent]
-        found = [one for one in found if not one.empty] or found
+        found = prefer_filled(found)
         if len(found) != 1 or (element is not None and element not in elements):
             continue
         spec = specs[role] = _adapt_unit(channel, found[0])

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
-from drivetwin.channels.mapping import Mapped, resolve_roles
+from drivetwin.channels.mapping import Fallback, Mapped, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.recall import recall_options
@@ -137,8 +137,8 @@ def read_recording(
     kinds = {name: element.kind for name, element in elements.items()}
     specs = {**({} if card is None else card.channels), **stated.channels}
     needed, sound = frozenset(demands.needed), demands.sound
-    remembered = {} if card is None else card.remembered.channels
-    mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path), sound, remembered)
+    fallback = Fallback({} if card is None else card.remembered.channels, stated.names)
+    mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path), sound, fallback)
     strict = _select_strict_roles(mapped.channels, card, specs, needed, sound)
     _refuse_unitless(recording, mapped.channels, strict, str(path))
     findings = [report(Code.RECORDING, text=text) for text in recording.warnings]
