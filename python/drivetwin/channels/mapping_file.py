@@ -3,21 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Generic, Literal, TypeVar
 
-import tomlkit
 from pydantic import Field
 
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.name_table import normalise_name
-from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
-from drivetwin.channels.roles import ROLES, get_quantity
-from drivetwin.channels.units import list_first_spellings
+from drivetwin.channels.roles import ROLES
 from drivetwin.errors import MappingError, Where
 
 Entry = TypeVar("Entry")
@@ -127,70 +125,3 @@ def _refuse_blank_names(names: Mapping[str, list[str]], path: Path) -> None:
                     f"map the column by [channels.{role}] with its `source`",
                     Where(file=str(path)),
                 )
-
-
-def format_mapping(
-    channels: Mapping[str, ChannelSpec],
-    options: ReadOptions | None = None,
-    unitless: Collection[str] = (),
-) -> str:
-    """Return `channels` (by role) as a mapping file to edit.
-
-    `options` for the file as a whole stand before them, DBC files with their full path. Roles that
-    are `unitless` in the log get a line for their unit to be filled in.
-    """
-    document = tomlkit.document()
-    document.add(tomlkit.comment("Channel mapping: which column is what to the driveline."))
-    document.add(tomlkit.comment("value = sign * (scale * column + offset), in `unit`;"))
-    document.add(tomlkit.comment("time_shift_s is added to the time stamps of the channel."))
-    for name, entries in _format_options(options or ReadOptions()).items():
-        if entries:
-            document.add(name, tomlkit.item(entries))
-    tables = tomlkit.table(is_super_table=True)
-    pressures = tomlkit.table(is_super_table=True)
-    for role, spec in channels.items():
-        table = _format_table(spec, role if role in unitless else None)
-        element = get_pressure_element(role)
-        if element is None:
-            tables.add(role, table)
-        else:
-            pressures.add(element, table)
-    if pressures:
-        tables.add("pressure", pressures)
-    document.add("channels", tables)
-    return tomlkit.dumps(document)
-
-
-def _format_options(options: ReadOptions) -> dict[str, dict[str, object]]:
-    """The tables `[time]` and `[bus]`, without what is not stated."""
-    time = {
-        "source": options.time.source,
-        "unit": options.time.unit,
-        "simultaneous": options.time.simultaneous or None,
-    }
-    bus = {
-        "dbc": [str(path.resolve()) for path in options.bus.databases] or None,
-        "reference_torque_Nm": options.bus.reference_torque,
-    }
-    return {
-        name: {key: value for key, value in table.items() if value is not None}
-        for name, table in (("time", time), ("bus", bus))
-    }
-
-
-def _format_table(spec: ChannelSpec, unitless: str | None) -> tomlkit.items.Table:
-    """The table of a spec; with a line to fill in where `unitless` is the role it plays."""
-    table = tomlkit.table()
-    table.add("source", spec.source)
-    if spec.group is not None:
-        table.add("group", spec.group)
-    if spec.unit is not None:
-        table.add("unit", spec.unit)
-    elif unitless is not None:
-        usual = ", ".join(map(repr, list_first_spellings(get_quantity(unitless))))
-        table.add(tomlkit.comment(f'unit = "..."  # the log names none; one of {usual}'))
-    table.add("sign", spec.sign)
-    table.add("scale", spec.scale)
-    table.add("offset", spec.offset)
-    table.add("time_shift_s", spec.time_shift)
-    return table

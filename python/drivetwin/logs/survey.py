@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -53,6 +53,10 @@ class Survey:
     mapping: Mapping[str, ChannelSpec]
     options: ReadOptions
     notes: tuple[str, ...]
+    elements: tuple[str, ...] | None = None
+    """Shift elements of the card; None without a card."""
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Names of the user by role."""
 
     @property
     def unitless(self) -> frozenset[str]:
@@ -117,6 +121,8 @@ def survey_recording(
         columns=tuple(looked),
         mapping=mapping,
         options=stated.options,
+        elements=None if card is None else tuple(card.elements),
+        names=stated.names,
         notes=(*recording.warnings, *faults, *filled, *_describe_open_roles(candidates, card)),
     )
 
