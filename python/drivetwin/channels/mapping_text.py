@@ -36,10 +36,14 @@ class UnitGap:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A column that may play a role, and the reason; `spec` picks it."""
+    """A column that may play a role, and the reason; `spec` picks it.
+
+    `units` are proposed where the log names none.
+    """
 
     spec: ChannelSpec
     why: str
+    units: tuple[Proposal, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -55,12 +59,14 @@ class Stub:
 class Draft:
     """What a mapping leaves open: units by role, roles without a column, unit of the time.
 
-    With `accept` a unit that is the only proposal becomes an entry.
+    `time` is the gap of the time unit; without a readable time column `time_source` is open. With
+    `accept` a unit that is the only proposal becomes an entry.
     """
 
     units: Mapping[str, UnitGap] = field(default_factory=dict)
     stubs: tuple[Stub, ...] = ()
     time: UnitGap | None = None
+    time_source: bool = False
     remarks: tuple[str, ...] = ()
     accept: bool = False
 
@@ -86,6 +92,8 @@ def format_mapping(
             lines += ["", f"[{name}]", *(f"{key} = {text}" for key, text in entries.items())]
         if open_unit is not None:
             lines += _format_unit_gap(open_unit, draft.accept, ())
+    if draft.time_source and "source" not in _list_options(options or ReadOptions())["time"]:
+        lines += ["", "# [time]", '# source = "..."', '# unit = "s"']
     if names:
         lines += _format_names(names)
     for role, spec in channels.items():
@@ -177,4 +185,7 @@ def _format_stub(stub: Stub) -> list[str]:
         lines.append(f"{mark}source = {format_text(one.spec.source)}  # {escape_line(one.why)}")
         if one.spec.group is not None:
             lines.append(f"{mark}group = {format_text(one.spec.group)}")
+        for rank, unit in enumerate(one.units):
+            other = "# " if rank else ""
+            lines.append(f"{mark}{other}unit = {format_text(unit.unit)}  # proposal")
     return lines

@@ -15,6 +15,9 @@ from drivetwin.channels.units import find_unit
 from drivetwin.errors import Where
 from drivetwin.findings import Code, Finding, report
 
+RECALLED = frozenset((Code.UNITS_REMEMBERED, Code.CONVERSION_NOT_USED, Code.OPTIONS_REMEMBERED))
+"""Findings on what the twin's mapping decided."""
+
 
 def recall_channels(
     remembered: Mapping[str, RememberedChannel],

@@ -23,7 +23,7 @@ _USUAL: dict[str, Range] = {
     "engine_speed": (60.0, 900.0),
     "output_speed": (10.0, 900.0),
     "wheel_speed": (4.0, 130.0),
-    "throttle": (0.02, 1.1),
+    "throttle": (0.2, 1.1),
 }
 """Usual largest magnitude of each role over a log with shifts [SI]."""
 
@@ -43,6 +43,9 @@ _LEAST_PERCENT = 1.5
 
 _MOST_PERCENT_TORQUE = 130.0
 """Largest number of an engine torque up to which it may be in percent of the reference torque."""
+
+_MOST_REVERSED = 0.1
+"""Largest part of the values on the other side of zero of a speed, pressure or pedal."""
 
 _TIME_UNITS = ("s", "ms", "us")
 _USUAL_STEP: Range = (2e-5, 0.25)
@@ -71,7 +74,10 @@ def propose_units(role: str, span: Range | None) -> tuple[Proposal, ...]:
     if span is None or quantity not in _UNITS:
         return ()
     low, high = span
-    largest = max(abs(low), abs(high))
+    largest, smallest = max(abs(low), abs(high)), min(abs(low), abs(high))
+    both_signs = low < 0.0 < high and smallest > _MOST_REVERSED * largest
+    if both_signs and quantity is not Quantity.TORQUE:
+        return ()
     least, most = _USUAL_PRESSURE if quantity is Quantity.PRESSURE else _USUAL[role]
     factors = {unit: _get_factor(unit) for unit in _UNITS[quantity]}
     fitting = [unit for unit, factor in factors.items() if least <= factor * largest <= most]

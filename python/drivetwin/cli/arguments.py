@@ -47,7 +47,7 @@ def find_mapping(channels: Path | None, log: Path) -> Path | None:
     return beside if beside.is_file() else None
 
 
-def load_twin_card(twin: Twin, vehicle: Path | None) -> VehicleCard:
+def _load_twin_card(twin: Twin, vehicle: Path | None) -> VehicleCard:
     """Return the card in the file `vehicle`, without one the twin's own.
 
     Both remember the channel mapping of the twin.
@@ -57,6 +57,24 @@ def load_twin_card(twin: Twin, vehicle: Path | None) -> VehicleCard:
     if vehicle is None:
         return twin.build_card()
     return replace(load_card(vehicle), remembered=twin.mapping)
+
+
+def read_twin_log(
+    twin: Twin, log: Path, vehicle: Path | None, channels: Path | None
+) -> tuple[ShiftLog, VehicleCard]:
+    """Read a log for use with a twin, and the card in the file `vehicle` or the twin's own.
+
+    Units and options that come from the twin are shown. Raises the typed errors of the readers.
+    """
+    from drivetwin.channels.recall import RECALLED
+    from drivetwin.cli.output import show_findings, show_step
+    from drivetwin.logs.read import read_log
+
+    card = _load_twin_card(twin, vehicle)
+    with show_step(f"reading {log.name}"):
+        recording = read_log(log, card, find_mapping(channels, log))
+    show_findings(one for one in recording.findings if one.code in RECALLED)
+    return recording, card
 
 
 def load_inputs(log: Path, vehicle: Path, channels: Path | None) -> tuple[ShiftLog, VehicleCard]:

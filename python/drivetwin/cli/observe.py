@@ -14,8 +14,7 @@ from drivetwin.cli.arguments import (
     ChannelsFile,
     LogFile,
     OptionalVehicleFile,
-    find_mapping,
-    load_twin_card,
+    read_twin_log,
 )
 from drivetwin.cli.output import (
     JsonFlag,
@@ -67,16 +66,13 @@ def observe(
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.files.twin_conversion import load_twin
-    from drivetwin.logs.read import read_log
     from drivetwin.observer.observe import estimate_torques
     from drivetwin.report.observer import render_observations
     from drivetwin.shifts.detect import require_shifts
 
     model = load_twin(twin)
-    with show_step(f"reading {log.name}"):
-        card = load_twin_card(model, vehicle)
-        recording = read_log(log, card, find_mapping(channels, log))
-        shifts = require_shifts(recording, card)
+    recording, card = read_twin_log(model, log, vehicle, channels)
+    shifts = require_shifts(recording, card)
     found, left_out = _observe_shifts(
         shifts.shifts, lambda shift: estimate_torques(model, recording, shift, by), by
     )

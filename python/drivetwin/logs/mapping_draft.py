@@ -64,7 +64,8 @@ def draft_unread(elements: tuple[str, ...] | None, mapped: Collection[str], why:
     """
     roles = [one for one in _list_roles(elements) if one not in mapped]
     remarks = (f"The log cannot be read: {why}", *(() if elements is not None else (_NO_CARD,)))
-    return Draft(stubs=tuple(Stub(one, _describe_role(one)) for one in roles), remarks=remarks)
+    stubs = tuple(Stub(one, _describe_role(one)) for one in roles)
+    return Draft(stubs=stubs, time_source=True, remarks=remarks)
 
 
 def _list_roles(elements: tuple[str, ...] | None) -> list[str]:
@@ -112,10 +113,8 @@ def _list_stubs(survey: Survey) -> tuple[Stub, ...]:
         rivals = [one for one in survey.columns if role in one.roles]
         why = f"{role} may be any of several columns: choose one." if rivals else ""
         found = rivals or [one for one in free if not one.roles]
-        listed = [(one, _explain(one, role, named=bool(rivals))) for one in found]
-        candidates = tuple(
-            Candidate(_make_spec(one, survey), text) for one, text in listed if text is not None
-        )
+        listed = [_make_candidate(one, role, survey, named=bool(rivals)) for one in found]
+        candidates = tuple(one for one in listed if one is not None)
         stubs.append(Stub(role, why or _describe_role(role), candidates[:_MOST_CANDIDATES]))
     return tuple(stubs)
 
@@ -125,25 +124,30 @@ def _make_spec(column: Column, survey: Survey) -> ChannelSpec:
     return ChannelSpec(column.name, group=column.group if alike > 1 else None)
 
 
-def _explain(column: Column, role: str, *, named: bool) -> str | None:
-    """Return why a column may play a role; None if neither name, unit nor values suggest it."""
-    unit = (column.unit or "").strip()
+def _make_candidate(column: Column, role: str, survey: Survey, *, named: bool) -> Candidate | None:
+    """Return a column as candidate of a role; None if neither name, unit nor values suggest it."""
+    unit, quantity = (column.unit or "").strip(), get_quantity(role)
     span = "no numbers" if column.range is None else "{:.4g} to {:.4g}".format(*column.range)
-    text = f"{span} {unit}".strip()
-    if named:
-        return text
+    text, spec = f"{span} {unit}".strip(), _make_spec(column, survey)
+    units = () if unit else propose_units(role, column.range)
     hints = find_hints([LogColumn(column.name)], role)
     if hints:
-        return f"{text}; {hints[column.name]}"
-    quantity = get_quantity(role)
-    known = find_unit(unit) if unit else None
-    if known is not None and quantity is not Quantity.STATE:
-        return text if known.quantity is quantity else None
-    if unit or column.range is None:
-        return None
+        return Candidate(spec, f"{text}; {hints[column.name]}")
+    if named:
+        return Candidate(spec, text, units)
+    if unit:
+        known = find_unit(unit)
+        fits = known is not None and known.quantity is quantity
+        return Candidate(spec, text) if fits and quantity is not Quantity.STATE else None
     if quantity is Quantity.STATE:
-        low, high = column.range
-        whole = low == round(low) and high == round(high)
-        return text if whole and -_MOST_STATE <= low < high <= _MOST_STATE else None
-    units = [one.unit for one in propose_units(role, column.range)]
-    return f"{text}, usual in {' or '.join(units)}" if units else None
+        return Candidate(spec, text) if _can_be_state(column) else None
+    return Candidate(spec, text, units) if units else None
+
+
+def _can_be_state(column: Column) -> bool:
+    """Return True if the limits of the values are small whole numbers, as of gears and flags."""
+    if column.range is None:
+        return False
+    low, high = column.range
+    whole = low == round(low) and high == round(high)
+    return whole and -_MOST_STATE <= low < high <= _MOST_STATE
