@@ -22,12 +22,14 @@ class Mapped:
     """Channel specs by role, how to read the file, and what was left out on purpose.
 
     `names` by role are the user's, by which columns are recognised beside the built-in names.
+    `absent` are the columns by role that an earlier log had and this one has not.
     """
 
     channels: Mapping[str, ChannelSpec]
     options: ReadOptions = field(default_factory=ReadOptions)
     findings: tuple[Finding, ...] = ()
     names: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    absent: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -82,14 +84,17 @@ def resolve_roles(
             what = f"{role!r} may be any of the columns {named}"
             raise MappingError(what, _suggest_choice(role, candidates), Where(file=file))
         findings.append(report(Code.COLUMN_AMBIGUOUS, role=role, columns=named))
+    absent = {role: one.spec.source for role, one in open_roles.items() if role not in channels}
     _refuse_double_use(channels, {*stated, *recalled}, file)
-    _refuse_absent(needed, channels, columns, file, fallback.remembered)
+    _refuse_absent(needed, channels, columns, file, absent)
     order = [*ROLES, *(make_pressure_role(element) for element in elements)]
     without = [element for element in elements if make_pressure_role(element) not in channels]
     if without:
         findings.append(report(Code.NO_PRESSURE, elements=", ".join(without)))
     return Mapped(
-        {role: channels[role] for role in order if role in channels}, findings=tuple(findings)
+        {role: channels[role] for role in order if role in channels},
+        findings=tuple(findings),
+        absent=absent,
     )
 
 
@@ -149,7 +154,7 @@ def _refuse_absent(
     channels: Mapping[str, ChannelSpec],
     columns: Sequence[Column],
     file: str,
-    remembered: Mapping[str, RememberedChannel],
+    earlier: Mapping[str, str],
 ) -> None:
     order = [*ROLES, *sorted(role for role in needed if role not in ROLES)]
     absent = [
@@ -159,16 +164,12 @@ def _refuse_absent(
     ]
     if absent:
         silent = ", ".join(dict.fromkeys(column.name for column in columns if column.silent))
-        earlier = ", ".join(
-            f"{remembered[role].spec.source!r} for {role!r}"
-            for role in absent
-            if role in remembered
-        )
+        had = ", ".join(f"{earlier[role]!r} for {role!r}" for role in absent if role in earlier)
         raise MissingChannelError(
             f"no column for {' nor '.join(map(repr, absent))} among "
             f"{', '.join(dict.fromkeys(one.name for one in columns if not one.silent))}"
             + (f"; without a value throughout: {silent}" if silent else "")
-            + (f"; the twin was identified with {earlier}" if earlier else ""),
+            + (f"; the twin was identified with {had}" if had else ""),
             _suggest_remedy(absent[0]),
             Where(file=file),
         )

@@ -170,7 +170,8 @@ class ShiftLog(DisplayMixin):
     """All mapped channels of one recording, by role.
 
     `source` is its file and `sha256` that of the content, `mappings` the SHA-256 by name of the
-    mapping file that it was read with, `mapping` the specs and options that were used.
+    mapping file that it was read with, `mapping` the specs and options that were used. `absent` are
+    the columns by role of a twin's log that this log does not have.
     Raises TimeError where the time of a channel reaches beyond LATEST, as stamps from 1970 do.
     """
 
@@ -180,6 +181,7 @@ class ShiftLog(DisplayMixin):
     findings: tuple[Finding, ...] = ()
     mappings: Mapping[str, str] = field(default_factory=dict)
     mapping: RememberedMapping = field(default_factory=RememberedMapping)
+    absent: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def inputs(self) -> dict[str, str]:
@@ -203,8 +205,10 @@ class ShiftLog(DisplayMixin):
         try:
             return self.channels[role]
         except KeyError:
+            had = self.absent.get(role)
             raise MissingChannelError(
-                f"no channel for {role!r}; the log maps {', '.join(sorted(self.channels))}",
+                f"no channel for {role!r}; the log maps {', '.join(sorted(self.channels))}"
+                + ("" if had is None else f"; the twin was identified with {had!r} for {role!r}"),
                 "name it in a channel mapping file (--channels) or in [channels] of the card",
                 Where(file=self.source),
             ) from None

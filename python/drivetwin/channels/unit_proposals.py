@@ -54,10 +54,11 @@ _USUAL_STEP: Range = (2e-5, 0.25)
 
 @dataclass(frozen=True)
 class Proposal:
-    """A unit that makes the values usual, and the reason in words."""
+    """A unit that makes the values usual, and the reason in words; 0 is the most usual `rank`."""
 
     unit: str
     reason: str
+    rank: int = 0
 
 
 def propose_units(role: str, span: Range | None) -> tuple[Proposal, ...]:
@@ -83,9 +84,11 @@ def propose_units(role: str, span: Range | None) -> tuple[Proposal, ...]:
     fitting = [unit for unit, factor in factors.items() if least <= factor * largest <= most]
     if quantity is Quantity.FRACTION:
         fitting = [one for one in fitting if (one == "%") == (largest > _LEAST_PERCENT)]
+    unusual = [unit for unit in factors if unit not in fitting]
     return tuple(
-        Proposal(unit, _explain(role, span, unit, [one for one in factors if one not in fitting]))
-        for unit in fitting
+        Proposal(unit, _explain(role, span, unit, unusual), rank)
+        for rank, unit in enumerate(factors)
+        if unit in fitting
     )
 
 

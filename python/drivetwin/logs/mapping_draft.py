@@ -114,8 +114,8 @@ def _list_stubs(survey: Survey) -> tuple[Stub, ...]:
         why = f"{role} may be any of several columns: choose one." if rivals else ""
         found = rivals or [one for one in free if not one.roles]
         listed = [_make_candidate(one, role, survey, named=bool(rivals)) for one in found]
-        candidates = tuple(one for one in listed if one is not None)
-        stubs.append(Stub(role, why or _describe_role(role), candidates[:_MOST_CANDIDATES]))
+        candidates = sorted((one for one in listed if one is not None), key=_rank_candidate)
+        stubs.append(Stub(role, why or _describe_role(role), tuple(candidates[:_MOST_CANDIDATES])))
     return tuple(stubs)
 
 
@@ -142,6 +142,11 @@ def _make_candidate(column: Column, role: str, survey: Survey, *, named: bool) -
     if quantity is Quantity.STATE:
         return Candidate(spec, text) if _can_be_state(column) else None
     return Candidate(spec, text, units) if units else None
+
+
+def _rank_candidate(candidate: Candidate) -> int:
+    """Return the rank of the best unit; the unit that a log names is the best."""
+    return 1 + candidate.units[0].rank if candidate.units else 0
 
 
 def _can_be_state(column: Column) -> bool:

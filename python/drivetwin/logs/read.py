@@ -175,6 +175,7 @@ def read_recording(
         _compute_digest(path),
         tuple(dict.fromkeys(findings)),
         mapping=RememberedMapping(used, stated.options),
+        absent=mapped.absent,
     )
 
 
