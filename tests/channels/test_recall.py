@@ -53,6 +53,12 @@ def test_the_unit_that_a_log_names_is_never_overridden_by_another_log(before: st
     assert codes == [Code.CONVERSION_NOT_USED]
 
 
+def test_a_log_that_names_the_unit_that_was_asserted_is_read_as_it_is() -> None:
+    assert recall(remember("n1", None, unit="1/min"), "rpm") == (ChannelSpec("n1"), [])
+    _, codes = recall(remember("n1", None, unit="rpm", scale=0.125), "rpm")
+    assert codes == [Code.CONVERSION_NOT_USED]
+
+
 def test_what_a_mapping_states_comes_before_the_twin_and_the_twin_before_names() -> None:
     columns = [Column(name, "rpm") for name in ("a", "b", "n_ein", "n_ab")]
     twin = Fallback({"input_speed": remember("a"), "output_speed": remember("b")})

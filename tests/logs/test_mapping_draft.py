@@ -3,17 +3,23 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from drivetwin.channels.mapping import Mapped
-from drivetwin.channels.mapping_text import Draft, Stub
+from drivetwin.channels.mapping import Mapped, resolve_roles
+from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.mapping_text import Draft, Stub, format_mapping
 from drivetwin.logs.mapping_draft import draft_mapping, draft_unread
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.survey import survey_recording
 from tests.report.sample import card
 
+NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20)
 Columns = Sequence[tuple[str, str | None, float, float]]
 
 
@@ -86,6 +92,28 @@ def test_a_related_quantity_is_told_with_the_reason() -> None:
     found = draft([("ActualEngPercentTorque", "%", 0, 100)])
     (one,) = stub(found, "engine_torque").candidates
     assert "reference torque" in one.why
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(NAMES, min_size=1, max_size=5, unique=True))
+def test_any_columns_give_a_mapping_that_selects_the_same_channels(
+    tmp_path: Path, added: list[str]
+) -> None:
+    names = dict.fromkeys(("n_ein", "p_B2", *added))
+    time = np.linspace(0.0, 1.0, 101)
+    log = RawLog(tuple(RawChannel(name, None, time, 1400.0 + time) for name in names))
+    survey = survey_recording(log, "log.csv", card(), Mapped({}))
+    path = tmp_path / "channels.toml"
+    text = format_mapping(survey.mapping, draft=draft_mapping(survey, accept=True))
+    path.write_text(text, encoding="utf-8", newline="")
+    tomllib.loads(text)
+    stated = read_mapping(path).channels
+    elements = {"B2": "brake", "B3": "brake"}
+    used = resolve_roles(log.columns, stated, elements, (), "log.csv", ()).channels
+    assert {role: one.source for role, one in used.items()} == {
+        role: one.source for role, one in survey.mapping.items()
+    }
+    assert all(line.isprintable() for line in text.split("\n"))
 
 
 def test_without_a_card_the_pressures_are_said_to_be_unknown() -> None:

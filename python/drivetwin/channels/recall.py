@@ -63,12 +63,13 @@ def _adapt_unit(channel: RememberedChannel, column: Column) -> ChannelSpec:
 def _report_other_conversion(
     role: str, channel: RememberedChannel, column: Column
 ) -> list[Finding]:
-    """Return a finding where the file names another unit than the one that was converted."""
-    stated, twin = (column.unit or "").strip(), channel.file_unit or ""
-    if not stated:
+    """Return a finding where the unit that the file names replaces another conversion."""
+    stated, spec = (column.unit or "").strip(), channel.spec
+    is_plain = (spec.scale, spec.offset) == (1.0, 0.0)
+    if not stated or (is_plain and _is_same_unit(stated, spec.unit or channel.file_unit)):
         return []
-    place = Where(channel=column.name)
-    return [report(Code.CONVERSION_NOT_USED, "", place, role=role, stated=stated, twin=twin)]
+    before, place = channel.file_unit or "none", Where(channel=column.name)
+    return [report(Code.CONVERSION_NOT_USED, "", place, role=role, stated=stated, twin=before)]
 
 
 def _is_same_unit(named: str, before: str | None) -> bool:

@@ -166,6 +166,7 @@ def _write_unread(
     elements = None if card is None else tuple(card.elements)
     draft = draft_unread(elements, stated.channels, fault.what)
     write_text(path, format_mapping(stated.channels, stated.options, stated.names, draft))
+    print_line(f"wrote {path}", stderr=True)
 
 
 def _read_as_mapped_log(
