@@ -12,7 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin._util.toml import MAX_DEPTH, MAX_SIZE, MAX_TEXT, parse_toml
+from drivetwin._util.toml import (
+    MAX_DEPTH,
+    MAX_SIZE,
+    MAX_TEXT,
+    format_key,
+    format_text,
+    parse_toml,
+)
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError
@@ -80,3 +87,10 @@ def test_the_limits_themselves_are_allowed() -> None:
     }
     depth = MAX_DEPTH - 1
     assert parse_toml(f"x = {depth * '['}{depth * ']'}")
+
+
+@given(st.text(st.characters(exclude_categories=["Cs"])))
+def test_written_texts_and_keys_read_back(text: str) -> None:
+    line = f"{format_key(text)} = {format_text(text)}"
+    assert line.isprintable()
+    assert parse_toml(line) == {text: text}

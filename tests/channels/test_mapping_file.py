@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.mapping import ChannelSpec
-from drivetwin.channels.mapping_file import ByRole, ChannelTable, format_mapping, read_mapping
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping_file import ByRole, ChannelTable, read_mapping
+from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.channels.roles import ROLES
 from drivetwin.errors import MappingError
@@ -69,12 +70,3 @@ def test_all_faults_are_told_with_their_keys(tmp_path: Path) -> None:
 def test_a_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(MappingError, match="cannot read the file"):
         read_mapping(tmp_path / "none.toml")
-
-
-def test_a_unit_that_the_log_does_not_name_has_a_line_to_fill_in(tmp_path: Path) -> None:
-    path = tmp_path / "map.toml"
-    text = format_mapping({"input_speed": ChannelSpec("n")}, unitless={"input_speed"})
-    path.write_text(text, encoding="utf-8")
-    assert read_mapping(path).channels == {"input_speed": ChannelSpec("n")}
-    path.write_text(text.replace('# unit = "..."', 'unit = "rpm"'), encoding="utf-8")
-    assert read_mapping(path).channels == {"input_speed": ChannelSpec("n", "rpm")}

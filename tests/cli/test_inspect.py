@@ -171,3 +171,68 @@ def test_the_commands_that_refuse_a_log_are_named(
     assert main(["inspect", *arguments]) == 0
     assert words in " ".join(capsys.readouterr().out.split())
     assert main(["shifts", *arguments]) == (2 if column == "SpdIn" else 0)
+
+
+def _unnamed(log: Path, path: Path) -> Path:
+    """A copy of the log without the row of units, as MATLAB's `writetable` makes it."""
+    head, _, *rows = log.read_text().splitlines()
+    path.write_text("\n".join([head, *rows]) + "\n")
+    return path
+
+
+def test_a_log_without_units_is_described_and_its_mapping_proposes_them(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, path = _unnamed(bench_files.log, tmp_path / "log.csv"), tmp_path / "map.toml"
+    arguments = [str(log), "--vehicle", str(bench_files.card), "--write-mapping", str(path)]
+    found = _inspect(capsys, *arguments)
+    assert len(found["columns"]) == 7
+    assert "time column" in found["refusal"]["what"]
+    mapping = read_mapping(path)
+    assert all(one.unit is None for one in mapping.channels.values())
+    assert mapping.options.time.unit is None
+    assert main(["inspect", *arguments, "--accept-proposals"]) == 0
+    accepted = read_mapping(path)
+    units = {role: one.unit for role, one in accepted.channels.items()}
+    assert units == {
+        "engine_torque": "Nm", "output_torque": "Nm", "input_speed": "rpm", "output_speed": "rpm",
+        "wheel_speed": "rpm", "pressure.B2": "bar", "pressure.B3": "bar",
+    }  # fmt: skip
+    assert accepted.options.time.unit == "s"
+    checked = ["shifts", str(log), "--vehicle", str(bench_files.card), "--channels", str(path)]
+    assert main(checked) == 0
+
+
+def test_a_mapping_is_written_of_a_log_that_cannot_be_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, path = tmp_path / "log.csv", tmp_path / "map.toml"
+    rows = "".join(f"{0.01 * k:.2f},{k % 7},{k}\n" for k in range(100))
+    log.write_text(f"a,b,c\nV,Nm,rpm\n{rows}")
+    assert main(["inspect", str(log), "--write-mapping", str(path)]) == 2
+    assert "no time column" in capsys.readouterr().err
+    text = path.read_text()
+    assert "# [channels.engine_torque]" in text
+    opened = text.replace('# [time]\n# source = "..."\n# unit = "s"', '[time]\nsource = "a"')
+    path.write_text(opened.replace('source = "a"', 'source = "a"\nunit = "s"'))
+    assert main(["inspect", str(log), "--channels", str(path)]) == 0
+
+
+def test_proposals_need_a_file_to_be_written_to(
+    bench_files: Files, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["inspect", str(bench_files.log), "--accept-proposals"]) == 2
+    assert "--write-mapping" in capsys.readouterr().err
+
+
+def test_names_of_the_user_are_recognised_and_kept(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, path = tmp_path / "log.csv", tmp_path / "channels.toml"
+    log.write_text(bench_files.log.read_text().replace("EngTrq", "Kanal 7", 1))
+    path.write_text('[names]\nengine_torque = ["kanal_7"]\n')
+    arguments = [str(log), "--vehicle", str(bench_files.card), "--write-mapping", str(path)]
+    columns = {one["name"]: one for one in _inspect(capsys, *arguments)["columns"]}
+    assert columns["Kanal 7"]["roles"] == ["engine_torque"]
+    assert read_mapping(path).names == {"engine_torque": ["kanal_7"]}
+    assert read_mapping(path).channels["engine_torque"].source == "Kanal 7"

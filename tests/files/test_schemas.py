@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from drivetwin.channels.mapping import ChannelSpec
-from drivetwin.channels.mapping_file import format_mapping
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.export.parameters.json_file import format_json
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.files.result_file import ResultFile

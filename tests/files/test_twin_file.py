@@ -3,15 +3,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import tomlkit
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
+from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
+from drivetwin.channels.read_options import BusOptions, ReadOptions
 from drivetwin.errors import ResultFileError
 from drivetwin.files.twin_conversion import load_twin, save_twin
 from drivetwin.twin.build import build_twin
+from drivetwin.twin.twin import Twin
 from tests.report.sample import card, identification
 
 
@@ -59,3 +65,33 @@ def test_a_misspelt_name_is_told(tmp_path: Path, table: str, old: str, new: str,
     path.write_text(tomlkit.dumps(document), encoding="utf-8")
     with pytest.raises(ResultFileError, match=says):
         load_twin(path)
+
+
+NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20)
+
+
+def make_twin(mapping: RememberedMapping) -> Twin:
+    return replace(build_twin(identification(), card()), mapping=mapping)
+
+
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(NAMES, NAMES, NAMES)
+def test_channels_of_any_name_read_back(tmp_path: Path, one: str, two: str, three: str) -> None:
+    mapping = RememberedMapping(
+        {
+            "gear": RememberedChannel(ChannelSpec(one, two, group=three), one),
+            f"pressure.{two}": RememberedChannel(ChannelSpec(three)),
+        }
+    )
+    save_twin(tmp_path / "twin.toml", make_twin(mapping))
+    assert load_twin(tmp_path / "twin.toml").mapping == mapping
+
+
+def test_of_a_dbc_file_the_name_alone_counts(tmp_path: Path) -> None:
+    path = tmp_path / "twin.toml"
+    options = ReadOptions(bus=BusOptions((Path("/somewhere/else/bus.dbc"),)))
+    save_twin(path, make_twin(RememberedMapping(options=options)))
+    assert "somewhere" not in path.read_text(encoding="utf-8")
+    hostile = path.read_text(encoding="utf-8").replace("bus.dbc", "../../bus.dbc")
+    path.write_text(hostile, encoding="utf-8")
+    assert load_twin(path).mapping.options.bus.databases == (Path("bus.dbc"),)

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
+from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.files.twin_conversion import load_twin, save_twin
@@ -232,7 +233,9 @@ def test_covariance_is_total(twin: Twin) -> None:
 
 def test_the_card_it_carries_reads_a_log_as_the_vehicles_own(twin: Twin, tmp_path: Path) -> None:
     spec = ChannelSpec("TQ_OUT", unit="N*m", sign=-1, group="fast")
-    save_twin(tmp_path / "twin.toml", replace(twin, channels={"output_torque": spec}))
+    options = ReadOptions(TimeColumn("clk", "ms"), BusOptions((Path("a.dbc"),), 1109.0))
+    mapping = RememberedMapping({"output_torque": RememberedChannel(spec, "Nm")}, options)
+    save_twin(tmp_path / "twin.toml", replace(twin, mapping=mapping))
     carried, given = load_twin(tmp_path / "twin.toml").build_card(), card()
     for gear in given.gears:
         assert carried.compute_ratio(gear.name) == pytest.approx(given.compute_ratio(gear.name))
@@ -241,7 +244,7 @@ def test_the_card_it_carries_reads_a_log_as_the_vehicles_own(twin: Twin, tmp_pat
         assert carried.get_clutch_ratios(name) == pytest.approx(given.get_clutch_ratios(name))
         assert carried.elements[name].kind == given.elements[name].kind
     assert carried.J_vehicle_range == given.J_vehicle_range
-    assert carried.channels == {"output_torque": spec}
+    assert carried.remembered == mapping
 
 
 def test_round_trip(twin: Twin, tmp_path: Path) -> None:

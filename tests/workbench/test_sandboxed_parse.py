@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.errors import InputError
 from drivetwin.logs.formats.parser_limits import BASE_TIME
 from drivetwin.workbench.jobs import call

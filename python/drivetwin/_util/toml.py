@@ -130,6 +130,22 @@ def raise_faults(faults: Iterable[Fault], error: type[InputError], file: str, re
         raise error(f"{len(found)} faults{listed}", remedy, Where(file=file))
 
 
+def format_text(text: str) -> str:
+    """Write a text as a basic string of TOML; characters without a glyph are escapes."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{"".join(one if one.isprintable() else _escape(one) for one in escaped)}"'
+
+
+def format_key(key: str) -> str:
+    """Write one part of a key, in quotes where TOML needs them."""
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else format_text(key)
+
+
+def _escape(char: str) -> str:
+    code = ord(char)
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
 def format_key_path(location: Iterable[int | str]) -> str:
     """Write a location as a key path: `("gears", 1, "ratio")` -> `gears[1].ratio`."""
     path = ""

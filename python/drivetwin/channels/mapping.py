@@ -3,173 +3,44 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from drivetwin._util.spelling import suggest_spelling
+from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.recall import recall_channels
+from drivetwin.channels.recognition import infer_candidates, prefer_filled
 from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS
 from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.findings import Code, Finding, report
 
 
 @dataclass(frozen=True)
-class ChannelSpec:
-    """Conversion of a column to a role: sign·(scale·column + offset) in `unit`, then in SI.
-
-    `unit` overrides the unit of the file (None: unit of the file). `time_shift` [s] is added to
-    the time stamps. `group` chooses among columns of one name (None: the name is unique).
-    """
-
-    source: str
-    unit: str | None = None
-    sign: int = 1
-    scale: float = 1.0
-    offset: float = 0.0
-    time_shift: float = 0.0
-    group: str | None = None
-
-    def matches(self, column: Column) -> bool:
-        """Return True if the spec refers to this column."""
-        return column.name == self.source and self.group in (None, column.group)
-
-
-@dataclass(frozen=True)
 class Mapped:
-    """Channel specs by role, how to read the file, and what was left out on purpose."""
+    """Channel specs by role, how to read the file, and what was left out on purpose.
+
+    `names` by role are the user's, by which columns are recognised beside the built-in names.
+    `absent` are the columns by role that an earlier log had and this one has not.
+    """
 
     channels: Mapping[str, ChannelSpec]
     options: ReadOptions = field(default_factory=ReadOptions)
     findings: tuple[Finding, ...] = ()
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    absent: Mapping[str, str] = field(default_factory=dict)
 
 
-_ENGINE = "mot|motor|eng|engine|verbrennungsmotor|vm"
-_TORQUE = "m|md|mom|moment|t|tq|trq|torque|drehmoment"
-_SPEED = "n|w|om|omega|spd|speed|drehzahl|drz|rpm"
-_INPUT = (
-    "inputshaft|inshaft|in|inp|input|ein|eing|eingang|eingangs|getrein|gearboxin|trb|turb|turbine|"
-    "turbinen|trnsinp|transinput"
-)
-_OUTPUT = (
-    "out|outp|output|ab|abtr|abtrieb|abtriebs|aus|ausgang|ausgangs|outshaft|outputshaft|"
-    "abtriebswelle|kard|kardan|cardan|prop|propshaft|gelenkwelle|gelenkwellen|tailshaft"
-)
-_GEARBOX = "(getr|getriebe|gbx|gearbox|trans|transmission|at)?"
-_WHEEL = (
-    "whl|wheel|wheels|rad|raeder|rd|hinterrad|antriebsrad|drivenwheel|drivenwheels|rearwheel|"
-    "rearwheels|rearaxle"
-)
-_BESIDE = "(can|bus|xcp|ecu|tcu|mess|meas)*"
-_SIDE = "(h|v|f|r)(l|r)|left|right|links|rechts"
-_AFTER = "(ist|act|actual|can|bus|xcp|mess|meas|value|val|mean|avg|mittel|ha|rear|nm|rpm|bar)*"
-_STATE = "(ist|act|actual|mess|meas|val|c|avg|mw)*"
+@dataclass(frozen=True)
+class Fallback:
+    """Sources of the roles that are not stated: channels of an earlier log, then names."""
+
+    remembered: Mapping[str, RememberedChannel] = field(default_factory=dict)
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
-def _make_either_order(thing: str, measure: str) -> str:
-    return f"{_GEARBOX}(({thing})({measure})|({measure}){_GEARBOX}({thing})){_STATE}"
-
-
-_NAMES: dict[str, str] = {
-    "engine_torque": f"{_make_either_order(_ENGINE, _TORQUE)}|te|me|engnettorque",
-    "output_torque": f"{_make_either_order(_OUTPUT, _TORQUE)}|to",
-    "input_speed": _make_either_order(_INPUT, _SPEED),
-    "engine_speed": f"{_make_either_order(_ENGINE, _SPEED)}|we|ne|omegae",
-    "output_speed": _make_either_order(_OUTPUT, _SPEED),
-    "wheel_speed": f"({_make_either_order(_WHEEL, _SPEED)}|ww)({_SIDE})?",
-    "throttle": "(accel|acc|gas|fahr)?(pedal|ped|throttle|pwg)((pos1?)|stellung|wert)?" + _STATE,
-    "gear": "(trans)?(current|act|actual|ist|n)?(gear|gang)(engaged)?" + _STATE,
-    "requested_gear": "(trans|getr|tcu)?(((selected|requested|request|req|desired|target|ziel|soll)"
-    "(gear|gang))|((gear|gang)(selected|requested|request|req|desired|target|ziel|soll)))",
-    "shift_in_process": "(trans|getr)?(shift|schaltung)(inprocess|active|flag|aktiv)" + _STATE,
-    "lockup_engaged": "(trans)?(torqueconverter|tc|wandler)?(lockup|luc|wk)(engaged|closed|zu)?"
-    + _STATE,
-}
-"""Names of each role, in the form of `plain`: without case, separators, umlauts. Where no column
-has one, names with a source before them or more words after them count."""
-
-_PRESSURE_WORD = "p|prs|pres|press|pressure|druck"
-_KIND_WORD = {
-    "brake": "b|br|brk|brake|bremse|brems",
-    "clutch": "c|k|cl|clu|clt|clutch|kup|kuppl|kupplung|kupplungs",
-}
-
-
-def normalise_name(name: str) -> str:
-    """Reduce a column name to letters and digits for comparison: `n_Ab [1/min]` -> `nab`."""
-    text = re.sub(r"\\.*$|\[[^\]]*\]", "", name.casefold())
-    for umlaut, letters in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("ß", "ss"), ("ω", "w")):
-        text = text.replace(umlaut, letters)
-    return re.sub(r"[^a-z0-9]", "", text)
-
-
-def infer_candidates(
-    columns: Sequence[Column], elements: Mapping[str, str]
-) -> dict[str, list[Column]]:
-    """Return the candidate columns of each role; `elements` gives the kind of each by name.
-
-    A column without any number, or from a strange sender, is a candidate only where no other is, a
-    silent one never.
-    """
-    columns = [column for column in columns if not column.silent]
-    found = {
-        role: _select_first_match(columns, (pattern, f"{_BESIDE}({pattern}){_AFTER}"))
-        for role, pattern in _NAMES.items()
-    }
-    for element, kind in elements.items():
-        found[make_pressure_role(element)] = _find_pressure_candidates(columns, element, kind)
-    return {
-        role: _drop_secondary(_drop_empty(candidates))
-        for role, candidates in found.items()
-        if candidates
-    }
-
-
-def _select_first_match(columns: Sequence[Column], forms: Iterable[str]) -> list[Column]:
-    """Return the columns that match the first pattern of `forms` that matches any column.
-
-    The last part of a name like `log.EngTrq` counts only where no whole name has any.
-    """
-    forms = tuple(forms)
-    for part in (normalise_name, lambda name: normalise_name(re.split(r"[./]", name)[-1])):
-        for form in forms:
-            if found := [column for column in columns if re.fullmatch(form, part(column.name))]:
-                return found
-    return []
-
-
-def _drop_secondary(candidates: list[Column]) -> list[Column]:
-    return [column for column in candidates if not column.aside] or candidates
-
-
-def _drop_empty(candidates: list[Column]) -> list[Column]:
-    return [column for column in candidates if not column.empty] or candidates
-
-
-def _drop_abbreviations(words: str) -> str:
-    """Drop the abbreviations from a pattern of alternatives."""
-    return "|".join(word for word in words.split("|") if len(word) > 2)
-
-
-def _find_pressure_candidates(columns: Sequence[Column], element: str, kind: str) -> list[Column]:
-    """Columns for an element: its full name or kind and number first, its bare number last."""
-    label = normalise_name(element)
-    digits = re.sub(r"\D", "", label)
-    forms = [f"({_PRESSURE_WORD})({label}){_STATE}|({label})({_PRESSURE_WORD}){_STATE}"]
-    if digits:
-        numbered = f"({_KIND_WORD[kind]})0*{digits}"
-        forms.append(
-            f"({_PRESSURE_WORD})({numbered}){_STATE}|({numbered})({_PRESSURE_WORD}){_STATE}"
-        )
-        # Compounds name kind and pressure before number or label, in whole words: no `Kp2`.
-        compound = (
-            f"({_drop_abbreviations(_KIND_WORD[kind])})({_drop_abbreviations(_PRESSURE_WORD)})"
-        )
-        forms.append(f"{compound}({label}|0*{digits}){_STATE}")
-        forms.append(f"({_PRESSURE_WORD})({_KIND_WORD[kind]})({label}){_STATE}")
-        forms.append(f"({_PRESSURE_WORD})0*{digits}{_STATE}")
-    return _select_first_match(columns, forms)
+_NO_FALLBACK = Fallback()
 
 
 def resolve_roles(
@@ -179,13 +50,15 @@ def resolve_roles(
     needed: Iterable[str],
     file: str,
     sound: Iterable[str] | None = None,
+    fallback: Fallback = _NO_FALLBACK,
 ) -> Mapped:
     """Decide the column of every role from the `columns` of a file.
 
-    The `stated` specs take precedence; other roles are inferred. Raises MappingError
-    where a stated column does not exist or a role has several candidates (only a finding where the
-    role is neither `needed` nor `sound`, by default all measured ones), MissingChannelError where a
-    needed role and its stand-in have none.
+    The `stated` specs take precedence, then those remembered of an earlier log, as far as the file
+    has their columns; other roles are inferred from names. Raises MappingError where a stated
+    column does not exist or a role has several candidates (only a finding where the role is neither
+    `needed` nor `sound`, by default all measured ones), MissingChannelError where a needed role and
+    its stand-in have none.
     """
     needed = frozenset(needed)
     measured = [*MEASURED, *map(make_pressure_role, elements)]
@@ -193,8 +66,13 @@ def resolve_roles(
     _refuse_unknown_elements(stated, elements, file)
     stated, findings = _drop_absent_optional(stated, columns, strict)
     channels = {role: _require_column(role, spec, columns, file) for role, spec in stated.items()}
-    free = [one for one in columns if not any(spec.matches(one) for spec in stated.values())]
-    for role, candidates in infer_candidates(free, elements).items():
+    free = select_free(columns, stated.values())
+    open_roles = {role: one for role, one in fallback.remembered.items() if role not in stated}
+    recalled, remarks = recall_channels(open_roles, free, elements)
+    channels |= recalled
+    findings += remarks
+    free = select_free(free, recalled.values())
+    for role, candidates in infer_candidates(free, elements, fallback.names).items():
         if role in channels:
             continue
         if len(candidates) == 1:
@@ -206,15 +84,24 @@ def resolve_roles(
             what = f"{role!r} may be any of the columns {named}"
             raise MappingError(what, _suggest_choice(role, candidates), Where(file=file))
         findings.append(report(Code.COLUMN_AMBIGUOUS, role=role, columns=named))
-    _refuse_double_use(channels, stated, file)
-    _refuse_absent(needed, channels, columns, file)
+    absent = {role: one.spec.source for role, one in open_roles.items() if role not in channels}
+    _refuse_double_use(channels, {*stated, *recalled}, file)
+    _refuse_absent(needed, channels, columns, file, absent)
     order = [*ROLES, *(make_pressure_role(element) for element in elements)]
     without = [element for element in elements if make_pressure_role(element) not in channels]
     if without:
         findings.append(report(Code.NO_PRESSURE, elements=", ".join(without)))
     return Mapped(
-        {role: channels[role] for role in order if role in channels}, findings=tuple(findings)
+        {role: channels[role] for role in order if role in channels},
+        findings=tuple(findings),
+        absent=absent,
     )
+
+
+def select_free(columns: Iterable[Column], specs: Iterable[ChannelSpec]) -> list[Column]:
+    """Return the columns that none of the `specs` refers to."""
+    specs = tuple(specs)
+    return [one for one in columns if not any(spec.matches(one) for spec in specs)]
 
 
 def _drop_absent_optional(
@@ -267,6 +154,7 @@ def _refuse_absent(
     channels: Mapping[str, ChannelSpec],
     columns: Sequence[Column],
     file: str,
+    earlier: Mapping[str, str],
 ) -> None:
     order = [*ROLES, *sorted(role for role in needed if role not in ROLES)]
     absent = [
@@ -276,10 +164,12 @@ def _refuse_absent(
     ]
     if absent:
         silent = ", ".join(dict.fromkeys(column.name for column in columns if column.silent))
+        had = ", ".join(f"{earlier[role]!r} for {role!r}" for role in absent if role in earlier)
         raise MissingChannelError(
             f"no column for {' nor '.join(map(repr, absent))} among "
             f"{', '.join(dict.fromkeys(one.name for one in columns if not one.silent))}"
-            + (f"; without a value throughout: {silent}" if silent else ""),
+            + (f"; without a value throughout: {silent}" if silent else "")
+            + (f"; the twin was identified with {had}" if had else ""),
             _suggest_remedy(absent[0]),
             Where(file=file),
         )
@@ -302,7 +192,7 @@ def _refuse_unknown_elements(
 def _require_column(
     role: str, spec: ChannelSpec, columns: Sequence[Column], file: str
 ) -> ChannelSpec:
-    found = _drop_empty([column for column in columns if spec.matches(column)])
+    found = prefer_filled([column for column in columns if spec.matches(column)])
     if len(found) == 1:
         return spec
     where = Where(file=file)
@@ -330,7 +220,7 @@ def _require_column(
 
 
 def _refuse_double_use(
-    channels: Mapping[str, ChannelSpec], stated: Mapping[str, ChannelSpec], file: str
+    channels: Mapping[str, ChannelSpec], stated: Collection[str], file: str
 ) -> None:
     """A guessed column must not serve two roles, as with two elements of one number."""
     roles_of: dict[tuple[str, str | None], list[str]] = {}

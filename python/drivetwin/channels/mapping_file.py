@@ -3,20 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Generic, Literal, TypeVar
 
-import tomlkit
 from pydantic import Field
 
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
-from drivetwin.channels.mapping import ChannelSpec, Mapped
-from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.name_table import normalise_name
+from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
-from drivetwin.channels.roles import ROLES, get_quantity
-from drivetwin.channels.units import list_first_spellings
-from drivetwin.errors import MappingError
+from drivetwin.channels.roles import ROLES
+from drivetwin.errors import MappingError, Where
 
 Entry = TypeVar("Entry")
 
@@ -92,6 +92,7 @@ class MappingFile(StrictModel):
     time: TimeTable = TimeTable()
     bus: BusTable = BusTable()
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
+    names: ByRole[list[str]] = ByRole[list[str]]()
 
 
 def read_mapping(path: Path) -> Mapped:
@@ -109,71 +110,18 @@ def read_mapping(path: Path) -> Mapped:
         tuple(path.parent / name for name in file.bus.dbc), file.bus.reference_torque_Nm
     )
     time = TimeColumn(file.time.source, file.time.unit, file.time.simultaneous)
-    return Mapped(channels, ReadOptions(time, bus))
+    names = dict(file.names.iterate_roles())
+    _refuse_blank_names(names, path)
+    return Mapped(channels, ReadOptions(time, bus), names=names)
 
 
-def format_mapping(
-    channels: Mapping[str, ChannelSpec],
-    options: ReadOptions | None = None,
-    unitless: Collection[str] = (),
-) -> str:
-    """Return `channels` (by role) as a mapping file to edit.
-
-    `options` for the file as a whole stand before them, DBC files with their full path. Roles that
-    are `unitless` in the log get a line for their unit to be filled in.
-    """
-    document = tomlkit.document()
-    document.add(tomlkit.comment("Channel mapping: which column is what to the driveline."))
-    document.add(tomlkit.comment("value = sign * (scale * column + offset), in `unit`;"))
-    document.add(tomlkit.comment("time_shift_s is added to the time stamps of the channel."))
-    for name, entries in _format_options(options or ReadOptions()).items():
-        if entries:
-            document.add(name, tomlkit.item(entries))
-    tables = tomlkit.table(is_super_table=True)
-    pressures = tomlkit.table(is_super_table=True)
-    for role, spec in channels.items():
-        table = _format_table(spec, role if role in unitless else None)
-        element = get_pressure_element(role)
-        if element is None:
-            tables.add(role, table)
-        else:
-            pressures.add(element, table)
-    if pressures:
-        tables.add("pressure", pressures)
-    document.add("channels", tables)
-    return tomlkit.dumps(document)
-
-
-def _format_options(options: ReadOptions) -> dict[str, dict[str, object]]:
-    """The tables `[time]` and `[bus]`, without what is not stated."""
-    time = {
-        "source": options.time.source,
-        "unit": options.time.unit,
-        "simultaneous": options.time.simultaneous or None,
-    }
-    bus = {
-        "dbc": [str(path.resolve()) for path in options.bus.databases] or None,
-        "reference_torque_Nm": options.bus.reference_torque,
-    }
-    return {
-        name: {key: value for key, value in table.items() if value is not None}
-        for name, table in (("time", time), ("bus", bus))
-    }
-
-
-def _format_table(spec: ChannelSpec, unitless: str | None) -> tomlkit.items.Table:
-    """The table of a spec; with a line to fill in where `unitless` is the role it plays."""
-    table = tomlkit.table()
-    table.add("source", spec.source)
-    if spec.group is not None:
-        table.add("group", spec.group)
-    if spec.unit is not None:
-        table.add("unit", spec.unit)
-    elif unitless is not None:
-        usual = ", ".join(map(repr, list_first_spellings(get_quantity(unitless))))
-        table.add(tomlkit.comment(f'unit = "..."  # the log names none; one of {usual}'))
-    table.add("sign", spec.sign)
-    table.add("scale", spec.scale)
-    table.add("offset", spec.offset)
-    table.add("time_shift_s", spec.time_shift)
-    return table
+def _refuse_blank_names(names: Mapping[str, list[str]], path: Path) -> None:
+    """Raise MappingError for a name without letters and digits, which nothing can match."""
+    for role, some in names.items():
+        for name in some:
+            if not normalise_name(name):
+                raise MappingError(
+                    f"names.{role} has {name!r}, which has no letter or digit from a to z",
+                    f"map the column by [channels.{role}] with its `source`",
+                    Where(file=str(path)),
+                )

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.rich_display import DisplayMixin
 from drivetwin._util.time_steps import compute_median_step
+from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.update_raster import UpdateRaster, find_raster, find_updates
@@ -169,7 +170,8 @@ class ShiftLog(DisplayMixin):
     """All mapped channels of one recording, by role.
 
     `source` is its file and `sha256` that of the content, `mappings` the SHA-256 by name of the
-    mapping file that it was read with.
+    mapping file that it was read with, `mapping` the specs and options that were used. `absent` are
+    the columns by role of a twin's log that this log does not have.
     Raises TimeError where the time of a channel reaches beyond LATEST, as stamps from 1970 do.
     """
 
@@ -178,6 +180,8 @@ class ShiftLog(DisplayMixin):
     sha256: str
     findings: tuple[Finding, ...] = ()
     mappings: Mapping[str, str] = field(default_factory=dict)
+    mapping: RememberedMapping = field(default_factory=RememberedMapping)
+    absent: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def inputs(self) -> dict[str, str]:
@@ -201,8 +205,10 @@ class ShiftLog(DisplayMixin):
         try:
             return self.channels[role]
         except KeyError:
+            had = self.absent.get(role)
             raise MissingChannelError(
-                f"no channel for {role!r}; the log maps {', '.join(sorted(self.channels))}",
+                f"no channel for {role!r}; the log maps {', '.join(sorted(self.channels))}"
+                + ("" if had is None else f"; the twin was identified with {had!r} for {role!r}"),
                 "name it in a channel mapping file (--channels) or in [channels] of the card",
                 Where(file=self.source),
             ) from None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, find_mapping
+from drivetwin.cli.arguments import ChannelsFile, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
 from drivetwin.errors import InputError
 from drivetwin.export.fmu.version import FmiVersion
@@ -134,11 +134,9 @@ def _load_subject(
     if log is None:
         return build_subject(twin, gears), None
     from drivetwin.export.fmu.measured import build_measured_subject
-    from drivetwin.logs.read import read_log
 
-    return build_measured_subject(
-        twin, read_log(log, twin.build_card(), find_mapping(channels, log)), gears
-    )
+    recording, _ = read_twin_log(twin, log, None, channels)
+    return build_measured_subject(twin, recording, gears)
 
 
 def parse_gears(text: str) -> tuple[str, str]:

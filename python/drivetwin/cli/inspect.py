@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,7 +22,7 @@ from drivetwin.cli.output import (
     show_step,
     to_error_document,
 )
-from drivetwin.errors import DrivetwinError
+from drivetwin.errors import DamagedChannelError, DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 
     from drivetwin.channels.mapping import Mapped
     from drivetwin.logs.raw import Recording
+    from drivetwin.logs.survey import Survey
     from drivetwin.vehicle.card import VehicleCard
 
 
@@ -42,8 +45,18 @@ def inspect(
     channels: ChannelsFile = None,
     write_mapping: Annotated[
         Path | None,
-        typer.Option(metavar="MAP", help="Write the mapping shown as a file to edit."),
+        typer.Option(
+            metavar="MAP",
+            help="Write the mapping shown as a file to edit; open points are comments.",
+        ),
     ] = None,
+    accept_proposals: Annotated[
+        bool,
+        typer.Option(
+            "--accept-proposals",
+            help="With --write-mapping: units that are the only proposal become entries.",
+        ),
+    ] = False,
     as_json: JsonFlag = False,
 ) -> None:
     """List the columns of a log: unit, rate, range, gaps, and the role each would play.
@@ -52,25 +65,34 @@ def inspect(
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.channels.mapping import Mapped
-    from drivetwin.channels.mapping_file import format_mapping, read_mapping
+    from drivetwin.channels.mapping_file import read_mapping
+    from drivetwin.channels.mapping_text import format_mapping
     from drivetwin.files.records import dump_findings
-    from drivetwin.logs.formats.detect import open_recording
-    from drivetwin.logs.raw import Remembered
-    from drivetwin.logs.survey import survey_recording
+    from drivetwin.logs.mapping_draft import draft_mapping
     from drivetwin.vehicle.card import load_card
 
+    if accept_proposals and write_mapping is None:
+        raise InputError(
+            "--accept-proposals has nothing to write them to", "add --write-mapping MAP"
+        )
     card = None if vehicle is None else load_card(vehicle)
     mapping = find_mapping(channels, log)
     stated = Mapped({}) if mapping is None else read_mapping(mapping)
-    with show_step(f"reading {log.name}"), open_recording(log, stated.options) as opened:
-        recording = Remembered(opened)
-        found = survey_recording(recording, str(log), card, stated)
-        findings, refusal, commands = _read_as_mapped_log(recording, log, card, stated)
+    with show_step(f"reading {log.name}"):
+        try:
+            seen = _look_at(log, card, stated)
+        except DrivetwinError as fault:
+            if write_mapping is not None:
+                _write_unread(write_mapping, card, stated, fault)
+            raise
+    found = seen.survey
     if write_mapping is not None:
-        write_text(write_mapping, format_mapping(found.mapping, found.options, found.unitless))
+        draft = draft_mapping(found, unnamed_step=seen.unnamed_step, accept=accept_proposals)
+        text = format_mapping(found.mapping, found.options, found.names, draft)
+        write_text(write_mapping, text)
     if as_json:
-        error = None if refusal is None else to_error_document(refusal)["error"]
-        remarks = {"findings": dump_findings(findings), "refusal": error}
+        error = None if seen.refusal is None else to_error_document(seen.refusal)["error"]
+        remarks = {"findings": dump_findings(seen.findings), "refusal": error}
         print_json(found.to_document() | remarks)
         return
     print_table(_build_table([column.to_document() for column in found.columns], log.name))
@@ -80,11 +102,71 @@ def inspect(
         print_paragraph(
             f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping"
         )
-    print_findings(one for one in findings if one.names.get("text") not in found.notes)
-    if refusal is not None:
-        print_paragraph(f"{commands} this log: {refusal}")
+    print_findings(one for one in seen.findings if one.names.get("text") not in found.notes)
+    if seen.refusal is not None:
+        print_paragraph(f"{seen.refused_by} this log: {seen.refusal}")
     if write_mapping is not None:
         print_line(f"wrote {write_mapping}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Survey of a log, findings of its use, and the error of the commands that refuse it.
+
+    `unnamed_step` is the time between samples if the log names no unit of time.
+    """
+
+    survey: Survey
+    findings: tuple[Finding, ...] = ()
+    refusal: DrivetwinError | None = None
+    refused_by: str = ""
+    unnamed_step: float | None = None
+
+
+def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
+    """Survey a log and read it as for use; a log without a unit of time is surveyed in seconds."""
+    from drivetwin.logs.formats.detect import open_recording
+    from drivetwin.logs.raw import Remembered
+    from drivetwin.logs.survey import survey_recording
+
+    try:
+        with open_recording(log, stated.options) as opened:
+            recording = Remembered(opened)
+            found = survey_recording(recording, str(log), card, stated)
+            return _Seen(found, *_read_as_mapped_log(recording, log, card, stated))
+    except UnitError as fault:
+        if stated.options.time.unit is not None:
+            raise
+        refusal = fault
+    seconds = replace(stated.options, time=replace(stated.options.time, unit="s"))
+    with open_recording(log, seconds) as opened:
+        recording = Remembered(opened)
+        found = survey_recording(recording, str(log), card, stated)
+        step = _find_step(recording)
+    return _Seen(found, (), refusal, "shifts and identify refuse", step)
+
+
+def _find_step(recording: Recording) -> float:
+    """Return the shortest time between samples of any column; 0 without samples."""
+    steps = []
+    for index in range(len(recording.columns)):
+        with suppress(DamagedChannelError):
+            steps.append(recording.load(index).step)
+    return min((step for step in steps if step is not None and step > 0.0), default=0.0)
+
+
+def _write_unread(
+    path: Path, card: VehicleCard | None, stated: Mapped, fault: DrivetwinError
+) -> None:
+    """Write a mapping with what is stated and stubs of all roles, for a log that cannot be read."""
+    from drivetwin._util.atomic import write_text
+    from drivetwin.channels.mapping_text import format_mapping
+    from drivetwin.logs.mapping_draft import draft_unread
+
+    elements = None if card is None else tuple(card.elements)
+    draft = draft_unread(elements, stated.channels, fault.what)
+    write_text(path, format_mapping(stated.channels, stated.options, stated.names, draft))
+    print_line(f"wrote {path}", stderr=True)
 
 
 def _read_as_mapped_log(

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile, find_mapping
+from drivetwin.cli.arguments import (
+    ChannelsFile,
+    LogFile,
+    OptionalVehicleFile,
+    read_twin_log,
+)
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -61,17 +66,13 @@ def observe(
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.files.twin_conversion import load_twin
-    from drivetwin.logs.read import read_log
     from drivetwin.observer.observe import estimate_torques
     from drivetwin.report.observer import render_observations
     from drivetwin.shifts.detect import require_shifts
-    from drivetwin.vehicle.card import load_card
 
     model = load_twin(twin)
-    with show_step(f"reading {log.name}"):
-        card = model.build_card() if vehicle is None else load_card(vehicle)
-        recording = read_log(log, card, find_mapping(channels, log))
-        shifts = require_shifts(recording, card)
+    recording, card = read_twin_log(model, log, vehicle, channels)
+    shifts = require_shifts(recording, card)
     found, left_out = _observe_shifts(
         shifts.shifts, lambda shift: estimate_torques(model, recording, shift, by), by
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, find_mapping
+from drivetwin.cli.arguments import ChannelsFile, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
 from drivetwin.errors import InputError, ResultFileError, Where
 
@@ -139,11 +139,9 @@ def _load_twin(source: Path) -> Twin:
 
 def _simulate_trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list[Trial]:
     """Every shift of a log by every twin; shifts are found with the ratios of the first."""
-    from drivetwin.logs.read import read_log
     from drivetwin.report.comparison import simulate_trials
     from drivetwin.shifts.detect import require_shifts
 
-    card = next(iter(twins.values())).build_card()
+    recording, card = read_twin_log(next(iter(twins.values())), log, None, channels)
     with show_step(f"simulating {log.name}"):
-        recording = read_log(log, card, find_mapping(channels, log))
         return simulate_trials(twins, recording, require_shifts(recording, card).shifts, log.name)

@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, OptionalVehicleFile, find_mapping
+from drivetwin.cli.arguments import (
+    ChannelsFile,
+    LogFile,
+    OptionalVehicleFile,
+    read_twin_log,
+)
 from drivetwin.cli.output import (
     JsonFlag,
     print_findings,
@@ -65,17 +70,14 @@ def simulate(
     from drivetwin.cli.tables import build_fit_table
     from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
     from drivetwin.files.twin_conversion import load_twin
-    from drivetwin.logs.read import read_log
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.simulate_log import simulate_shift
-    from drivetwin.vehicle.card import load_card
 
     model = (
         load_twin(twin) if parameters is None else _apply_parameters(load_twin(twin), parameters)
     )
+    recording, card = read_twin_log(model, log, vehicle, channels)
     with show_step(f"simulating {log.name}"):
-        card = model.build_card() if vehicle is None else load_card(vehicle)
-        recording = read_log(log, card, find_mapping(channels, log))
         shifts = require_shifts(recording, card)
         runs = [simulate_shift(model, recording, shift) for shift in shifts.shifts]
         if step_size is not None or input_kind is InputKind.HOLD:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from drivetwin._util.rich_display import DisplayMixin
+from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.result.estimate import (
     Estimate,
@@ -49,3 +50,5 @@ class Identification(DisplayMixin):
     correlation: FloatArray | None = None
     load: LoadLaw | None = None
     status: ModelStatus = ModelStatus.NOT_VALIDATED
+    mapping: RememberedMapping = field(default_factory=RememberedMapping)
+    """Channel mapping by which the log was read, of several the first."""

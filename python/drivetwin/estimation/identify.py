@@ -95,6 +95,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         correlation_ids=found.correlation_ids,
         correlation=found.correlation,
         load=found.load,
+        mapping=log.mapping,
     )
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.plain_values import to_plain_values
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import RememberedChannel, RememberedMapping
+from drivetwin.channels.read_options import ReadOptions
 from drivetwin.files.twin_file import TWIN_SCHEMA, TwinFile, read_twin_file, write_twin_file
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 
@@ -18,7 +19,7 @@ _TWIN_FIELDS = (
     *("settings", "assumptions"),
 )
 _GEARBOX_FIELDS = (
-    *("i_in", "final_drive", "gears", "J_prime_range", "J_vehicle_range", "channels", "converter"),
+    *("i_in", "final_drive", "gears", "J_prime_range", "J_vehicle_range", "converter"),
 )
 _KEYS = {
     "gain": "gain_m3", "P0": "P0_Pa", "drum": "drum_inertia_kgm2",
@@ -48,12 +49,33 @@ def build_twin_file(twin: Twin) -> TwinFile:
             "transmission": {
                 **_add_units({name: getattr(twin, name) for name in _GEARBOX_FIELDS}),
                 "elements": {name: _add_units(vars(one)) for name, one in twin.elements.items()},
+                "channels": {
+                    role: _flatten_channel(one) for role, one in twin.mapping.channels.items()
+                },
             },
+            "log": _flatten_options(twin.mapping.options),
             "load": twin.load_law,
             "covariance": None if twin.covariance is None else covariance,
             "settings": to_plain_values(dict(twin.settings)),
         }
     )
+
+
+def _flatten_channel(channel: RememberedChannel) -> dict[str, Any]:
+    return {**vars(channel.spec), "file_unit": channel.file_unit}
+
+
+def _flatten_options(options: ReadOptions) -> dict[str, Any] | None:
+    """Record of the options; None where none was stated."""
+    if options == ReadOptions():
+        return None
+    return {
+        "time_source": options.time.source,
+        "time_unit": options.time.unit,
+        "simultaneous": options.time.simultaneous,
+        "reference_torque_Nm": options.bus.reference_torque,
+        "dbc": [path.name for path in options.bus.databases],
+    }
 
 
 def _add_units(fields: dict[str, Any]) -> dict[str, Any]:
@@ -74,7 +96,10 @@ def restore_twin(content: TwinFile) -> Twin:
                 name: TwinElement(**{_NAMES.get(key, key): value for key, value in one})
                 for name, one in gearbox.elements.items()
             },
-            "channels": {name: ChannelSpec(**dict(one)) for name, one in gearbox.channels.items()},
+            "mapping": RememberedMapping(
+                {role: one.to_channel() for role, one in gearbox.channels.items()},
+                ReadOptions() if content.log is None else content.log.to_options(),
+            ),
             "converter": None if gearbox.converter is None else gearbox.converter.to_converter(),
             "parameters": {name: one.to_estimate(name) for name, one in content.parameters.items()},
             "friction": {name: one.to_curve() for name, one in content.friction.items()},

@@ -14,6 +14,8 @@ from pydantic import Field, FiniteFloat, field_validator, model_validator
 from drivetwin._util.atomic import write_text
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import Fault, parse_toml, raise_faults
+from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
+from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.errors import InputError, ResultFileError
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.read import read_record
@@ -65,7 +67,10 @@ class ElementRecord(Record):
 
 
 class ChannelRecord(Record):
-    """How a role is read from a log: sign*(scale*column + offset) in `unit`, shifted in time."""
+    """How a role is read from a log: sign*(scale*column + offset) in `unit`, shifted in time.
+
+    `file_unit` is the unit that the log named; `unit` overrides it.
+    """
 
     source: str
     unit: str | None = None
@@ -74,6 +79,28 @@ class ChannelRecord(Record):
     offset: FiniteFloat = 0.0
     time_shift: FiniteFloat = 0.0
     group: str | None = None
+    file_unit: str | None = None
+
+    def to_channel(self) -> RememberedChannel:
+        """Return the channel as a mapping remembers it."""
+        spec = self.model_dump(exclude={"file_unit"})
+        return RememberedChannel(ChannelSpec(**spec), self.file_unit)
+
+
+class LogRecord(Record):
+    """How logs are read as a whole: time column, reference torque and names of DBC files."""
+
+    time_source: str | None = None
+    time_unit: str | None = None
+    simultaneous: bool = False
+    reference_torque_Nm: OptionalFloat = None
+    dbc: list[str] = Field(default_factory=list)
+
+    def to_options(self) -> ReadOptions:
+        """Return the options of reading; DBC files by their names alone."""
+        time = TimeColumn(self.time_source, self.time_unit, self.simultaneous)
+        names = tuple(Path(Path(name).name) for name in self.dbc)
+        return ReadOptions(time, BusOptions(names, self.reference_torque_Nm))
 
 
 class ConverterRecord(Record):
@@ -130,6 +157,7 @@ class TwinFile(Record):
     method: Method
     loss_law: Literal["paper", "dissipative"]
     transmission: TransmissionRecord
+    log: LogRecord | None = None
     parameters: dict[str, TwinParameterRecord]
     friction: dict[str, FrictionRecord]
     load: LoadRecord | None = None

@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Iterator, Mapping, Set
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivetwin._util.progress import notify_progress
-from drivetwin.channels.mapping import ChannelSpec, Mapped, resolve_roles
+from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
+from drivetwin.channels.mapping import Fallback, Mapped, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.recall import recall_options
 from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.channels.units import find_unit, list_first_spellings, resolve_channel_unit
@@ -69,7 +72,8 @@ def read_log(
 ) -> ShiftLog:
     """Read a shift log: every mapped channel on its own time base, SI inside.
 
-    Columns come from the `mapping` file, else from the card's [channels], else by name. `needed`
+    Columns come from the `mapping` file, else from the card's [channels], else from the log of the
+    twin that the card is of, else by name. `needed`
     are the roles that must exist (or their stand-in: engine for input speed, wheel for output
     speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
     last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
@@ -86,10 +90,35 @@ def read_log(
     """
     path = Path(path)
     stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
-    with open_recording(path, stated.options) as recording:
+    with open_as_mapped(path, stated, card) as (recording, stated):
         log = read_recording(recording, path, card, stated, Demands(needed, sound, gearing), window)
     mappings = {} if mapping is None else {Path(mapping).name: _compute_digest(Path(mapping))}
     return replace(log, mappings=mappings)
+
+
+@contextmanager
+def open_as_mapped(
+    path: Path, stated: Mapped, card: VehicleCard | None
+) -> Iterator[tuple[Recording, Mapped]]:
+    """Open a log with the `stated` options, completed by those that the twin of the card remembers.
+
+    Yields the recording and the mapping with the options that were used. A log that cannot be
+    opened with the remembered options is opened without them.
+    """
+    with ExitStack() as stack:
+        options = stated.options
+        if card is not None:
+            options = recall_options(options, card.remembered.options, path.parent)
+        if options != stated.options:
+            try:
+                recording = stack.enter_context(open_recording(path, options))
+            except DrivetwinError:
+                options = stated.options
+            else:
+                recalled = (*stated.findings, report(Code.OPTIONS_REMEMBERED))
+                yield recording, replace(stated, options=options, findings=recalled)
+                return
+        yield stack.enter_context(open_recording(path, options)), stated
 
 
 def read_recording(
@@ -108,12 +137,14 @@ def read_recording(
     kinds = {name: element.kind for name, element in elements.items()}
     specs = {**({} if card is None else card.channels), **stated.channels}
     needed, sound = frozenset(demands.needed), demands.sound
-    mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path), sound)
+    fallback = Fallback({} if card is None else card.remembered.channels, stated.names)
+    mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path), sound, fallback)
     strict = _select_strict_roles(mapped.channels, card, specs, needed, sound)
     _refuse_unitless(recording, mapped.channels, strict, str(path))
     findings = [report(Code.RECORDING, text=text) for text in recording.warnings]
-    findings += mapped.findings
+    findings += [*stated.findings, *mapped.findings]
     channels: dict[str, Channel] = {}
+    used: dict[str, RememberedChannel] = {}
     for count, (role, spec) in enumerate(mapped.channels.items()):
         notify_progress(count / len(mapped.channels))
         try:
@@ -125,6 +156,7 @@ def read_recording(
             findings.append(_report_left_out(spec.source, fault))
             continue
         channels[role] = checked.channel
+        used[role] = RememberedChannel(spec, raw.unit)
         findings += checked.findings
     channels, dropped = _drop_inconsistent(
         channels, strict, card if demands.gearing else None, str(path)
@@ -137,7 +169,14 @@ def read_recording(
     if not stated.options.time.simultaneous:
         channels, late = mark_late_samples(channels)
         findings += late
-    return ShiftLog(channels, str(path), _compute_digest(path), tuple(dict.fromkeys(findings)))
+    return ShiftLog(
+        channels,
+        str(path),
+        _compute_digest(path),
+        tuple(dict.fromkeys(findings)),
+        mapping=RememberedMapping(used, stated.options),
+        absent=mapped.absent,
+    )
 
 
 def _select_strict_roles(

@@ -4,16 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
+from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.filling import Filling, FillKind, find_filling
-from drivetwin.channels.mapping import ChannelSpec, Mapped, infer_candidates, make_spec
+from drivetwin.channels.mapping import Mapped, make_spec, select_free
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.recognition import infer_candidates
 from drivetwin.channels.roles import NEEDED, get_quantity
 from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.errors import DamagedChannelError
@@ -51,6 +53,10 @@ class Survey:
     mapping: Mapping[str, ChannelSpec]
     options: ReadOptions
     notes: tuple[str, ...]
+    elements: tuple[str, ...] | None = None
+    """Shift elements of the card; None without a card."""
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Names of the user by role."""
 
     @property
     def unitless(self) -> frozenset[str]:
@@ -86,9 +92,9 @@ def survey_recording(
     columns = list(recording.columns)
     specs = {**({} if card is None else card.channels), **stated.channels}
     kinds = {} if card is None else {name: spec.kind for name, spec in card.elements.items()}
-    free = [one for one in columns if not any(spec.matches(one) for spec in specs.values())]
+    free = select_free(columns, specs.values())
     candidates = {
-        **infer_candidates(free, kinds),
+        **infer_candidates(free, kinds, stated.names),
         **{role: [one for one in columns if spec.matches(one)] for role, spec in specs.items()},
     }
     mapping = {
@@ -115,6 +121,8 @@ def survey_recording(
         columns=tuple(looked),
         mapping=mapping,
         options=stated.options,
+        elements=None if card is None else tuple(card.elements),
+        names=stated.names,
         notes=(*recording.warnings, *faults, *filled, *_describe_open_roles(candidates, card)),
     )
 

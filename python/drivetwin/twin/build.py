@@ -9,6 +9,7 @@ import numpy as np
 
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
+from drivetwin.channels.channel_spec import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.verdict import from_prior
@@ -52,10 +53,16 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
         version=get_program_version(),
         covariance_ids=ids,
         covariance=covariance,
-        channels=card.channels,
+        mapping=_remember_mapping(found, card),
         load_law=load,
         converter=card.converter,
     )
+
+
+def _remember_mapping(found: Identification, card: VehicleCard) -> RememberedMapping:
+    """Mapping of the log, completed by the card's channels that the log does not have."""
+    stated = {role: RememberedChannel(spec) for role, spec in card.channels.items()}
+    return RememberedMapping({**stated, **found.mapping.channels}, found.mapping.options)
 
 
 def _build_element(card: VehicleCard, name: str) -> TwinElement:

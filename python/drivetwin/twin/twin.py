@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.rich_display import DisplayMixin
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.errors import InputError, MissingParameterError, Where
 from drivetwin.estimation.result.estimate import (
     Estimate,
@@ -78,9 +78,9 @@ class Twin(DisplayMixin):
     `parameters` by id (see parameters.py), also the not identifiable ones; `friction` by
     element; `covariance` (n, n) over `covariance_ids`, total; `validity` the ranges of slip,
     pressure, torque and speed that the log covered; `inputs` file name -> SHA-256. The design
-    ranges [kg m^2] and `channels` by role are those of the vehicle card. `load_law` is the growth
-    of the load torque with speed; None where it is constant. `converter` is the card's map of the
-    torque converter, None where it has none.
+    ranges [kg m^2] are those of the vehicle card; `mapping` is the channel mapping of the log.
+    `load_law` is the growth of the load torque with speed; None where it is constant. `converter`
+    is the card's map of the torque converter, None where it has none.
     """
 
     name: str
@@ -101,7 +101,7 @@ class Twin(DisplayMixin):
     version: str
     covariance_ids: tuple[str, ...] = ()
     covariance: FloatArray | None = None
-    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    mapping: RememberedMapping = field(default_factory=RememberedMapping)
     load_law: LoadLaw | None = None
     converter: Converter | None = None
 
@@ -175,8 +175,8 @@ class Twin(DisplayMixin):
             elements={name: one.to_spec(name) for name, one in self.elements.items()},
             J_prime_range=self.J_prime_range,
             J_vehicle_range=self.J_vehicle_range,
-            channels=self.channels,
             converter=self.converter,
+            remembered=self.mapping,
         )
 
     def _build_load(self, Tv_over_if: float, scale: float) -> RoadLoad:

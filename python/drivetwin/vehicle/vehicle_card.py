@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import ChannelSpec, RememberedMapping
 from drivetwin.errors import CardError, Where
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import LossLaw
@@ -30,7 +30,8 @@ class VehicleCard:
     is the inertia of the output side before the shaft (Jo' without drums), None if unknown.
     `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
     parameters.py), `effects` what is known of departures from the model. `converter` is the map of
-    the torque converter, None where the card has none.
+    the torque converter, None where the card has none. `remembered` is the mapping of the log of a
+    twin that the card was made from.
     `source` is the file that it was read from and `sha256` that of its content; both empty where
     it is from none, the latter also where it was changed since.
     """
@@ -51,6 +52,7 @@ class VehicleCard:
     converter: Converter | None = None
     effects: Mapping[EffectId, EffectPrior] = field(default_factory=dict)
     sha256: str = ""
+    remembered: RememberedMapping = field(default_factory=RememberedMapping)
 
     @property
     def inputs(self) -> dict[str, str]:

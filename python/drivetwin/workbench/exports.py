@@ -99,10 +99,12 @@ def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
             text: str = jobs.call(render_log_report, _get_evidence(work), log, limit=REPORT_LIMIT)
             return text.encode()
         case Record.MAPPING:
-            from drivetwin.channels.mapping_file import format_mapping
+            from drivetwin.channels.mapping_text import format_mapping
 
             survey = work.require_opened().survey
-            return format_mapping({**survey.mapping, **work.channels}, survey.options).encode()
+            return format_mapping(
+                {**survey.mapping, **work.channels}, survey.options, survey.names
+            ).encode()
     return _read_file(path)
 
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivetwin.channels.mapping import ChannelSpec, make_spec
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping import make_spec
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.roles import ROLES, get_quantity

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from drivetwin._util.process_limits import limit_memory
-from drivetwin.channels.mapping import ChannelSpec, Mapped
-from drivetwin.channels.mapping_file import format_mapping, read_mapping
-from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError, InputError
 from drivetwin.gearbox import load_gearbox
@@ -72,7 +73,7 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
             looked = survey_recording(recording, str(request.log), card, stated)
     try:
         with _apply_labels(labels):
-            mapping = _write_mapping(scratch, stated.channels, stated.options)
+            mapping = _write_mapping(scratch, stated)
             read = read_log(request.log, card, mapping)
             log = replace(read, source=request.label, mappings={})
             found = detect_shifts(log, card)
@@ -101,6 +102,7 @@ def _apply_labels(labels: Mapping[Path, str]) -> Iterator[None]:
         raise InputError(what, error.remedy, replace(error.where, file=file)) from None
 
 
-def _write_mapping(path: Path, channels: Mapping[str, ChannelSpec], options: ReadOptions) -> Path:
-    path.write_text(format_mapping(channels, options), encoding="utf-8")
+def _write_mapping(path: Path, stated: Mapped) -> Path:
+    text = format_mapping(stated.channels, stated.options, stated.names)
+    path.write_text(text, encoding="utf-8")
     return path

@@ -15,7 +15,7 @@ from typing import IO, Any
 
 import plotly.graph_objects as go
 
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation

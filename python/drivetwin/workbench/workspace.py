@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, field_validator
 from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin._util.toml import StrictModel, format_key_path
 from drivetwin._util.version import get_program_version
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
 from drivetwin.errors import RefusedError, Where

@@ -99,6 +99,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> Prepare
         sha256=log.sha256,
         inputs={**log.inputs, **card.inputs},
         findings=(*log.findings, *check_lockup_observed(log, card)),
+        mapping=log.mapping,
     )
 
 

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
+from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.channels.shiftlog import find_pauses
 from drivetwin.findings import Finding
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
@@ -215,7 +216,8 @@ class PreparedLog:
     """Data of one log and one vehicle for the estimators.
 
     `candidates` are the shifts that were detected, `shifts` the data of those to be fitted and
-    `rejected` all others with the reason. `inputs` is the SHA-256 by name of every file.
+    `rejected` all others with the reason. `inputs` is the SHA-256 by name of every file, `mapping`
+    the channel mapping by which the log was read.
     """
 
     shifts: tuple[ShiftData, ...]
@@ -226,6 +228,7 @@ class PreparedLog:
     sha256: str
     inputs: Mapping[str, str]
     findings: tuple[Finding, ...] = ()
+    mapping: RememberedMapping = field(default_factory=RememberedMapping)
 
     @property
     def signals(self) -> tuple[ShiftSignals, ...]:

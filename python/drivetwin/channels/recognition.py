@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""Recognition of channels by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+from drivetwin.channels.name_table import NameTable, load_name_table, normalise_name
+from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.read_options import Column
+
+_WHOLE_WORD = 3
+"""Fewest letters of a word that is no abbreviation."""
+
+
+def infer_candidates(
+    columns: Sequence[Column],
+    elements: Mapping[str, str],
+    names: Mapping[str, Sequence[str]] | None = None,
+) -> dict[str, list[Column]]:
+    """Return the candidate columns of each role; `elements` gives the kind of each by name.
+
+    Columns of the user's `names` by role come before those of the built-in table.
+    A column without any number, or from a strange sender, is a candidate only where no other is, a
+    silent one never.
+    """
+    columns = [column for column in columns if not column.silent]
+    table = load_name_table()
+    forms = {
+        **{role: _list_forms(pattern, table) for role, pattern in table.patterns.items()},
+        **{
+            make_pressure_role(element): _list_pressure_forms(element, kind, table)
+            for element, kind in elements.items()
+        },
+    }
+    wholes = [normalise_name(column.name) for column in columns]
+    parts = [normalise_name(re.split(r"[./]", column.name)[-1]) for column in columns]
+    added = {role: "|".join(map(normalise_name, some)) for role, some in (names or {}).items()}
+    found = {
+        role: _select_first_match(columns, (wholes, parts), filter(None, (added.get(role), *some)))
+        for role, some in forms.items()
+    }
+    return {
+        role: _drop_secondary(prefer_filled(candidates))
+        for role, candidates in found.items()
+        if candidates
+    }
+
+
+def find_hints(columns: Iterable[Column], role: str) -> dict[str, str]:
+    """Return the columns, by name, that are related to a role, with the reason against their use.
+
+    They are proposed to the user, never used.
+    """
+    hints = load_name_table().hints.get(role, {})
+    found = ((column.name, hints.get(normalise_name(column.name))) for column in columns)
+    return {name: why for name, why in found if why is not None}
+
+
+def prefer_filled(candidates: list[Column]) -> list[Column]:
+    """Return the columns that hold numbers; all if none does."""
+    return [column for column in candidates if not column.empty] or candidates
+
+
+def _drop_secondary(candidates: list[Column]) -> list[Column]:
+    return [column for column in candidates if not column.aside] or candidates
+
+
+def _select_first_match(
+    columns: Sequence[Column], spellings: Iterable[Sequence[str]], forms: Iterable[str]
+) -> list[Column]:
+    """Return the columns that match the first pattern of `forms` that matches any column.
+
+    Of the `spellings` of all columns the second, the last part of a name like `log.EngTrq`, counts
+    only where no whole name matches.
+    """
+    patterns = [re.compile(form) for form in forms]
+    for texts in spellings:
+        for form in patterns:
+            matches = zip(columns, texts, strict=True)
+            if found := [column for column, text in matches if form.fullmatch(text)]:
+                return found
+    return []
+
+
+def _list_forms(pattern: str, table: NameTable) -> list[str]:
+    """List the expressions of a role's names: plain, then with words before and after."""
+    before, after = table.make_alternatives("before"), table.make_alternatives("after")
+    return [pattern, f"({before})*({pattern})({after})*"]
+
+
+def _list_pressure_forms(element: str, kind: str, table: NameTable) -> list[str]:
+    """List the expressions of a pressure: full name or kind and number first, number last."""
+    label = re.escape(normalise_name(element))
+    digits = re.sub(r"\D", "", label)
+    pressure, words = table.make_alternatives("pressure"), table.make_alternatives(kind)
+    state = f"({table.make_alternatives('state')})*"
+    forms = []
+    if label:
+        forms.append(f"({pressure}){state}({label}){state}|({label})({pressure}){state}")
+    if digits:
+        numbered = f"({words})0*{digits}"
+        forms.append(f"({pressure}){state}({numbered}){state}|({numbered})({pressure}){state}")
+        # Compounds name kind and pressure before number or label, in whole words: no `Kp2`.
+        compound = "".join(
+            f"({table.make_alternatives(one, _WHOLE_WORD)})" for one in (kind, "pressure")
+        )
+        forms.append(f"{compound}({label}|0*{digits}){state}")
+        forms.append(f"({pressure})({words})({label}){state}")
+        forms.append(f"({pressure})0*{digits}{state}")
+    return forms
