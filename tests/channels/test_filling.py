@@ -140,6 +140,13 @@ def test_ramps_without_noise_are_not_filled() -> None:
     assert find_filling(time, ramps + np.where(time > 4.5, np.sin(9.0 * (time - 4.5)), 0.0)) is None
 
 
+@pytest.mark.parametrize("slope", [0.0, 20.0, 1.0 / 3.0, 1e-9])
+def test_a_line_is_not_filled(slope: float) -> None:
+    """A record that is straight up to the round-off of its numbers."""
+    time = np.round(np.arange(200) * 0.01, 2)
+    assert find_filling(time, 800.0 + slope * time) is None
+
+
 def test_rest_is_not_filled() -> None:
     """A signal at one number has no knots."""
     time = np.arange(0.0, 5.0, STEP)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.knot_fit import (
+    ROUND_OFF,
     Interpolant,
     KnotFit,
     extend_knots,
@@ -111,8 +112,6 @@ _MANY_LINES = 0.05
 """Straight parts over the samples from which a record is filled up."""
 _DEVIATION = 0.4
 """Distance of samples from their line, over the bends that rounding makes: one step."""
-_ROUND_OFF = 1e-12
-"""Second differences over the largest value that are round-off of the interpolation."""
 
 
 def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
@@ -270,7 +269,7 @@ def estimate_lattice(values: FloatArray) -> float:
     The least change of the slope of a densely sampled signal is one step.
     """
     bends = np.abs(np.diff(values, 2))
-    floor = 10.0 * _ROUND_OFF * float(np.abs(values).max(initial=0.0))
+    floor = 10.0 * ROUND_OFF * float(np.abs(values).max(initial=0.0))
     bends = bends[bends > floor]
     if bends.size < FILLING.least_knots:
         return 0.0
@@ -312,7 +311,7 @@ def find_uneven_knots(time: FloatArray, values: FloatArray) -> Filling | None:
     unknown = Filling(FillKind.UNKNOWN, np.nan, step, nothing, nothing)
     bends, lattice = np.abs(np.diff(values, 2)), estimate_lattice(values)
     # A rounded straight line has bends of up to two steps, another one those of round-off.
-    border = max(_ROUNDED_BENDS * lattice, _ROUND_OFF * float(np.abs(values).max()))
+    border = max(_ROUNDED_BENDS * lattice, ROUND_OFF * float(np.abs(values).max()))
     if not _has_straight_parts(values, bends, border):
         return None
     parts = find_true_runs(bends <= border)

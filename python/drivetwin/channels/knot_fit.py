@@ -23,8 +23,15 @@ _CONTRAST = 0.9
 """Least misfit of these relative to the largest that suggests knots."""
 _ENDS = 4
 """Periods at each end where an interpolant depends on samples outside the record [count]."""
+ROUND_OFF = 1e-12
+"""Differences over the largest value that are round-off of an interpolation."""
 _BLOCKS = 32
 """Parts of a record that are compared one by one [count]."""
+_LEAST_BLOCKS = 8
+"""Parts that must bend [count]: some corners of a straight record make no raster."""
+_LEAST_SHARE = 1e-3
+"""Misfit of a part over the largest from which it counts as bent: a spline carries that of a corner
+on into the parts beside."""
 
 
 class Interpolant(StrEnum):
@@ -64,16 +71,26 @@ class _Misfit:
     left: FloatArray
     size: float
 
-    def compare(self, other: _Misfit) -> float:
-        """Return the median ratio of misfits over parts of the record, this one to `other`."""
-        ratios = []
-        for ours, theirs in zip(
-            np.array_split(self.left, _BLOCKS), np.array_split(other.left, _BLOCKS), strict=True
-        ):
-            left, right = ours[np.isfinite(ours)], theirs[np.isfinite(theirs)]
-            if left.size and right.size and right.any():
-                ratios.append(np.sqrt(np.mean(left**2) / np.mean(right**2)))
-        return float(np.median(ratios)) if ratios else 1.0
+    def compare(self, other: _Misfit, values: FloatArray) -> float:
+        """Return the median ratio of misfits over parts of the record, this one to `other`.
+
+        Parts that both reproduce, as straight ones, are no evidence; without evidence the ratio is
+        one.
+        """
+        ours, theirs = (
+            np.array([_compute_rms(part) for part in np.array_split(one.left, _BLOCKS)])
+            for one in (self, other)
+        )
+        least = max(ROUND_OFF * float(np.abs(values).max()), _LEAST_SHARE * float(theirs.max()))
+        bent = theirs > least
+        enough = np.count_nonzero(bent) >= _LEAST_BLOCKS
+        return float(np.median(ours[bent] / theirs[bent])) if enough else 1.0
+
+
+def _compute_rms(values: FloatArray) -> float:
+    """Compute the root mean square of the finite `values`; 0 without any."""
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
 
 
 def fit_on_grid(
@@ -118,7 +135,7 @@ def fit_on_grid(
         values=values[first::samples],
         misfit=misfits[first].size,
         misfit_between=between.size,
-        contrast=misfits[first].compare(between),
+        contrast=misfits[first].compare(between, values),
         on_grid=True,
     )
 
@@ -182,7 +199,7 @@ def fit_off_grid(
         values=heights,
         misfit=misfit.size,
         misfit_between=between.size,
-        contrast=misfit.compare(between),
+        contrast=misfit.compare(between, values),
         on_grid=False,
     )
 

@@ -82,8 +82,8 @@ def read_log(
 
     A channel that cannot be used refuses the log if its role is needed or one of `sound`, else it
     is left out and listed in `findings`. By default `sound` are all measured roles, without an
-    engine speed beside an input speed unless the card has a converter, and without a wheel speed
-    beside output speed and output torque; pedal, gear and flags if they are mapped. Damaged samples are left out and listed. Nothing is replaced.
+    engine speed beside an input speed unless the card has a converter; pedal, gear and flags if
+    they are mapped. Damaged samples are left out and listed. Nothing is replaced.
 
     Raises FileFormatError, MissingExtraError, MissingChannelError, MappingError, UnitError,
     TimeError, DamagedChannelError, PlausibilityError; each contains a remedy.
@@ -196,11 +196,7 @@ def _select_strict_roles(
     if sound is not None:
         return frozenset(mapped).intersection(strict | frozenset(sound))
     has_converter = card is not None and card.converter is not None
-    spare = set()
-    if "input_speed" in mapped and not has_converter:
-        spare.add("engine_speed")
-    if {"output_speed", "output_torque"} <= mapped.keys():
-        spare.add("wheel_speed")  # load and vehicle inertia follow from these two
+    spare = {"engine_speed"} if "input_speed" in mapped and not has_converter else set()
     usual = {role for role in mapped if role in specs or get_quantity(role) not in AUXILIARY}
     return frozenset(mapped).intersection(strict | (usual - spare))
 
