@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin card`: vehicle cards: check one against physics and a log."""
+"""`drivetwin card`: vehicle cards: write one, or check one against physics and a log."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, find_mapping
+from drivetwin.cli.card_new import new
 from drivetwin.cli.output import (
     JsonFlag,
     print_findings,
@@ -28,6 +29,7 @@ IMPLAUSIBLE = 3
 """Exit code of a card with findings, with --strict."""
 
 card = typer.Typer(help="Check a vehicle card, or write one.", no_args_is_help=True)
+card.command()(new)
 
 
 @card.command()

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Answers that follow from other answers and from a log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from drivetwin.authoring.answers import (
+    Answer,
+    Answers,
+    Key,
+    Origin,
+    get_value,
+    list_gears,
+    merge_answers,
+)
+from drivetwin.authoring.gearboxes import reduce_gears
+from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
+from drivetwin.plausibility.settings import PLAUSIBILITY
+
+GEOMETRY = frozenset(("surfaces", "derating", "area_m2", "radius_m", "outer_mm", "inner_mm"))
+"""Parts of an element from which its gain is computed."""
+WHEELS = 1.1
+"""Factor on the inertia of a vehicle's mass for that of wheels and axles."""
+
+
+def derive_answers(answers: Answers, survey: LogSurvey | None) -> dict[Key, Answer]:
+    """Return the answers with all that follows from them; stated ones take precedence.
+
+    Raises CardError where the gears of a stated gearbox have no dual-clutch form.
+    """
+    known = merge_answers(answers.items(), _derive_gearbox(answers))
+    known = merge_answers(known.items(), _spread_common(known))
+    if survey is not None:
+        known = merge_answers(known.items(), _label_elements(known, survey))
+    return merge_answers(known.items(), _derive_geometry(known), _derive_vehicle(known))
+
+
+def _derive_gearbox(answers: Answers) -> Iterator[tuple[Key, Answer]]:
+    name, names = get_value(answers, "gearbox"), get_value(answers, "gears", "names")
+    if name is None or names is None:
+        return
+    note = f"computed from the built-in gearbox {name}"
+    elements = reduce_gears(name, names)
+    yield ("gears", "ratios"), Answer(tuple(one.ratio for one in elements), note=note)
+    yield ("gears", "elements"), Answer(tuple(one.element for one in elements), note=note)
+    for one in elements:
+        for part in ("kind", "i_c", "i_out"):
+            yield ("elements", one.element, part), Answer(getattr(one, part), note=note)
+
+
+def _spread_common(answers: Answers) -> Iterator[tuple[Key, Answer]]:
+    """Give each element what is stated for all."""
+    common = {key[2]: one for key, one in answers.items() if key[0] == "elements" and not key[1]}
+    for gear in list_gears(answers):
+        own = {key[2] for key in answers if key[:2] == ("elements", gear.element)}
+        for part, answer in common.items():
+            if not (own & GEOMETRY if part == "gain_m3" else part in GEOMETRY and "gain_m3" in own):
+                yield ("elements", gear.element, part), answer
+
+
+def _label_elements(answers: Answers, survey: LogSurvey) -> Iterator[tuple[Key, Answer]]:
+    """Name the pressure of the log that belongs to each element, by the ratio of its gear."""
+    labels = assign_pressures(survey.gears)
+    for gear in list_gears(answers):
+        for held, label in zip(survey.gears, labels, strict=True):
+            if label and abs(held.ratio / gear.ratio - 1.0) <= PLAUSIBILITY.ratio_tolerance:
+                note = f"high while {survey.name} holds gear {gear.name}"
+                key = ("elements", gear.element, "label")
+                yield key, Answer(label, Origin.GUESS, note)
+
+
+def _derive_geometry(answers: Answers) -> Iterator[tuple[Key, Answer]]:
+    """Area and effective radius of the ring between two diameters."""
+    for gear in list_gears(answers):
+        outer, inner = (
+            get_value(answers, "elements", gear.element, part) for part in ("outer_mm", "inner_mm")
+        )
+        if outer is None or inner is None:
+            continue
+        note = f"from the diameters {outer:g} mm and {inner:g} mm"
+        area, radius = compute_ring(5e-4 * outer, 5e-4 * inner)
+        yield ("elements", gear.element, "area_m2"), Answer(float(f"{area:.6g}"), note=note)
+        yield ("elements", gear.element, "radius_m"), Answer(float(f"{radius:.6g}"), note=note)
+
+
+def compute_ring(outer: float, inner: float) -> tuple[float, float]:
+    """Return area [m^2] and effective radius [m] of a ring with radii `outer` > `inner` [m].
+
+    The radius is that of a uniform pressure: (2/3) (R³ - r³)/(R² - r²).
+    """
+    area = math.pi * (outer**2 - inner**2)
+    radius = 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2)
+    return area, radius
+
+
+def _derive_vehicle(answers: Answers) -> Iterator[tuple[Key, Answer]]:
+    """J3 of a mass on wheels: m·r², and up to a tenth more for wheels and axles."""
+    mass, radius = get_value(answers, "vehicle", "mass"), get_value(answers, "vehicle", "radius")
+    if mass is None or radius is None:
+        return
+    low, high = mass
+    note = (
+        f"mass {low:g} to {high:g} kg times (wheel radius {radius:g} m) squared, wheels up to 10 %"
+    )
+    limits = (
+        float(f"{low * radius**2:.4g}"),
+        float(f"{WHEELS * high * radius**2:.4g}"),
+    )
+    yield ("inertia", "J_vehicle"), Answer(limits, note=note)

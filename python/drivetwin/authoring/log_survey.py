@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: MIT
+"""Survey of a log for a new card: ratios held, pressures, and the pressure that makes each gear."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.channels.mapping import (
+    ChannelSpec,
+    Mapped,
+    infer_candidates,
+    make_spec,
+    normalise_name,
+)
+from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
+from drivetwin.channels.read_options import Column
+from drivetwin.channels.shiftlog import Quantity, ShiftLog
+from drivetwin.channels.units import find_unit
+from drivetwin.errors import MissingChannelError, TimeError
+from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.quality.time_alignment import estimate_speed_ratio
+from drivetwin.logs.raw import Remembered
+from drivetwin.logs.read import Demands, read_recording
+from drivetwin.plausibility.ratios import find_held_ratios
+from drivetwin.plausibility.settings import PLAUSIBILITY
+from drivetwin.shifts.kinematics import GearboxSpeeds, resample_geared
+from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.vehicle.spec import ElementSpec, PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+ENGAGED = 0.5
+"""Least pressure of an engaged element over the largest mean pressure of its column."""
+LEAST_SAMPLES = 20
+"""Fewest samples that two speeds are compared at."""
+_PRESSURE_NAME = re.compile(
+    r"(?:p|prs|pres|press|pressure|druck)(?:ist|act|mess)?"
+    r"(?P<kind>br|brk|brake|bremse|brems|b|clutch|clu|clt|cl|kupplung|kuppl|kup|k|c|)"
+    r"0*(?P<number>[0-9]+)(?:ist|act|actual|mess|meas|val|bar)*"
+)
+"""Names of pressure columns by the number of their element."""
+
+
+@dataclass(frozen=True)
+class LogGear:
+    """A gear that a log holds: its ratio, name where the log contains it, pressures [Pa]."""
+
+    ratio: float
+    time: float
+    name: str | None
+    pressures: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class LogSurvey:
+    """A log and what it shows without a card.
+
+    `log` contains the pressures under the labels of their columns, `specs` how those are read;
+    `columns` are all columns of the file.
+    `gears` run from low to high. `final_drive` is output over wheel speed, with one standard
+    deviation; None without both speeds. `input_gear` is engine over input speed; None without both,
+    or where they slip. `remark` states why no gears were found.
+    """
+
+    log: ShiftLog
+    specs: Mapping[str, ChannelSpec]
+    columns: tuple[Column, ...]
+    gears: tuple[LogGear, ...]
+    final_drive: tuple[float, float] | None
+    input_gear: float | None = None
+    has_input_slip: bool = False
+    remark: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the file."""
+        return Path(self.log.source).name
+
+    def select_stated_specs(
+        self, labels: Mapping[str, str], kinds: Mapping[str, str]
+    ) -> dict[str, ChannelSpec]:
+        """Select the pressures, by element, that a card has to name because names do not fit.
+
+        `labels` are those of the elements in this log, `kinds` their kinds.
+        """
+        candidates = infer_candidates(self.columns, kinds)
+        return {
+            element: self.specs[label]
+            for element, label in labels.items()
+            if self.specs[label].unit is not None
+            or [
+                make_spec(one, self.columns)
+                for one in candidates.get(make_pressure_role(element), [])
+            ]
+            != [self.specs[label]]
+        }
+
+
+def survey_log(path: Path, mapping: Path | None) -> LogSurvey:
+    """Read a log without a card and find the ratios and pressures that it holds.
+
+    Raises the typed errors of `read_log` where the log cannot be read at all.
+    """
+    stated = Mapped({}) if mapping is None else read_mapping(mapping)
+    with open_recording(path, stated.options) as opened:
+        recording = Remembered(opened)
+        specs = find_pressure_columns(recording.columns, stated.channels)
+        channels = {
+            **stated.channels,
+            **{make_pressure_role(key): one for key, one in specs.items()},
+        }
+        blank = make_blank_card(specs)
+        named = replace(stated, channels=channels)
+        columns = tuple(recording.columns)
+        log = read_recording(recording, path, blank, named, Demands((), (), gearing=False))
+    labels = [label for label in specs if make_pressure_role(label) in log]
+    final_drive = None
+    if "output_speed" in log and "wheel_speed" in log:
+        final_drive = estimate_speed_ratio(log["output_speed"], log["wheel_speed"])
+    input_gear, slips = _compare_input_speeds(log)
+    found = LogSurvey(log, specs, columns, (), final_drive, input_gear, slips)
+    try:
+        speeds = resample_geared(log, 1.0, 1.0 if final_drive is None else final_drive[0])
+    except (MissingChannelError, TimeError) as fault:
+        return replace(found, remark=fault.what)
+    gears = tuple(_find_gears(log, speeds, labels))
+    return replace(found, gears=gears, remark="" if gears else "the speeds hold no ratio")
+
+
+def _compare_input_speeds(log: ShiftLog) -> tuple[float | None, bool]:
+    """Return engine over input speed, None if unknown, and True where the two slip."""
+    if "engine_speed" not in log or "input_speed" not in log:
+        return None, False
+    engine = log["engine_speed"].updates
+    driven = log["input_speed"].updates.interpolate(engine.time)
+    known = np.isfinite(driven) & np.isfinite(engine.values)
+    known &= np.nan_to_num(driven) > ShiftSettings().min_output_speed
+    if np.count_nonzero(known) < LEAST_SAMPLES:
+        return None, False
+    ratios = engine.values[known] / driven[known]
+    low, middle, high = np.quantile(ratios, (0.1, 0.5, 0.9))
+    if high - low > PLAUSIBILITY.ratio_tolerance * middle:
+        return None, True
+    return float(middle), False
+
+
+def make_blank_card(labels: Mapping[str, object]) -> VehicleCard:
+    """Make a card without gears that lets pressures be read under the `labels`."""
+    elements = {label: ElementSpec(label, "brake", 1.0, PriorValue(0.0)) for label in labels}
+    return VehicleCard("", "paper", 1.0, 1.0, (), elements, (1.0, 2.0), (1.0, 2.0))
+
+
+def find_pressure_columns(
+    columns: Sequence[Column], stated: Mapping[str, ChannelSpec]
+) -> dict[str, ChannelSpec]:
+    """Find the pressures of shift elements: as stated in a mapping, else by name and unit."""
+    found = {
+        label: spec
+        for role, spec in stated.items()
+        if (label := get_pressure_element(role)) is not None
+    }
+    if found:
+        return found
+    usable = [column for column in columns if not (column.empty or column.silent or column.aside)]
+    labels: dict[str, list[Column]] = {}
+    for column in usable:
+        label = label_pressure(column)
+        if label is not None and not any(spec.matches(column) for spec in stated.values()):
+            labels.setdefault(label, []).append(column)
+    return {label: make_spec(one[0], columns) for label, one in labels.items() if len(one) == 1}
+
+
+def label_pressure(column: Column) -> str | None:
+    """Return the element that a pressure column is named after: `PrsBrk2` -> `B2`; else None."""
+    unit = find_unit(column.unit or "")
+    if unit is None or unit.quantity is not Quantity.PRESSURE:
+        return None
+    plain = normalise_name(re.split(r"[./]", column.name)[-1])
+    match = _PRESSURE_NAME.fullmatch(plain)
+    if match is None:
+        is_clutch = re.fullmatch(r"(?:p|prs|pressure|druck)(?:clutch|kupplung|kuppl|k)", plain)
+        return "K" if is_clutch else None
+    kind = match["kind"][:1].upper()
+    return f"{kind or 'E'}{int(match['number'])}"
+
+
+def _find_gears(log: ShiftLog, speeds: GearboxSpeeds, labels: Sequence[str]) -> list[LogGear]:
+    low, high = PLAUSIBILITY.ratio
+    gears = []
+    moving = speeds.output > ShiftSettings().min_output_speed
+    ratio = np.divide(
+        speeds.input, speeds.output, out=np.full(speeds.time.size, np.nan), where=moving
+    )
+    for held in find_held_ratios(speeds):
+        if not low <= held.ratio <= high:
+            continue
+        time = speeds.time[np.abs(ratio / held.ratio - 1.0) < PLAUSIBILITY.ratio_tolerance]
+        pressures = {
+            label: mean
+            for label in labels
+            if np.isfinite(mean := _compute_median(log, make_pressure_role(label), time))
+        }
+        gears.append(LogGear(held.ratio, held.time, _find_name(log, time), pressures))
+    return gears
+
+
+def _compute_median(log: ShiftLog, role: str, time: FloatArray) -> float:
+    values = log[role].interpolate(time)
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else float("nan")
+
+
+def _find_name(log: ShiftLog, time: FloatArray) -> str | None:
+    """Return the gear that the channel of the engaged gear states for most of a time."""
+    if "gear" not in log or time.size == 0:
+        return None
+    number = _compute_median(log, "gear", time)
+    return str(round(number)) if np.isfinite(number) and number >= 0.5 else None
+
+
+def assign_pressures(gears: Sequence[LogGear]) -> list[str | None]:
+    """Return the label of the pressure that makes each gear; None where no pressure fits.
+
+    An element makes a gear if its pressure is high in it. Of several the one that is high in the
+    fewest gears is taken; elements that are high in all gears are common to them, unless the log
+    has one pressure only.
+    """
+    labels = sorted({label for gear in gears for label in gear.pressures})
+    largest = {
+        label: max((gear.pressures.get(label, 0.0) for gear in gears), default=0.0)
+        for label in labels
+    }
+    engaged = {
+        label: [
+            largest[label] > 0.0 and gear.pressures.get(label, 0.0) > ENGAGED * largest[label]
+            for gear in gears
+        ]
+        for label in labels
+    }
+    usable = [label for label in labels if any(engaged[label]) and not all(engaged[label])] or [
+        label for label in labels if len(labels) == 1 and any(engaged[label])
+    ]
+    found: list[str | None] = []
+    for index, gear in enumerate(gears):
+        candidates = [label for label in usable if engaged[label][index]]
+        candidates.sort(key=lambda one: (sum(engaged[one]), -gear.pressures[one]))
+        found.append(candidates[0] if candidates else None)
+    return found

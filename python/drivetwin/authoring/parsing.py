@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""Conversion of typed answers to values; ValueError states why one is refused."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+
+from drivetwin._util.spelling import suggest_spelling
+
+Parser = Callable[[str], object]
+
+MOST_CHARACTERS = 200
+"""Longest name."""
+
+
+def parse_number(text: str) -> float:
+    """Parse a finite number with a decimal point."""
+    text = text.strip()
+    try:
+        value = float(text)
+    except ValueError:
+        if re.fullmatch(r"[+-]?\d+,\d+", text):
+            raise ValueError(f"{text!r} is no number: write a point instead of the comma") from None
+        raise ValueError(f"{text!r} is no number") from None
+    if not math.isfinite(value) or "_" in text:
+        raise ValueError(f"{text!r} is no finite number")
+    return value
+
+
+def make_number_parser(
+    low: float = 0.0, high: float = 1e12, *, zero: bool = False, unit: str = ""
+) -> Callable[[str], float]:
+    """Return a parser of numbers above `low` (with `zero` from it on) and up to `high`."""
+
+    def parse(text: str) -> float:
+        value = parse_number(text)
+        shown = f" {unit}" if unit else ""
+        if value < low or (value == low and not zero):
+            raise ValueError(f"{value:g}{shown} is not {'at least' if zero else 'above'} {low:g}")
+        if value > high:
+            raise ValueError(f"{value:g}{shown} is above {high:g}, the largest value that can be")
+        return value
+
+    return parse
+
+
+def split_list(text: str) -> list[str]:
+    """Split a list at commas, semicolons or white space."""
+    return [part for part in re.split(r"[,;\s]+", text.strip()) if part]
+
+
+def parse_ratios(text: str) -> tuple[float, ...]:
+    """Parse the ratios of two or more gears, which fall from low gear to high gear."""
+    parse = make_number_parser(high=1000.0)
+    ratios = tuple(parse(part) for part in split_list(text))
+    if len(ratios) < 2:
+        raise ValueError("a card needs two gears or more, as 1.86, 1.41")
+    for lower, higher in pairwise(ratios):
+        if higher >= lower:
+            raise ValueError(
+                f"the ratios run from low to high gear: {higher:g} must be below {lower:g}"
+            )
+    return ratios
+
+
+def parse_name(text: str) -> str:
+    """Parse a name: any text of a line, without bytes that are no characters."""
+    name = text.strip()
+    if not name:
+        raise ValueError("the name is empty")
+    if len(name) > MOST_CHARACTERS:
+        raise ValueError(f"the name has {len(name)} characters, at most {MOST_CHARACTERS} are used")
+    if any(0xD800 <= ord(one) <= 0xDFFF for one in name):
+        raise ValueError("the name contains bytes that are no text in UTF-8")
+    return name
+
+
+def make_names_parser(count: int | None) -> Callable[[str], tuple[str, ...]]:
+    """Return a parser of `count` different names."""
+
+    def parse(text: str) -> tuple[str, ...]:
+        names = tuple(parse_name(part) for part in split_list(text))
+        if count is not None and len(names) != count:
+            raise ValueError(f"{len(names)} names for {count} gears: give one for each gear")
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"{twice!r} is named twice: each gear has its own")
+        if not names:
+            raise ValueError("no name is given")
+        return names
+
+    return parse
+
+
+def parse_range(text: str, spread: float = 2.0) -> tuple[float, float]:
+    """Parse LOW,HIGH; of one value the range from it over `spread` to it times `spread`."""
+    parse = make_number_parser()
+    parts = [parse(part) for part in split_list(text)]
+    if len(parts) == 1:
+        return parts[0] / spread, parts[0] * spread
+    if len(parts) != 2:
+        raise ValueError("give a range LOW,HIGH or one value")
+    if not parts[0] < parts[1]:
+        raise ValueError(f"a range is LOW,HIGH with LOW below HIGH, not {parts[0]:g},{parts[1]:g}")
+    return parts[0], parts[1]
+
+
+def parse_design_value(text: str) -> tuple[float, float]:
+    """Parse VALUE or VALUE,STD: a design value and one standard deviation in the same unit."""
+    parse = make_number_parser(zero=True)
+    parts = [parse(part) for part in split_list(text.replace("±", " ").replace("+-", " "))]
+    if len(parts) not in (1, 2):
+        raise ValueError("give VALUE or VALUE,STD")
+    return parts[0], parts[1] if len(parts) == 2 else 0.0
+
+
+def make_choice_parser(choices: Iterable[str]) -> Callable[[str], str]:
+    """Return a parser of one of the `choices`; an unambiguous beginning is enough."""
+    known = list(choices)
+
+    def parse(text: str) -> str:
+        wanted = text.strip().casefold()
+        exact = [one for one in known if one.casefold() == wanted]
+        found = exact or [one for one in known if wanted and one.casefold().startswith(wanted)]
+        if len(found) != 1:
+            hint = suggest_spelling(text.strip(), known)
+            raise ValueError(f"{text.strip()!r} is none of {', '.join(known)}{hint}")
+        return found[0]
+
+    return parse
+
+
+def parse_surfaces(text: str) -> int:
+    """Parse a number of friction surfaces."""
+    value = make_number_parser(high=200.0)(text)
+    if value != int(value):
+        raise ValueError(f"{value:g} is no whole number")
+    return int(value)
+
+
+def parse_share(text: str) -> float:
+    """Parse a share above 0 and up to 1."""
+    return make_number_parser(high=1.0)(text)

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""A question whose answer becomes an entry of a vehicle card."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drivetwin.authoring.answers import Answer, Key
+from drivetwin.authoring.parsing import Parser
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question.
+
+    `option` is the command-line option that replaces it, `prompt` names the quantity and `meaning`
+    explains it in a sentence. `parse` converts the text of an answer and raises ValueError with the
+    reason where it cannot. `default` is taken for an empty answer; without one an answer is
+    required. `shown` replaces the text of the default.
+    """
+
+    key: Key
+    option: str
+    prompt: str
+    meaning: str
+    parse: Parser
+    unit: str = ""
+    default: Answer | None = None
+    shown: str = ""
+
+    def format_default(self) -> str:
+        """Return the default as a user would type it; empty without one."""
+        if self.shown or self.default is None or self.default.value is None:
+            return self.shown
+        return format_value(self.default.value)
+
+    def answer(self, text: str) -> Answer:
+        """Return the answer for a text; ValueError states why the text is refused."""
+        if not text.strip():
+            if self.default is None:
+                raise ValueError("an answer is needed here")
+            return self.default.confirm()
+        return Answer(self.parse(text))
+
+
+def format_value(value: object) -> str:
+    """Return a value as a user would type it."""
+    if isinstance(value, tuple):
+        return ",".join(format_value(one) for one in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: MIT
+"""Questions that lead to a vehicle card, in order; what is asked depends on the answers before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, Origin, get_value
+from drivetwin.authoring.element_questions import iterate_element_questions
+from drivetwin.authoring.gearboxes import list_forward_gears, match_gearboxes, reduce_gears
+from drivetwin.authoring.log_estimates import LogEstimates
+from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
+from drivetwin.authoring.parsing import (
+    Parser,
+    make_choice_parser,
+    make_names_parser,
+    make_number_parser,
+    parse_design_value,
+    parse_name,
+    parse_range,
+    parse_ratios,
+)
+from drivetwin.authoring.question import Question
+from drivetwin.authoring.sensor_classes import get_offset_unit, list_classes, parse_sensor
+from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.errors import CardError
+from drivetwin.gearbox import list_builtin_gearboxes
+
+INERTIA_MARGIN = 1.25
+"""Factor by which a range estimated from a log is widened to both sides."""
+MASS_SPREAD = 1.1
+"""Factor between a single mass and the limits of its range."""
+SENSOR_ROLES = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
+"""Roles whose sensors are asked for without a log; `pressure` stands for all pressures."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What questions draw defaults from: a name for the card, a log, and estimates from it."""
+
+    name: str
+    survey: LogSurvey | None = None
+    estimates: LogEstimates = field(default_factory=LogEstimates)
+
+
+def iterate_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
+    """Iterate over all questions of a card, those that are answered included.
+
+    Questions on elements need the gears; without them one stands for all, without a name.
+    """
+    default = Answer(sources.name, Origin.DEFAULT)
+    yield Question(
+        ("name",), "--name NAME", "Name of the vehicle",
+        "The name stands in reports and results.", parse_name, default=default,
+    )  # fmt: skip
+    yield from _iterate_gear_questions(answers, sources)
+    yield from iterate_element_questions(answers, sources.survey, sources.estimates)
+    yield from _iterate_drive_questions(sources)
+    yield from _iterate_inertia_questions(answers, sources)
+    yield from _iterate_sensor_questions(sources)
+
+
+def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
+    survey = sources.survey
+    held = () if survey is None else tuple(round(gear.ratio, 3) for gear in survey.gears)
+    fits = match_gearboxes(held) if len(held) > 1 else []
+    known = list_builtin_gearboxes()
+    fitting = "".join(
+        f" The ratios of the log fit {one.name}, gears {', '.join(one.gears)}, within "
+        f"{100.0 * one.difference:.2g} %."
+        for one in fits
+    )
+    yield Question(
+        ("gearbox",), "--gearbox NAME", "Built-in gearbox, or none",
+        f"A built-in gearbox gives ratios and elements: {', '.join(known)}.{fitting}",
+        _make_optional(make_choice_parser([*known, "none"])),
+        default=Answer(None, Origin.DEFAULT), shown="none",
+    )  # fmt: skip
+    box = get_value(answers, "gearbox")
+    if box is not None:
+        yield _make_box_gears_question(box, next((one for one in fits if one.name == box), None))
+        return
+    note = "" if survey is None else f"ratios of input to output speed held in {survey.name}"
+    yield Question(
+        ("gears", "ratios"), "--ratios LOW,...,HIGH", "Ratios of the gears, from low to high",
+        "A ratio is input speed over output speed of the gearbox, without input gear and final "
+        "drive; list the gears whose shifts are identified.",
+        parse_ratios,
+        default=Answer(held, Origin.GUESS, note) if len(held) > 1 else None,
+    )  # fmt: skip
+    ratios = get_value(answers, "gears", "ratios", default=())
+    names = _guess_names(ratios, sources)
+    yield Question(
+        ("gears", "names"), "--gears NAME,...", "Names of these gears",
+        "Each gear has a name of its own, as 2 and 3.",
+        make_names_parser(len(ratios) or None), default=names,
+    )  # fmt: skip
+    yield Question(
+        ("gears", "elements"), "--elements NAME,...", "Shift element of each gear",
+        "The element is the clutch or brake that engages when its gear does and opens in the shift "
+        "to the next; name one for each gear, as B2,B3.",
+        make_names_parser(len(ratios) or None),
+        default=_guess_elements(ratios, get_value(answers, "gears", "names", default=()), survey),
+    )  # fmt: skip
+
+
+def _make_box_gears_question(box: str, fit: object) -> Question:
+    known = list_forward_gears(box)
+
+    def parse(text: str) -> tuple[str, ...]:
+        names = make_names_parser(None)(text)
+        try:
+            elements = reduce_gears(box, names)
+        except CardError as fault:
+            raise ValueError(f"{fault.what}; {fault.remedy}") from fault
+        return tuple(one.gear for one in elements)
+
+    gears = getattr(fit, "gears", None)
+    default = None if gears is None else Answer(gears, Origin.GUESS, "gears with the log's ratios")
+    listed = ", ".join(f"{gear} ({ratio:.4g})" for gear, ratio in known.items())
+    return Question(
+        ("gears", "names"), "--gears NAME,...", f"Gears of {box}, two or more neighbours",
+        f"The card describes the shifts between these gears; {box} has {listed}.",
+        parse, default=default,
+    )  # fmt: skip
+
+
+def _guess_names(ratios: tuple[float, ...], sources: Sources) -> Answer | None:
+    """Name the gears: as the log states, else as a built-in gearbox of these ratios, else 1, 2."""
+    survey = sources.survey
+    if not ratios:
+        return None
+    held = () if survey is None else survey.gears
+    if len(held) == len(ratios) and all(gear.name for gear in held):
+        names = tuple(str(gear.name) for gear in held)
+        if len(set(names)) == len(names):
+            return Answer(names, Origin.GUESS, "gear channel of the log")
+    fits = match_gearboxes(ratios)
+    if fits:
+        note = f"gears of the built-in gearbox {fits[0].name} with these ratios"
+        return Answer(fits[0].gears, Origin.GUESS, note)
+    return Answer(tuple(str(k + 1) for k in range(len(ratios))), Origin.DEFAULT, "counted")
+
+
+def _guess_elements(
+    ratios: tuple[float, ...], names: tuple[str, ...], survey: LogSurvey | None
+) -> Answer | None:
+    """Name the elements after their pressures in the log, else after their gears."""
+    if not ratios or len(names) != len(ratios):
+        return None
+    labels = [] if survey is None else assign_pressures(survey.gears)
+    if len(labels) == len(ratios) and any(labels):
+        found = [
+            f"E{name}" if label is None
+            else label if labels.count(label) == 1
+            else f"{label}{name}"
+            for label, name in zip(labels, names, strict=True)
+        ]  # fmt: skip
+        if len(set(found)) == len(found):
+            return Answer(tuple(found), Origin.GUESS, "pressure that is high in the gear alone")
+    return Answer(tuple(f"E{name}" for name in names), Origin.DEFAULT, "named after the gears")
+
+
+def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
+    survey = sources.survey
+    default = Answer(1.0, Origin.DEFAULT, "no input gear")
+    if survey is not None and survey.input_gear is not None:
+        note = f"engine over input speed in {survey.name}"
+        default = Answer(round(survey.input_gear, 4), Origin.GUESS, note)
+    yield Question(
+        ("i_in",), "--input-gear RATIO", "Ratio of the input gear",
+        "Engine speed over gearbox input speed with the lock-up closed; 1 without an input gear.",
+        make_number_parser(high=100.0), default=default,
+    )  # fmt: skip
+    final = None
+    if survey is not None and survey.final_drive is not None:
+        ratio, std = survey.final_drive
+        note = f"output over wheel speed in {survey.name}, ± {std:.2g}"
+        final = Answer(float(f"{ratio:.4g}"), Origin.GUESS, note)
+    yield Question(
+        ("final_drive",), "--final-drive RATIO", "Ratio of the final drive",
+        "Output speed over wheel speed, hub reduction included; 1 where the gear ratios include it "
+        "or where it is unknown and inertias count at the output shaft.",
+        make_number_parser(high=1000.0), default=final,
+    )  # fmt: skip
+
+
+def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
+    survey, estimates = sources.survey, sources.estimates
+    note = "" if survey is None else f"torque balance of {survey.name}, efficiency 0.7 to 1"
+    yield Question(
+        ("inertia", "J_prime"), "--engine-inertia LOW,HIGH", "Range of the inertia at the engine",
+        "J′ is engine, flywheel, converter and gearbox input together, at engine speed: 0.1 to 0.6 "
+        "for a car, 4 to 40 for a truck; of one value the range is half to twice of it.",
+        parse_range, "kg·m²", _widen(estimates.J_prime, note),
+    )  # fmt: skip
+    guess = _widen(
+        estimates.J_vehicle, "" if survey is None else f"torque balance of {survey.name}"
+    )
+    if ("inertia", "J_vehicle") not in answers or ("vehicle", "mass") in answers:
+        yield Question(
+            ("vehicle", "mass"), "--mass KG (or --vehicle-inertia LOW,HIGH)", "Mass of the vehicle",
+            "Mass during the recording, load included, as LOW,HIGH; one value counts ± 10 %.",
+            _parse_mass, "kg", None if guess is None else UNKNOWN,
+            shown="" if guess is None else "the inertia that the log shows",
+        )  # fmt: skip
+        if get_value(answers, "vehicle", "mass") is not None or guess is None:
+            yield Question(
+                ("vehicle", "radius"), "--wheel-radius M (with --mass)", "Radius of the wheels",
+                "Rolling radius of the driven wheels: 0.3 for a car, 0.5 for a truck.",
+                make_number_parser(high=5.0, unit="m"), "m",
+            )  # fmt: skip
+        else:
+            yield Question(
+                ("inertia", "J_vehicle"), "--vehicle-inertia LOW,HIGH",
+                "Range of the vehicle's inertia at the wheel",
+                "J3 is mass times wheel radius squared, plus the wheels.",
+                parse_range, "kg·m²", guess,
+            )  # fmt: skip
+    yield Question(
+        ("inertia", "J_out"), "--output-inertia VALUE,STD", "Inertia of the output side, or blank",
+        "Jo′ is gearbox output and propeller shaft before the elastic shaft, without clutch drums; "
+        "blank if unknown.",
+        parse_design_value, "kg·m²", UNKNOWN,
+    )  # fmt: skip
+
+
+def _iterate_sensor_questions(sources: Sources) -> Iterator[Question]:
+    roles: tuple[str, ...] = (*SENSOR_ROLES, "pressure")
+    if sources.survey is not None:
+        log = sources.survey.log
+        has_pressure = any(get_pressure_element(role) for role in log.channels)
+        roles = tuple(role for role in SENSOR_ROLES if role in log)
+        roles += ("pressure",) if has_pressure else ()
+    for role in roles:
+        unit = get_offset_unit(role).replace("Nm", "N·m")
+        yield Question(
+            ("sensors", role), f"--sensor {role}=CLASS[:RANGE]", f"Sensor class of {role}, or none",
+            f"The class gives the tolerances: {', '.join(list_classes(role))}; write CLASS:RANGE "
+            f"with the largest value that the sensor measures [{unit}] where its offset depends on "
+            "it. None: intervals cover noise only.",
+            _make_sensor_parser(role), default=UNKNOWN, shown="none",
+        )  # fmt: skip
+
+
+def _make_sensor_parser(role: str) -> Parser:
+    return lambda text: parse_sensor(text, role)
+
+
+def _make_optional(parse: Parser) -> Parser:
+    """Return a parser that converts `none` to None."""
+
+    def parse_optional(text: str) -> object:
+        value = parse(text)
+        return None if value == "none" else value
+
+    return parse_optional
+
+
+def _parse_mass(text: str) -> tuple[float, float]:
+    return parse_range(text, MASS_SPREAD)
+
+
+def _widen(limits: tuple[float, float] | None, note: str) -> Answer | None:
+    """Return an estimated range as a guess, widened to both sides and rounded."""
+    if limits is None:
+        return None
+    low, high = limits[0] / INERTIA_MARGIN, limits[1] * INERTIA_MARGIN
+    return Answer((float(f"{low:.2g}"), float(f"{high:.2g}")), Origin.GUESS, note)
+
+
+def find_next(answers: Answers, sources: Sources) -> Question | None:
+    """Return the first question without an answer; None if there is none."""
+    questions = iterate_questions(answers, sources)
+    return next((one for one in questions if one.key not in answers), None)
+
+
+def list_open_questions(answers: Answers, sources: Sources) -> list[Question]:
+    """List the questions that have neither an answer nor a default."""
+    filled: dict[Key, Answer] = dict(answers)
+    found: dict[Key, Question] = {}
+    for question in iterate_questions(filled, sources):
+        if question.key in filled:
+            continue
+        if question.default is None:
+            found[question.key] = question
+        else:
+            filled[question.key] = question.default
+    return list(found.values())

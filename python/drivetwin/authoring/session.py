@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""Completion of the answers: by questions to the user, by defaults, or as a draft."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from drivetwin.authoring.answers import (
+    UNKNOWN,
+    Answer,
+    Answers,
+    Key,
+    get_value,
+    list_gears,
+)
+from drivetwin.authoring.derive import derive_answers
+from drivetwin.authoring.log_estimates import LogEstimates, estimate_entries
+from drivetwin.authoring.question import Question
+from drivetwin.authoring.questions import Sources, find_next, list_open_questions
+from drivetwin.errors import InputError
+
+Ask = Callable[[Question, str], str]
+"""Asks a question, with the reason why the answer before was refused; returns the text."""
+
+
+class Session:
+    """Answers on their way to a card.
+
+    Estimates from the log are computed anew when an answer that they depend on is known.
+    """
+
+    def __init__(self, answers: Mapping[Key, Answer], sources: Sources) -> None:
+        self._stated = dict(answers)
+        self._sources = sources
+        self._based_on: object = None
+
+    @property
+    def answers(self) -> dict[Key, Answer]:
+        """All answers, with those that follow from them."""
+        return derive_answers(self._stated, self._sources.survey)
+
+    @property
+    def estimates(self) -> LogEstimates:
+        """Estimates from the log with the answers so far."""
+        return self._update_sources(self.answers).estimates
+
+    def list_open(self) -> list[Question]:
+        """List the questions that need an answer and were left open."""
+        known = self.answers
+        decided = {key: one for key, one in known.items() if one.value is not None}
+        sources = self._update_sources(known)
+        open_ = list_open_questions(decided, sources)
+        return [one for one in open_ if one.key in known]
+
+    def ask_all(self, ask: Ask) -> None:
+        """Ask every question that is open; one whose answer is refused is asked again."""
+        while (question := self._find_next()) is not None:
+            reason = ""
+            while question.key not in self._stated:
+                try:
+                    self._stated[question.key] = question.answer(ask(question, reason))
+                except ValueError as fault:
+                    reason = str(fault)
+
+    def fill_defaults(self) -> None:
+        """Take the default of every open question.
+
+        Raises InputError that lists the options for questions without one.
+        """
+        while (question := self._find_next()) is not None:
+            if question.default is None:
+                known = self.answers
+                raise _make_open_error(list_open_questions(known, self._update_sources(known)))
+            self._stated[question.key] = question.default
+
+    def fill_draft(self) -> None:
+        """Take the default of every open question; what has none stays unknown."""
+        while (question := self._find_next()) is not None:
+            self._stated[question.key] = question.default or UNKNOWN
+
+    def _find_next(self) -> Question | None:
+        known = self.answers
+        return find_next(known, self._update_sources(known))
+
+    def _update_sources(self, answers: Answers) -> Sources:
+        survey = self._sources.survey
+        if survey is None or not list_gears(answers):
+            return self._sources
+        based_on = _list_dependencies(answers)
+        if based_on != self._based_on:
+            self._based_on = based_on
+            estimates = estimate_entries(survey, answers)
+            self._sources = replace(self._sources, estimates=estimates)
+        return self._sources
+
+
+def _list_dependencies(answers: Answers) -> tuple[object, ...]:
+    """List the values that estimates from a log depend on."""
+    return (
+        tuple(list_gears(answers)),
+        *(get_value(answers, *key) for key in (("i_in",), ("final_drive",), ("inertia", "J_out"))),
+        *(
+            get_value(answers, "elements", gear.element, part)
+            for gear in list_gears(answers)
+            for part in ("label", "kind", "i_c", "i_out", "P0_bar")
+        ),
+    )
+
+
+def _make_open_error(questions: list[Question]) -> InputError:
+    listed = "".join(f"\n  - {one.option}: {one.prompt}" for one in questions)
+    return InputError(
+        f"{len(questions)} entries of the card are open, and there is no terminal to ask:{listed}",
+        "state them by these options, or run the command in a terminal; `--draft` writes a file in "
+        "which open entries are comments",
+    )

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin card new`: write a vehicle card from answers, options and a log."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from drivetwin.cli.arguments import ChannelsFile, find_mapping
+from drivetwin.cli.output import print_findings, print_line, print_paragraph, show_step
+from drivetwin.errors import InputError, Where
+
+if TYPE_CHECKING:
+    from drivetwin.authoring.log_survey import LogSurvey
+    from drivetwin.authoring.question import Question
+    from drivetwin.authoring.session import Session
+
+
+def new(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="CARD.toml", help="The card to write.")
+    ],
+    from_log: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="LOG", help="Fill in what a log of the vehicle shows."),
+    ] = None,
+    channels: ChannelsFile = None,
+    draft: Annotated[
+        bool,
+        typer.Option("--draft", help="Ask nothing: mark guesses, leave open entries as comments."),
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing card.")] = False,
+    name: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Name of the vehicle; the file's name if not."),
+    ] = None,
+    gearbox: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Built-in gearbox, as `drivetwin gearbox` lists them, or none."
+        ),
+    ] = None,
+    ratios: Annotated[
+        str | None, typer.Option(metavar="LOW,...,HIGH", help="Ratios of the gears, falling.")
+    ] = None,
+    gears: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="Names of the gears, from low to high.")
+    ] = None,
+    elements: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="Shift element that makes each gear.")
+    ] = None,
+    element: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[NAME:]KEY=VALUE,...",
+            help="Data of a shift element, without NAME of all; repeatable. Keys: kind, P0_bar, "
+            "P0_std_bar, gain_m3 or surfaces, derating, outer_mm, inner_mm (or area_m2, radius_m), "
+            "of a clutch i_c, i_out; drum_inertia_kgm2, peak.",
+        ),
+    ] = None,
+    input_gear: Annotated[
+        str | None, typer.Option(metavar="RATIO", help="Ratio of the input gear; 1 if not given.")
+    ] = None,
+    final_drive: Annotated[
+        str | None, typer.Option(metavar="RATIO", help="Ratio of the final drive.")
+    ] = None,
+    engine_inertia: Annotated[
+        str | None,
+        typer.Option(metavar="LOW,HIGH", help="Range of the inertia J′ at the engine [kg·m²]."),
+    ] = None,
+    mass: Annotated[
+        str | None, typer.Option(metavar="KG", help="Mass of the vehicle, or LOW,HIGH [kg].")
+    ] = None,
+    wheel_radius: Annotated[
+        str | None, typer.Option(metavar="M", help="Radius of the driven wheels [m].")
+    ] = None,
+    vehicle_inertia: Annotated[
+        str | None,
+        typer.Option(metavar="LOW,HIGH", help="Instead of mass: inertia at the wheel [kg·m²]."),
+    ] = None,
+    output_inertia: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE,STD", help="Inertia of the output side before the shaft [kg·m²]."
+        ),
+    ] = None,
+    sensor: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROLE=CLASS[:RANGE]",
+            help="Sensor class of a channel role, or of `pressure`; repeatable.",
+        ),
+    ] = None,
+) -> None:
+    """Write a vehicle card: in a terminal by questions, else from options.
+
+    With --from LOG what the log shows is filled in. Without a terminal, or with --draft, that is a
+    draft: each guess is marked, and open entries are comments. A gain is never guessed.
+    """
+    from drivetwin._util.atomic import write_text
+    from drivetwin.authoring.card_text import format_card
+    from drivetwin.authoring.options import CardOptions, parse_options
+    from drivetwin.authoring.questions import Sources
+    from drivetwin.authoring.session import Session
+
+    _refuse_existing(output, force=force)
+    single = {
+        "--name": name, "--gearbox": gearbox, "--ratios": ratios, "--gears": gears,
+        "--elements": elements, "--input-gear": input_gear, "--final-drive": final_drive,
+        "--engine-inertia": engine_inertia, "--vehicle-inertia": vehicle_inertia, "--mass": mass,
+        "--wheel-radius": wheel_radius, "--output-inertia": output_inertia,
+    }  # fmt: skip
+    given = {option: text for option, text in single.items() if text is not None}
+    survey = None if from_log is None else _survey(from_log, channels)
+    sources = Sources(_make_default_name(output), survey)
+    options = CardOptions(given, element or (), sensor or ())
+    session = Session(parse_options(options, sources), sources)
+    is_draft = _complete(session, draft=draft, from_log=from_log is not None)
+    text = format_card(session.answers, survey, session.estimates, draft=is_draft)
+    _refuse_existing(output, force=force)
+    write_text(output, text)
+    print_line(f"wrote {output}")
+    _report(session, output, from_log)
+
+
+def _refuse_existing(output: Path, *, force: bool) -> None:
+    if output.exists() and not force:
+        raise InputError(
+            "this file exists", "choose another name, or replace it with --force",
+            Where(file=str(output)),
+        )  # fmt: skip
+
+
+def _survey(log: Path, channels: Path | None) -> LogSurvey:
+    from drivetwin.authoring.log_survey import survey_log
+
+    with show_step(f"reading {log.name}"):
+        return survey_log(log, find_mapping(channels, log))
+
+
+def _make_default_name(output: Path) -> str:
+    """Name a vehicle after the file of its card."""
+    from drivetwin.authoring.parsing import parse_name
+
+    try:
+        return parse_name(output.name.removesuffix(".toml").removesuffix(".card"))
+    except ValueError:
+        return "vehicle"
+
+
+def has_terminal() -> bool:
+    """Return True if questions can be asked: input and output are a terminal."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def _complete(session: Session, *, draft: bool, from_log: bool) -> bool:
+    """Complete the answers; return True for a draft."""
+    if draft or (from_log and not has_terminal()):
+        session.fill_draft()
+        return True
+    if has_terminal():
+        print_line("Each question is a sentence on the number and its unit; Enter takes [default].")
+        session.ask_all(_ask)
+    else:
+        session.fill_defaults()
+    return False
+
+
+def _ask(question: Question, reason: str) -> str:
+    """Ask a question in the terminal, with the reason why the answer before was refused."""
+    from drivetwin._util.visible_text import escape_line
+
+    if reason:
+        print_line(f"  not taken: {reason}")
+    else:
+        print_line("")
+        print_paragraph(question.meaning)
+        if question.default is not None and question.default.note:
+            print_paragraph(f"[{question.format_default()}]: {question.default.note}")
+    default = question.format_default()
+    shown = f" [{escape_line(default)}]" if default else ""
+    unit = f" ({question.unit})" if question.unit else ""
+    try:
+        return input(f"{escape_line(question.prompt)}{unit}{shown}: ")
+    except EOFError:
+        raise InputError(
+            f"the input ended at the question for {question.prompt!r}; no card was written",
+            f"answer all questions, or state {question.option}",
+        ) from None
+
+
+def _report(session: Session, output: Path, log: Path | None) -> None:
+    """Report open entries of a draft, or implausible ones of a complete card."""
+    from drivetwin.plausibility.check import check_card
+    from drivetwin.vehicle.card import load_card
+
+    if open_ := session.list_open():
+        print_line(f"{len(open_)} entries are open, as comments in the file:")
+        for question in open_:
+            print_paragraph(f"{question.prompt} ({question.option})")
+        print_line("next: fill them in, and confirm the entries marked `guess:`")
+        return
+    print_findings(check_card(load_card(output)))
+    beside = "" if log is None else f" {log}"
+    print_line(f"next: drivetwin card check {output}{beside}")
