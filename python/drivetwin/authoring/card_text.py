@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
-from drivetwin._util.toml import format_toml_key, format_toml_text
+from drivetwin._util.toml import format_toml_key, format_toml_text, parse_toml, raise_faults
 from drivetwin._util.visible_text import escape_line
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Origin, get_value, list_gears
 from drivetwin.authoring.element_text import format_elements
@@ -15,6 +15,8 @@ from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.sensor_classes import SensorAnswer, get_offset_unit
 from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.errors import CardError
+from drivetwin.vehicle.check import check_card
 
 
 def format_card(
@@ -47,6 +49,12 @@ def format_card(
     ]
     text = "\n".join(line for part in parts for line in part)
     return re.sub(r"\n{3,}", "\n\n", text).rstrip("\n") + "\n"
+
+
+def refuse_faults(text: str, file: str) -> None:
+    """Raise CardError where the text is no card that `load_card` reads; nothing is written yet."""
+    remedy = "correct the answers or options for these entries"
+    raise_faults(check_card(parse_toml(text)), CardError, file, remedy)
 
 
 def _format_head(answers: Answers, survey: LogSurvey | None, *, draft: bool) -> Iterator[str]:

@@ -17,9 +17,14 @@ from drivetwin.authoring.answers import (
 )
 from drivetwin.authoring.gearboxes import reduce_gears
 from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
+from drivetwin.errors import CardError, Where
 from drivetwin.plausibility.settings import PLAUSIBILITY
+from drivetwin.vehicle.check import RATIO_TOLERANCE
 
-GEOMETRY = frozenset(("surfaces", "derating", "area_m2", "radius_m", "outer_mm", "inner_mm"))
+GEOMETRY = frozenset((
+    "surfaces", "derating", "area_m2", "radius_m", "outer_mm", "inner_mm", "piston_outer_mm",
+    "piston_inner_mm",
+))  # fmt: skip
 """Parts of an element from which its gain is computed."""
 WHEELS = 1.1
 """Factor on the inertia of a vehicle's mass for that of wheels and axles."""
@@ -28,10 +33,12 @@ WHEELS = 1.1
 def derive_answers(answers: Answers, survey: LogSurvey | None) -> dict[Key, Answer]:
     """Return the answers with all that follows from them; stated ones take precedence.
 
-    Raises CardError where the gears of a stated gearbox have no dual-clutch form.
+    Raises CardError where the gears of a stated gearbox have no dual-clutch form, and where ratios
+    or diameters contradict each other.
     """
     known = merge_answers(answers.items(), _derive_gearbox(answers))
     known = merge_answers(known.items(), _spread_common(known))
+    _check_ratios(known)
     if survey is not None:
         known = merge_answers(known.items(), _label_elements(known, survey))
     return merge_answers(known.items(), _derive_geometry(known), _derive_vehicle(known))
@@ -60,6 +67,24 @@ def _spread_common(answers: Answers) -> Iterator[tuple[Key, Answer]]:
                 yield ("elements", gear.element, part), answer
 
 
+def _check_ratios(answers: Answers) -> None:
+    """Raise CardError where kind or ratios of an element do not make its gear."""
+    for gear in list_gears(answers):
+        kind, i_c, i_out = (
+            get_value(answers, "elements", gear.element, part) for part in ("kind", "i_c", "i_out")
+        )
+        what = None
+        if kind == "brake" and gear.ratio == 1.0 and i_c is None:
+            what = f"{gear.element} is a brake, which cannot make gear {gear.name} with ratio 1"
+        elif i_c and i_out and abs(i_c * i_out / gear.ratio - 1.0) > RATIO_TOLERANCE:
+            what = (
+                f"i_c·i_out of {gear.element} is {i_c * i_out:.4g}, but gear {gear.name} has "
+                f"{gear.ratio:g}"
+            )
+        if what is not None:
+            raise CardError(what, "correct the element or the ratio", Where(key="--element"))
+
+
 def _label_elements(answers: Answers, survey: LogSurvey) -> Iterator[tuple[Key, Answer]]:
     """Name the pressure of the log that belongs to each element, by the ratio of its gear."""
     labels = assign_pressures(survey.gears)
@@ -72,27 +97,41 @@ def _label_elements(answers: Answers, survey: LogSurvey) -> Iterator[tuple[Key, 
 
 
 def _derive_geometry(answers: Answers) -> Iterator[tuple[Key, Answer]]:
-    """Area and effective radius of the ring between two diameters."""
+    """Effective radius of the lining, and area of the piston, from their diameters."""
     for gear in list_gears(answers):
-        outer, inner = (
-            get_value(answers, "elements", gear.element, part) for part in ("outer_mm", "inner_mm")
-        )
-        if outer is None or inner is None:
-            continue
-        note = f"from the diameters {outer:g} mm and {inner:g} mm"
-        area, radius = compute_ring(5e-4 * outer, 5e-4 * inner)
-        yield ("elements", gear.element, "area_m2"), Answer(float(f"{area:.6g}"), note=note)
-        yield ("elements", gear.element, "radius_m"), Answer(float(f"{radius:.6g}"), note=note)
+        for ring, part, compute in (
+            ("", "radius_m", compute_effective_radius),
+            ("piston_", "area_m2", compute_area),
+        ):
+            diameters = [
+                get_value(answers, "elements", gear.element, f"{ring}{side}_mm")
+                for side in ("outer", "inner")
+            ]
+            if None in diameters:
+                continue
+            if not diameters[1] < diameters[0]:
+                raise CardError(
+                    f"the inner diameter {diameters[1]:g} mm of {gear.element} is not below the "
+                    f"outer diameter {diameters[0]:g} mm",
+                    f"correct {ring}inner_mm or {ring}outer_mm",
+                    Where(key="--element"),
+                )
+            value = compute(*(5e-4 * one for one in diameters))
+            note = f"from the diameters {diameters[0]:g} mm and {diameters[1]:g} mm"
+            yield ("elements", gear.element, part), Answer(float(f"{value:.6g}"), note=note)
 
 
-def compute_ring(outer: float, inner: float) -> tuple[float, float]:
-    """Return area [m^2] and effective radius [m] of a ring with radii `outer` > `inner` [m].
+def compute_area(outer: float, inner: float) -> float:
+    """Return the area [m^2] of a ring with radii `outer` > `inner` [m]."""
+    return math.pi * (outer**2 - inner**2)
 
-    The radius is that of a uniform pressure: (2/3) (R³ - r³)/(R² - r²).
+
+def compute_effective_radius(outer: float, inner: float) -> float:
+    """Return the effective radius [m] of a lining between two radii [m].
+
+    It is that of a uniform pressure: (2/3) (R³ - r³)/(R² - r²).
     """
-    area = math.pi * (outer**2 - inner**2)
-    radius = 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2)
-    return area, radius
+    return 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2)
 
 
 def _derive_vehicle(answers: Answers) -> Iterator[tuple[Key, Answer]]:
@@ -101,9 +140,7 @@ def _derive_vehicle(answers: Answers) -> Iterator[tuple[Key, Answer]]:
     if mass is None or radius is None:
         return
     low, high = mass
-    note = (
-        f"mass {low:g} to {high:g} kg times (wheel radius {radius:g} m) squared, wheels up to 10 %"
-    )
+    note = f"{low:.4g} to {high:.4g} kg times the square of {radius:g} m; wheels add up to 10 %"
     limits = (
         float(f"{low * radius**2:.4g}"),
         float(f"{WHEELS * high * radius**2:.4g}"),

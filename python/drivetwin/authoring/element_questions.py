@@ -22,7 +22,7 @@ from drivetwin.authoring.question import Question
 from drivetwin.vehicle.check import RATIO_TOLERANCE
 
 FORMS = ("gain", "area", "diameters")
-"""Ways to state the gain of an element: one number, area and radius, or the lining's diameters."""
+"""Ways to state the gain of an element: one number, area and radius, or diameters."""
 MOST_GAIN = 10.0
 """Largest gain [m^3] that a clutch can have."""
 
@@ -50,8 +50,10 @@ ELEMENT_PARTS: dict[str, Parser] = {
     "derating": parse_share,
     "area_m2": make_number_parser(high=MOST_GAIN, unit="m²"),
     "radius_m": make_number_parser(high=MOST_GAIN, unit="m"),
-    "outer_mm": make_number_parser(high=MOST_DIAMETER, unit="mm"),
-    "inner_mm": make_number_parser(high=MOST_DIAMETER, unit="mm"),
+    "outer_mm": make_number_parser(1.0, MOST_DIAMETER, unit="mm"),
+    "inner_mm": make_number_parser(high=MOST_DIAMETER, unit="mm", zero=True),
+    "piston_outer_mm": make_number_parser(1.0, MOST_DIAMETER, unit="mm"),
+    "piston_inner_mm": make_number_parser(high=MOST_DIAMETER, unit="mm", zero=True),
     "drum_inertia_kgm2": parse_design_value,
     "peak": make_number_parser(1.0, 10.0, zero=True),
 }
@@ -81,9 +83,9 @@ PART_TEXTS = {
         "i_out=RATIO",
     ),
     "P0_bar": PartText(
-        "P0, as VALUE or VALUE,STD",
+        "P0",
         "Gauge pressure at which the fill ends and the element begins to carry torque, usually 0.3 "
-        "to 2 bar; STD is one standard deviation.",
+        "to 2 bar; as VALUE, or VALUE+-STD with one standard deviation.",
         "P0_bar=VALUE",
         "bar",
     ),
@@ -97,23 +99,40 @@ PART_TEXTS = {
     ),
     "derating": PartText(
         "De-rating",
-        "Share of the ring that carries, without grooves and holes: 0.8 to 1; 1 for none.",
+        "Share of the torque that grooves and uneven pressure leave: 0.8 to 1; 1 for no loss.",
         "derating=SHARE",
     ),
     "area_m2": PartText(
         "Piston area",
-        "Area on which the pressure acts, the A of the gain: 0.01 to 0.03 m².",
+        "Area on which the pressure acts, the A of the gain: 0.005 to 0.03 m².",
         "area_m2=M2",
         "m²",
     ),
     "radius_m": PartText(
         "Effective radius", "Mean radius of the lining: 0.05 to 0.25 m.", "radius_m=M", "m"
     ),
-    "outer_mm": PartText("Outer diameter", "Outer diameter of the lining.", "outer_mm=MM", "mm"),
+    "outer_mm": PartText(
+        "Outer diameter of the lining",
+        "The effective radius follows from both diameters of the lining.",
+        "outer_mm=MM",
+        "mm",
+    ),
     "inner_mm": PartText(
-        "Inner diameter",
-        "Inner diameter of the lining; area and effective radius follow from both diameters.",
+        "Inner diameter of the lining",
+        "The effective radius is 2/3 (R³ - r³)/(R² - r²) of outer and inner radius.",
         "inner_mm=MM",
+        "mm",
+    ),
+    "piston_outer_mm": PartText(
+        "Outer diameter of the piston",
+        "The pressure acts on the ring between both diameters of the piston, the A of the gain.",
+        "piston_outer_mm=MM",
+        "mm",
+    ),
+    "piston_inner_mm": PartText(
+        "Inner diameter of the piston",
+        "Inner diameter of the ring on which the pressure acts; 0 for a full circle.",
+        "piston_inner_mm=MM",
         "mm",
     ),
 }
@@ -235,7 +254,7 @@ def _iterate_gain_questions(
     if form is None:
         yield Question(
             ("elements", element, "form"),
-            _make_option(element, "gain_m3=M3, or surfaces=N,derating=SHARE,outer_mm=D,inner_mm=d"),
+            _make_option(element, "gain_m3=M3, or surfaces=N,derating=SHARE,area_m2=M2,radius_m=M"),
             f"Is the gain of {element or 'the element'} known as gain, area or diameters",
             "The gain N·D·A·r turns pressure into torque: friction surfaces, de-rating, area and "
             f"effective radius; it is one number, or computed from its parts.{hint}",
@@ -250,13 +269,22 @@ def _iterate_gain_questions(
 
 
 def _iterate_size_questions(answers: Answers, element: str, form: str) -> Iterator[Question]:
-    if form == "area":
-        yield _make_question(element, "area_m2")
-        yield _make_question(element, "radius_m")
-        return
-    yield _make_question(element, "outer_mm")
-    outer = get_value(answers, "elements", element, "outer_mm", default=MOST_DIAMETER)
-    yield _make_question(element, "inner_mm", make_number_parser(high=0.999 * outer, unit="mm"))
+    """Ask for effective radius and area, or for the diameters that they follow from."""
+    stated = {key[2] for key in answers if key[:2] == ("elements", element)}
+    for ring, part in (("", "radius_m"), ("piston_", "area_m2")):
+        has_diameter = bool(stated & {f"{ring}outer_mm", f"{ring}inner_mm"})
+        if has_diameter or (form == "diameters" and part not in stated):
+            yield from _iterate_ring_questions(answers, element, ring)
+        else:
+            yield _make_question(element, part)
+
+
+def _iterate_ring_questions(answers: Answers, element: str, ring: str) -> Iterator[Question]:
+    """Ask for the outer and the inner diameter of a ring."""
+    yield _make_question(element, f"{ring}outer_mm")
+    outer = get_value(answers, "elements", element, f"{ring}outer_mm", default=MOST_DIAMETER)
+    parse = make_number_parser(high=0.999 * outer, unit="mm", zero=True)
+    yield _make_question(element, f"{ring}inner_mm", parse)
 
 
 def find_form(answers: Answers, element: str) -> str | None:
@@ -267,6 +295,6 @@ def find_form(answers: Answers, element: str) -> str | None:
         return str(stated)
     if "gain_m3" in parts:
         return "gain"
-    if parts & {"area_m2", "radius_m"} and not parts & {"outer_mm", "inner_mm"}:
-        return "area"
-    return "diameters" if parts & GEOMETRY else None
+    if any(part.endswith("_mm") for part in parts):
+        return "diameters"
+    return "area" if parts & GEOMETRY else None

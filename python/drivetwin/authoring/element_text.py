@@ -15,9 +15,9 @@ from drivetwin.authoring.log_survey import LogSurvey
 
 GEOMETRY = (
     ("surfaces", "N: friction surfaces, two for each plate with linings on both sides [-]"),
-    ("derating", "D: share of the ring that carries, without grooves and holes [-]"),
-    ("area_m2", "A: area [m²]"),
-    ("radius_m", "r: effective radius [m]"),
+    ("derating", "D: share of the torque that grooves and uneven pressure leave [-]"),
+    ("area_m2", "A: area on which the pressure acts [m²]"),
+    ("radius_m", "r: effective radius of the lining [m]"),
 )
 """Parts of the gain N·D·A·r, with their meanings."""
 

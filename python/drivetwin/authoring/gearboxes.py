@@ -68,7 +68,8 @@ def match_gearboxes(ratios: Sequence[float]) -> list[GearboxFit]:
     return sorted(fits, key=lambda one: one.difference)
 
 
-def reduce_gears(name: str, gears: Sequence[str]) -> list[GearboxElement]:
+@cache
+def reduce_gears(name: str, gears: tuple[str, ...]) -> tuple[GearboxElement, ...]:
     """Return the elements of neighbouring `gears` (from low to high) of a gearbox.
 
     Raises CardError where the gears have no common dual-clutch form, with the reason.
@@ -80,7 +81,7 @@ def reduce_gears(name: str, gears: Sequence[str]) -> list[GearboxElement]:
         what = f"no gear {', '.join(missing)}" if missing else "one gear alone makes no card"
         listed = ", ".join(known)
         raise CardError(f"{name}: {what}", f"choose two or more of {listed} with --gears")
-    gears = sorted(gears, key=lambda gear: -known[gear])
+    gears = tuple(sorted(gears, key=lambda gear: -known[gear]))
     found: dict[str, ElementRatios] = {}
     for low, high in pairwise(gears):
         try:
@@ -111,7 +112,7 @@ def reduce_gears(name: str, gears: Sequence[str]) -> list[GearboxElement]:
             f"{name}: {twice} makes several of the gears {', '.join(gears)}",
             "write a card for each pair of gears: --gears LOW,HIGH",
         )
-    return [
+    return tuple(
         GearboxElement(
             gear,
             round(found[gear].ratio, 6),
@@ -121,7 +122,7 @@ def reduce_gears(name: str, gears: Sequence[str]) -> list[GearboxElement]:
             round(found[gear].i_out, 6),
         )
         for gear in gears
-    ]
+    )
 
 
 def _is_same(one: ElementRatios, other: ElementRatios) -> bool:

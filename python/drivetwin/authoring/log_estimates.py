@@ -31,6 +31,9 @@ LEAST_FILL_ERROR = 0.25
 MOST_FILL_ERROR = 0.45
 """Largest standard deviation [bar] of a P0 that is worth a guess."""
 
+MOST_SPREAD = 5.0
+"""Largest ratio of the limits of μ·gain that is worth a remark."""
+
 
 @dataclass(frozen=True)
 class LogEstimates:
@@ -72,13 +75,20 @@ def estimate_entries(survey: LogSurvey, answers: Answers) -> LogEstimates:
         return LogEstimates(J_vehicle=J_vehicle, remark="the log has no shift of these gears")
     products: dict[str, FrictionProduct] = {}
     for product in find_products(log, card, shifts):
-        products.setdefault(product.element, product)
+        if _has_ratios(answers, product.element) and product.high <= MOST_SPREAD * product.low:
+            products.setdefault(product.element, product)
     return LogEstimates(
         P0=estimate_fill_pressures(log, card, shifts),
         J_prime=None if survey.has_input_slip else estimate_engine_inertia(log, card, shifts),
         J_vehicle=J_vehicle,
         products=products,
     )
+
+
+def _has_ratios(answers: Answers, element: str) -> bool:
+    """Return True if the ratios that relate clutch torque to output torque are known."""
+    kind = get_value(answers, "elements", element, "kind")
+    return kind == "brake" or get_value(answers, "elements", element, "i_out") is not None
 
 
 def make_provisional_card(answers: Answers) -> VehicleCard:

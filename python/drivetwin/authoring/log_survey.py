@@ -24,6 +24,7 @@ from drivetwin.channels.read_options import Column
 from drivetwin.channels.shiftlog import Quantity, ShiftLog
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import MissingChannelError, TimeError
+from drivetwin.findings import Code
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.quality.time_alignment import estimate_speed_ratio
 from drivetwin.logs.raw import Remembered
@@ -128,7 +129,8 @@ def survey_log(path: Path, mapping: Path | None) -> LogSurvey:
     try:
         speeds = resample_geared(log, 1.0, 1.0 if final_drive is None else final_drive[0])
     except (MissingChannelError, TimeError) as fault:
-        return replace(found, remark=fault.what)
+        left_out = [one.text for one in log.findings if one.code is Code.CHANNEL_LEFT_OUT]
+        return replace(found, remark="; ".join([fault.what, *left_out]))
     gears = tuple(_find_gears(log, speeds, labels))
     return replace(found, gears=gears, remark="" if gears else "the speeds hold no ratio")
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from drivetwin._util.spelling import suggest_spelling
-from drivetwin.authoring.answers import Answer, Key, get_value
+from drivetwin.authoring.answers import Answer, Key
 from drivetwin.authoring.derive import GEOMETRY, derive_answers
 from drivetwin.authoring.element_questions import ELEMENT_PARTS
 from drivetwin.authoring.questions import SENSOR_ROLES, Sources, iterate_questions
@@ -52,8 +52,6 @@ def parse_options(options: CardOptions, sources: Sources) -> dict[Key, Answer]:
         if option in options.single:
             known = derive_answers(answers, None)
             answers[key] = _answer_question(option, options.single[option], known, sources)
-    known = derive_answers(answers, None)
-    _refuse_unknown_elements(answers, get_value(known, "gears", "elements"))
     return answers
 
 
@@ -132,21 +130,9 @@ def _parse_element_option(text: str) -> Iterator[tuple[Key, Answer]]:
         what = "gain_m3 and the parts that it is computed from state the same"
         raise InputError(what, "leave one of them out", where)
     if (std := found.pop("P0_std_bar", None)) is not None:
-        found["P0_bar"] = f"{found.get('P0_bar', '')},{std}"
+        found["P0_bar"] = f"{found.get('P0_bar', '')}+-{std}"
     for part, value in found.items():
         try:
             yield ("elements", name.strip(), part), Answer(ELEMENT_PARTS[part](value))
         except ValueError as fault:
             raise InputError(f"{part}: {fault}", remedy, where) from None
-
-
-def _refuse_unknown_elements(answers: Mapping[Key, Answer], elements: Sequence[str] | None) -> None:
-    if elements is None:
-        return
-    for key in answers:
-        if key[0] == "elements" and key[1] and key[1] not in elements:
-            raise InputError(
-                f"no gear has an element {key[1]!r}{suggest_spelling(key[1], elements)}",
-                "name the elements with --elements, one for each gear",
-                Where(key="--element"),
-            )

@@ -8,8 +8,6 @@ import re
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 
-from drivetwin._util.spelling import suggest_spelling
-
 Parser = Callable[[str], object]
 
 MOST_CHARACTERS = 200
@@ -48,8 +46,13 @@ def make_number_parser(
 
 
 def split_list(text: str) -> list[str]:
-    """Split a list at commas, semicolons or white space."""
-    return [part for part in re.split(r"[,;\s]+", text.strip()) if part]
+    """Split a list at semicolons, else at white space, else at commas."""
+    if ";" in text:
+        parts = text.split(";")
+    else:
+        parts = re.split(r"\s+", text.strip())
+        parts = parts if len(parts) > 1 else text.split(",")
+    return [part for one in parts if (part := one.strip().strip(",").strip())]
 
 
 def parse_ratios(text: str) -> tuple[float, ...]:
@@ -95,25 +98,29 @@ def make_names_parser(count: int | None) -> Callable[[str], tuple[str, ...]]:
     return parse
 
 
+def _split_pair(text: str, separators: str, example: str) -> list[float]:
+    """Split one or two numbers; a comma between digits is refused, for it may be a decimal one."""
+    if re.search(r"\d\s*,\s*\d", text):
+        raise ValueError(f"{text.strip()!r} has a comma: write a decimal point, or {example}")
+    parse = make_number_parser(zero=True)
+    parts = [parse(part) for part in re.split(rf"\s*(?:{separators})\s*", text.strip()) if part]
+    if len(parts) not in (1, 2):
+        raise ValueError(f"give one number, or {example}")
+    return parts
+
+
 def parse_range(text: str, spread: float = 2.0) -> tuple[float, float]:
-    """Parse LOW,HIGH; of one value the range from it over `spread` to it times `spread`."""
-    parse = make_number_parser()
-    parts = [parse(part) for part in split_list(text)]
-    if len(parts) == 1:
-        return parts[0] / spread, parts[0] * spread
-    if len(parts) != 2:
-        raise ValueError("give a range LOW,HIGH or one value")
-    if not parts[0] < parts[1]:
-        raise ValueError(f"a range is LOW,HIGH with LOW below HIGH, not {parts[0]:g},{parts[1]:g}")
-    return parts[0], parts[1]
+    """Parse LOW..HIGH; of one value the range from it over `spread` to it times `spread`."""
+    parts = _split_pair(text, r"\.\.\.?|\bto\b|–", "LOW..HIGH for a range, as 4..20")
+    low, high = parts if len(parts) == 2 else (parts[0] / spread, parts[0] * spread)
+    if not 0.0 < low < high:
+        raise ValueError(f"a range is LOW..HIGH with 0 below LOW below HIGH, not {low:g}..{high:g}")
+    return low, high
 
 
 def parse_design_value(text: str) -> tuple[float, float]:
-    """Parse VALUE or VALUE,STD: a design value and one standard deviation in the same unit."""
-    parse = make_number_parser(zero=True)
-    parts = [parse(part) for part in split_list(text.replace("±", " ").replace("+-", " "))]
-    if len(parts) not in (1, 2):
-        raise ValueError("give VALUE or VALUE,STD")
+    """Parse VALUE or VALUE+-STD: a design value and one standard deviation in the same unit."""
+    parts = _split_pair(text, r"\+/?-|±", "VALUE+-STD for a standard deviation, as 0.8+-0.1")
     return parts[0], parts[1] if len(parts) == 2 else 0.0
 
 
@@ -126,8 +133,7 @@ def make_choice_parser(choices: Iterable[str]) -> Callable[[str], str]:
         exact = [one for one in known if one.casefold() == wanted]
         found = exact or [one for one in known if wanted and one.casefold().startswith(wanted)]
         if len(found) != 1:
-            hint = suggest_spelling(text.strip(), known)
-            raise ValueError(f"{text.strip()!r} is none of {', '.join(known)}{hint}")
+            raise ValueError(f"{text.strip()!r} is none of {', '.join(known)}")
         return found[0]
 
     return parse

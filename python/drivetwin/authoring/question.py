@@ -32,7 +32,8 @@ class Question:
         """Return the default as a user would type it; empty without one."""
         if self.shown or self.default is None or self.default.value is None:
             return self.shown
-        return format_value(self.default.value)
+        separators = {"P0_bar": "+-", "J_prime": "..", "J_vehicle": ".."}
+        return format_value(self.default.value, separators.get(self.key[-1], ","))
 
     def answer(self, text: str) -> Answer:
         """Return the answer for a text; ValueError states why the text is refused."""
@@ -43,8 +44,8 @@ class Question:
         return Answer(self.parse(text))
 
 
-def format_value(value: object) -> str:
-    """Return a value as a user would type it."""
+def format_value(value: object, separator: str = ",") -> str:
+    """Return a value as a user would type it, the parts of a tuple with a `separator`."""
     if isinstance(value, tuple):
-        return ",".join(format_value(one) for one in value)
+        return separator.join(format_value(one) for one in value)
     return f"{value:.6g}" if isinstance(value, float) else str(value)

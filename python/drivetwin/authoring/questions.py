@@ -8,7 +8,12 @@ from dataclasses import dataclass, field
 
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, Origin, get_value
 from drivetwin.authoring.element_questions import iterate_element_questions
-from drivetwin.authoring.gearboxes import list_forward_gears, match_gearboxes, reduce_gears
+from drivetwin.authoring.gearboxes import (
+    GearboxFit,
+    list_forward_gears,
+    match_gearboxes,
+    reduce_gears,
+)
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
 from drivetwin.authoring.parsing import (
@@ -22,7 +27,12 @@ from drivetwin.authoring.parsing import (
     parse_ratios,
 )
 from drivetwin.authoring.question import Question
-from drivetwin.authoring.sensor_classes import get_offset_unit, list_classes, parse_sensor
+from drivetwin.authoring.sensor_classes import (
+    get_offset_unit,
+    list_classes,
+    parse_sensor,
+    read_sensor_classes,
+)
 from drivetwin.channels.pressure_roles import get_pressure_element
 from drivetwin.errors import CardError
 from drivetwin.gearbox import list_builtin_gearboxes
@@ -31,6 +41,8 @@ INERTIA_MARGIN = 1.25
 """Factor by which a range estimated from a log is widened to both sides."""
 MASS_SPREAD = 1.1
 """Factor between a single mass and the limits of its range."""
+LEAST_MASS = 50.0
+"""Least mass of a vehicle [kg]."""
 SENSOR_ROLES = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
 """Roles whose sensors are asked for without a log; `pressure` stands for all pressures."""
 
@@ -79,7 +91,8 @@ def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Ques
     )  # fmt: skip
     box = get_value(answers, "gearbox")
     if box is not None:
-        yield _make_box_gears_question(box, next((one for one in fits if one.name == box), None))
+        fit = next((one for one in fits if one.name == box), None)
+        yield _make_box_gears_question(box, fit, list_stated_elements(answers))
         return
     note = "" if survey is None else f"ratios of input to output speed held in {survey.name}"
     yield Question(
@@ -100,12 +113,35 @@ def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Ques
         ("gears", "elements"), "--elements NAME,...", "Shift element of each gear",
         "The element is the clutch or brake that engages when its gear does and opens in the shift "
         "to the next; name one for each gear, as B2,B3.",
-        make_names_parser(len(ratios) or None),
-        default=_guess_elements(ratios, get_value(answers, "gears", "names", default=()), survey),
+        _make_elements_parser(len(ratios) or None, list_stated_elements(answers)),
+        default=_guess_elements(answers, survey),
     )  # fmt: skip
 
 
-def _make_box_gears_question(box: str, fit: object) -> Question:
+def list_stated_elements(answers: Answers) -> tuple[str, ...]:
+    """List the elements for which something is stated, in the order of the statements."""
+    return tuple(dict.fromkeys(key[1] for key in answers if key[0] == "elements" and key[1]))
+
+
+def _refuse_unnamed(stated: tuple[str, ...], names: tuple[str, ...]) -> None:
+    """Raise ValueError where something is stated for an element that makes no gear."""
+    other = next((one for one in stated if one not in names), None)
+    if other is not None:
+        raise ValueError(f"--element names {other!r}; the elements are {', '.join(names)}")
+
+
+def _make_elements_parser(count: int | None, stated: tuple[str, ...]) -> Parser:
+    parse_names = make_names_parser(count)
+
+    def parse(text: str) -> tuple[str, ...]:
+        names = parse_names(text)
+        _refuse_unnamed(stated, names)
+        return names
+
+    return parse
+
+
+def _make_box_gears_question(box: str, fit: GearboxFit | None, stated: tuple[str, ...]) -> Question:
     known = list_forward_gears(box)
 
     def parse(text: str) -> tuple[str, ...]:
@@ -114,10 +150,12 @@ def _make_box_gears_question(box: str, fit: object) -> Question:
             elements = reduce_gears(box, names)
         except CardError as fault:
             raise ValueError(f"{fault.what}; {fault.remedy}") from fault
+        _refuse_unnamed(stated, tuple(one.element for one in elements))
         return tuple(one.gear for one in elements)
 
-    gears = getattr(fit, "gears", None)
-    default = None if gears is None else Answer(gears, Origin.GUESS, "gears with the log's ratios")
+    default = None
+    if fit is not None:
+        default = Answer(fit.gears, Origin.GUESS, "gears with the ratios of the log")
     listed = ", ".join(f"{gear} ({ratio:.4g})" for gear, ratio in known.items())
     return Question(
         ("gears", "names"), "--gears NAME,...", f"Gears of {box}, two or more neighbours",
@@ -140,26 +178,32 @@ def _guess_names(ratios: tuple[float, ...], sources: Sources) -> Answer | None:
     if fits:
         note = f"gears of the built-in gearbox {fits[0].name} with these ratios"
         return Answer(fits[0].gears, Origin.GUESS, note)
-    return Answer(tuple(str(k + 1) for k in range(len(ratios))), Origin.DEFAULT, "counted")
+    counted = tuple(str(k + 1) for k in range(len(ratios)))
+    if survey is None:
+        return Answer(counted, Origin.DEFAULT, "counted")
+    return Answer(counted, Origin.GUESS, "counted; the log does not name its gears")
 
 
-def _guess_elements(
-    ratios: tuple[float, ...], names: tuple[str, ...], survey: LogSurvey | None
-) -> Answer | None:
-    """Name the elements after their pressures in the log, else after their gears."""
-    if not ratios or len(names) != len(ratios):
+def _guess_elements(answers: Answers, survey: LogSurvey | None) -> Answer | None:
+    """Name the elements: as stated, else after pressures in the log, else after the gears."""
+    gears = get_value(answers, "gears", "names", default=())
+    if not gears or len(get_value(answers, "gears", "ratios", default=())) != len(gears):
         return None
+    stated = list_stated_elements(answers)
+    if len(stated) == len(gears):
+        return Answer(stated, Origin.DEFAULT)
     labels = [] if survey is None else assign_pressures(survey.gears)
-    if len(labels) == len(ratios) and any(labels):
-        found = [
-            f"E{name}" if label is None
+    found = Answer(tuple(f"E{gear}" for gear in gears), Origin.DEFAULT, "named after the gears")
+    if len(labels) == len(gears) and any(labels):
+        names = tuple(
+            f"E{gear}" if label is None
             else label if labels.count(label) == 1
-            else f"{label}{name}"
-            for label, name in zip(labels, names, strict=True)
-        ]  # fmt: skip
-        if len(set(found)) == len(found):
-            return Answer(tuple(found), Origin.GUESS, "pressure that is high in the gear alone")
-    return Answer(tuple(f"E{name}" for name in names), Origin.DEFAULT, "named after the gears")
+            else f"{label}{gear}"
+            for label, gear in zip(labels, gears, strict=True)
+        )  # fmt: skip
+        if len(set(names)) == len(names):
+            found = Answer(names, Origin.GUESS, "pressure that is high in the gear alone")
+    return found if set(stated) <= set(found.value) else None
 
 
 def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
@@ -168,6 +212,8 @@ def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
     if survey is not None and survey.input_gear is not None:
         note = f"engine over input speed in {survey.name}"
         default = Answer(round(survey.input_gear, 4), Origin.GUESS, note)
+    elif survey is not None:
+        default = Answer(1.0, Origin.GUESS, f"no input gear; {survey.name} does not show one")
     yield Question(
         ("i_in",), "--input-gear RATIO", "Ratio of the input gear",
         "Engine speed over gearbox input speed with the lock-up closed; 1 without an input gear.",
@@ -190,7 +236,7 @@ def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Q
     survey, estimates = sources.survey, sources.estimates
     note = "" if survey is None else f"torque balance of {survey.name}, efficiency 0.7 to 1"
     yield Question(
-        ("inertia", "J_prime"), "--engine-inertia LOW,HIGH", "Range of the inertia at the engine",
+        ("inertia", "J_prime"), "--engine-inertia LOW..HIGH", "Range of the inertia at the engine",
         "J′ is engine, flywheel, converter and gearbox input together, at engine speed: 0.1 to 0.6 "
         "for a car, 4 to 40 for a truck; of one value the range is half to twice of it.",
         parse_range, "kg·m²", _widen(estimates.J_prime, note),
@@ -200,8 +246,9 @@ def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Q
     )
     if ("inertia", "J_vehicle") not in answers or ("vehicle", "mass") in answers:
         yield Question(
-            ("vehicle", "mass"), "--mass KG (or --vehicle-inertia LOW,HIGH)", "Mass of the vehicle",
-            "Mass during the recording, load included, as LOW,HIGH; one value counts ± 10 %.",
+            ("vehicle", "mass"), "--mass KG (or --vehicle-inertia LOW..HIGH)",
+            "Mass of the vehicle",
+            "Mass during the recording, load included, as LOW..HIGH; one value counts ± 10 %.",
             _parse_mass, "kg", None if guess is None else UNKNOWN,
             shown="" if guess is None else "the inertia that the log shows",
         )  # fmt: skip
@@ -209,17 +256,17 @@ def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Q
             yield Question(
                 ("vehicle", "radius"), "--wheel-radius M (with --mass)", "Radius of the wheels",
                 "Rolling radius of the driven wheels: 0.3 for a car, 0.5 for a truck.",
-                make_number_parser(high=5.0, unit="m"), "m",
+                make_number_parser(0.05, 5.0, unit="m"), "m",
             )  # fmt: skip
         else:
             yield Question(
-                ("inertia", "J_vehicle"), "--vehicle-inertia LOW,HIGH",
+                ("inertia", "J_vehicle"), "--vehicle-inertia LOW..HIGH",
                 "Range of the vehicle's inertia at the wheel",
                 "J3 is mass times wheel radius squared, plus the wheels.",
                 parse_range, "kg·m²", guess,
             )  # fmt: skip
     yield Question(
-        ("inertia", "J_out"), "--output-inertia VALUE,STD", "Inertia of the output side, or blank",
+        ("inertia", "J_out"), "--output-inertia VALUE+-STD", "Inertia of the output side, or blank",
         "Jo′ is gearbox output and propeller shaft before the elastic shaft, without clutch drums; "
         "blank if unknown.",
         parse_design_value, "kg·m²", UNKNOWN,
@@ -234,14 +281,22 @@ def _iterate_sensor_questions(sources: Sources) -> Iterator[Question]:
         roles = tuple(role for role in SENSOR_ROLES if role in log)
         roles += ("pressure",) if has_pressure else ()
     for role in roles:
-        unit = get_offset_unit(role).replace("Nm", "N·m")
         yield Question(
             ("sensors", role), f"--sensor {role}=CLASS[:RANGE]", f"Sensor class of {role}, or none",
-            f"The class gives the tolerances: {', '.join(list_classes(role))}; write CLASS:RANGE "
-            f"with the largest value that the sensor measures [{unit}] where its offset depends on "
-            "it. None: intervals cover noise only.",
-            _make_sensor_parser(role), default=UNKNOWN, shown="none",
+            _describe_classes(role), _make_sensor_parser(role), default=UNKNOWN, shown="none",
         )  # fmt: skip
+
+
+def _describe_classes(role: str) -> str:
+    """Describe the classes that a role has, and how to name one."""
+    classes = read_sensor_classes()
+    names = list_classes(role)
+    listed = "; ".join(f"{name}: {classes[name].title}" for name in names)
+    text = f"The class gives the tolerances ({listed}); none: intervals cover noise only."
+    if any(classes[name].offset_limit_share for name in names):
+        unit = get_offset_unit(role).replace("Nm", "N·m")
+        text += f" Write CLASS:RANGE with the largest value measured [{unit}] if it has a range."
+    return text
 
 
 def _make_sensor_parser(role: str) -> Parser:
@@ -259,7 +314,10 @@ def _make_optional(parse: Parser) -> Parser:
 
 
 def _parse_mass(text: str) -> tuple[float, float]:
-    return parse_range(text, MASS_SPREAD)
+    low, high = parse_range(text, MASS_SPREAD)
+    if low < LEAST_MASS:
+        raise ValueError(f"{low:g} kg is below {LEAST_MASS:g} kg; the unit is kg")
+    return low, high
 
 
 def _widen(limits: tuple[float, float] | None, note: str) -> Answer | None:

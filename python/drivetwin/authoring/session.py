@@ -17,8 +17,13 @@ from drivetwin.authoring.answers import (
 from drivetwin.authoring.derive import derive_answers
 from drivetwin.authoring.log_estimates import LogEstimates, estimate_entries
 from drivetwin.authoring.question import Question
-from drivetwin.authoring.questions import Sources, find_next, list_open_questions
-from drivetwin.errors import InputError
+from drivetwin.authoring.questions import (
+    Sources,
+    find_next,
+    list_open_questions,
+    list_stated_elements,
+)
+from drivetwin.errors import InputError, Where
 
 Ask = Callable[[Question, str], str]
 """Asks a question, with the reason why the answer before was refused; returns the text."""
@@ -75,8 +80,19 @@ class Session:
             self._stated[question.key] = question.default
 
     def fill_draft(self) -> None:
-        """Take the default of every open question; what has none stays unknown."""
+        """Take the default of every open question; what has none stays unknown.
+
+        Raises InputError where an option states something of an element that makes no gear.
+        """
         while (question := self._find_next()) is not None:
+            is_named = get_value(self.answers, "gears", "ratios") is not None
+            if question.key == ("gears", "elements") and question.default is None and is_named:
+                stated = ", ".join(list_stated_elements(self.answers))
+                raise InputError(
+                    f"--element names {stated}, and not all of them are elements of the gears",
+                    f"name one for each gear with {question.option}",
+                    Where(key="--element"),
+                )
             self._stated[question.key] = question.default or UNKNOWN
 
     def _find_next(self) -> Question | None:

@@ -57,8 +57,9 @@ def new(
         typer.Option(
             metavar="[NAME:]KEY=VALUE,...",
             help="Data of a shift element, without NAME of all; repeatable. Keys: kind, P0_bar, "
-            "P0_std_bar, gain_m3 or surfaces, derating, outer_mm, inner_mm (or area_m2, radius_m), "
-            "of a clutch i_c, i_out; drum_inertia_kgm2, peak.",
+            "P0_std_bar, gain_m3 or surfaces, derating, area_m2 (or piston_outer_mm, "
+            "piston_inner_mm), radius_m (or outer_mm, inner_mm), of a clutch i_c, i_out; "
+            "drum_inertia_kgm2, peak.",
         ),
     ] = None,
     input_gear: Annotated[
@@ -69,22 +70,22 @@ def new(
     ] = None,
     engine_inertia: Annotated[
         str | None,
-        typer.Option(metavar="LOW,HIGH", help="Range of the inertia J′ at the engine [kg·m²]."),
+        typer.Option(metavar="LOW..HIGH", help="Range of the inertia J′ at the engine [kg·m²]."),
     ] = None,
     mass: Annotated[
-        str | None, typer.Option(metavar="KG", help="Mass of the vehicle, or LOW,HIGH [kg].")
+        str | None, typer.Option(metavar="KG", help="Mass of the vehicle, or LOW..HIGH [kg].")
     ] = None,
     wheel_radius: Annotated[
         str | None, typer.Option(metavar="M", help="Radius of the driven wheels [m].")
     ] = None,
     vehicle_inertia: Annotated[
         str | None,
-        typer.Option(metavar="LOW,HIGH", help="Instead of mass: inertia at the wheel [kg·m²]."),
+        typer.Option(metavar="LOW..HIGH", help="Instead of mass: inertia at the wheel [kg·m²]."),
     ] = None,
     output_inertia: Annotated[
         str | None,
         typer.Option(
-            metavar="VALUE,STD", help="Inertia of the output side before the shaft [kg·m²]."
+            metavar="VALUE+-STD", help="Inertia of the output side before the shaft [kg·m²]."
         ),
     ] = None,
     sensor: Annotated[
@@ -101,7 +102,7 @@ def new(
     draft: each guess is marked, and open entries are comments. A gain is never guessed.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.authoring.card_text import format_card
+    from drivetwin.authoring.card_text import format_card, refuse_faults
     from drivetwin.authoring.options import CardOptions, parse_options
     from drivetwin.authoring.questions import Sources
     from drivetwin.authoring.session import Session
@@ -116,10 +117,14 @@ def new(
     given = {option: text for option, text in single.items() if text is not None}
     survey = None if from_log is None else _survey(from_log, channels)
     sources = Sources(_make_default_name(output), survey)
+    if survey is not None and survey.remark:
+        print_paragraph(f"{survey.name} gives no ratios: {survey.remark}")
     options = CardOptions(given, element or (), sensor or ())
     session = Session(parse_options(options, sources), sources)
     is_draft = _complete(session, draft=draft, from_log=from_log is not None)
     text = format_card(session.answers, survey, session.estimates, draft=is_draft)
+    if not session.list_open():
+        refuse_faults(text, str(output))
     _refuse_existing(output, force=force)
     write_text(output, text)
     print_line(f"wrote {output}")
@@ -201,7 +206,9 @@ def _report(session: Session, output: Path, log: Path | None) -> None:
         print_line(f"{len(open_)} entries are open, as comments in the file:")
         for question in open_:
             print_paragraph(f"{question.prompt} ({question.option})")
-        print_line("next: fill them in, and confirm the entries marked `guess:`")
+        print_line(
+            "next: fill them in, or state these options and --force; confirm entries with `guess:`"
+        )
         return
     print_findings(check_card(load_card(output)))
     beside = "" if log is None else f" {log}"

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: MIT
+"""Any answers end in a card that the reader accepts, or in a question that is asked again."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from drivetwin._util.toml import parse_toml
+from drivetwin.authoring.answers import Key
+from drivetwin.authoring.card_text import format_card
+from drivetwin.authoring.options import CardOptions, parse_options
+from drivetwin.authoring.question import Question
+from drivetwin.authoring.questions import Sources
+from drivetwin.authoring.session import Session
+from drivetwin.errors import CardError, InputError
+from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+VALID = {
+    "name": "truck", "gearbox": "none", "ratios": "1.86, 1.41", "names": "2,3", "elements": "B2 B3",
+    "kind": "clutch", "i_c": "1", "i_out": "", "P0_bar": "0.8", "form": "gain", "gain_m3": "0.03",
+    "surfaces": "10", "derating": "0.9", "area_m2": "0.02", "radius_m": "0.15", "outer_mm": "340",
+    "inner_mm": "0", "piston_outer_mm": "300", "piston_inner_mm": "0", "i_in": "1",
+    "final_drive": "4.88", "J_prime": "4..20", "mass": "12000", "radius": "0.5", "J_out": "",
+}  # fmt: skip
+"""An answer to each question that is taken in nearly all situations, by the last part of its key."""
+POOL = (
+    "", " ", "0", "1", "-1", "2", "3", "0.5", "1e300", "1e-300", "nan", "inf", "0,8", "1_0", "4..20",
+    "20..4", "0.8+-0.1", "0.8 ± 0.1", "3 2 1", "1.91;1.43;1.0", "1.0000001 1", "2,3", "2,3,4", "1,2",
+    "a b c", "B2,B2", "brake", "clutch", "b", "gain", "area", "diameters", "none", "three-set-3000",
+    "zf-8hp70", "manual-6", "dual-clutch-7", "ecu-car", "torque-flange", "torque-flange:5000",
+    "strain-gauge:0", "pressure-gauge:25", "pressure-gauge:x", "j1939-speed", "340", "1e4", '"', "\\",
+    "\x00", "\x7f,\x1b[31m", "\u202e,\u2028", "#", "[x],]", "a\ud800",
+)  # fmt: skip
+"""Answers of all kinds: good ones, those of other questions, and nonsense."""
+
+
+def load(text: str, folder: Path) -> VehicleCard:
+    path = folder / "card.toml"
+    path.write_bytes(text.encode("utf-8"))
+    return load_card(path)
+
+
+def answer_valid(question: Question) -> str:
+    key = question.key
+    return "none" if key[0] == "sensors" else VALID[key[-1]]
+
+
+def make_session(options: CardOptions | None = None) -> Session:
+    sources = Sources("truck")
+    return Session(parse_options(options or CardOptions(), sources), sources)
+
+
+def test_plain_answers_make_a_card(tmp_path: Path) -> None:
+    session = make_session()
+    session.ask_all(lambda question, _: answer_valid(question))
+    card = load(format_card(session.answers), tmp_path)
+    assert [gear.ratio for gear in card.gears] == [1.86, 1.41]
+    assert card.elements["B2"].i_out == pytest.approx(1.86)
+    assert card.J_prime_range == (4.0, 20.0)
+    assert card.J_vehicle_range[0] < 3000.0 < card.J_vehicle_range[1]
+    assert not session.list_open()
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_answers_make_a_card_or_are_asked_again(tmp_path: Path, data: st.DataObject) -> None:
+    tries: Counter[Key] = Counter()
+    reasons = 0
+    texts = st.one_of(st.sampled_from(POOL), st.text(max_size=12))
+
+    def ask(question: Question, reason: str) -> str:
+        nonlocal reasons
+        reasons += bool(reason)
+        assert bool(reason) == (tries[question.key] > 0)
+        tries[question.key] += 1
+        if tries[question.key] > 12:
+            return "c" if question.key[-1] == "kind" else _rescue(session, question)
+        if tries[question.key] > 2 or data.draw(st.booleans()):
+            return answer_valid(question)
+        return data.draw(texts)
+
+    session = make_session()
+    session.ask_all(ask)
+    text = format_card(session.answers)
+    card = load(text, tmp_path)
+    assert len(card.gears) >= 2
+    stated = {key: one.value for key, one in session.answers.items()}
+    assert card.name == stated[("name",)]
+    assert [gear.name for gear in card.gears] == list(stated[("gears", "names")])
+    assert list(card.elements) == list(stated[("gears", "elements")])
+
+
+def _rescue(session: Session, question: Question) -> str:
+    """Answer a question for which the usual answer does not fit: as many names as gears."""
+    if question.key == ("gears", "names") and session.answers[("gearbox",)].value:
+        gears = {"dual-clutch-7": "1,2", "zf-8hp70": "1,2", "three-set-3000": "2,3"}
+        return gears.get(session.answers[("gearbox",)].value, "1,2")
+    count = len(session.answers[("gears", "ratios")].value)
+    return ",".join(f"N{index}" for index in range(count))
+
+
+HOSTILE = st.text(min_size=1, max_size=20).filter(
+    lambda text: text.strip() and not any(0xD800 <= ord(one) <= 0xDFFF for one in text)
+)
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(name=HOSTILE, elements=st.lists(HOSTILE, min_size=2, max_size=2))
+def test_hostile_names_come_back_from_the_card(
+    tmp_path: Path, name: str, elements: list[str]
+) -> None:
+    session = make_session(CardOptions({"--name": name}))
+
+    def ask(question: Question, reason: str) -> str:
+        if question.key == ("gears", "elements") and not reason:
+            return ";".join(elements)
+        return answer_valid(question)
+
+    session.ask_all(ask)
+    card = load(format_card(session.answers), tmp_path)
+    assert card.name == name.strip()
+    assert list(card.elements) == list(session.answers[("gears", "elements")].value)
+
+
+def test_open_questions_are_listed_by_their_options() -> None:
+    with pytest.raises(InputError) as raised:
+        make_session(CardOptions({"--ratios": "1.86,1.41"})).fill_defaults()
+    text = str(raised.value)
+    for part in (
+        "--final-drive",
+        "--engine-inertia",
+        "--mass",
+        "E2:kind",
+        "E2:P0_bar",
+        "E3:gain_m3",
+    ):
+        assert part in text
+    assert "--ratios" not in text
+    with pytest.raises(InputError, match="--ratios"):
+        make_session().fill_defaults()
+
+
+def test_options_leave_nothing_open(tmp_path: Path) -> None:
+    options = CardOptions(
+        {
+            "--gearbox": "three-set-3000", "--gears": "3,2", "--final-drive": "4.88",
+            "--engine-inertia": "4..20", "--mass": "12000", "--wheel-radius": "0.5",
+            "--output-inertia": "1.35+-0.1",
+        },
+        ["P0_bar=0.8,P0_std_bar=0.1", "C4:gain_m3=0.03", "surfaces=10,derating=0.9,area_m2=0.02",
+         "outer_mm=340,inner_mm=260"],
+        ["pressure=pressure-gauge:25", "engine_torque=ecu-heavy-duty"],
+    )  # fmt: skip
+    session = make_session(options)
+    session.fill_defaults()
+    card = load(format_card(session.answers), tmp_path)
+    assert [gear.name for gear in card.gears] == ["2", "3"]
+    assert card.elements["C4"].gain == pytest.approx(0.03)
+    assert card.elements["C3"].gain == pytest.approx(10 * 0.9 * 0.02 * 0.150889, rel=1e-5)
+    assert card.elements["C3"].i_c == pytest.approx(0.41, rel=1e-4)
+    assert card.elements["C3"].P0.std == pytest.approx(1e4)
+    assert card.sensors["engine_torque"].gain == pytest.approx(0.07 / 3**0.5, rel=1e-2)
+    assert card.sensors["pressure.C3"].offset == pytest.approx(0.4e5 / 3**0.5, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("single", "elements", "sensors", "said"),
+    [
+        ({"--ratios": "1.41,1.86"}, [], [], "must be below"),
+        ({"--ratios": "1,86;1,41"}, [], [], "comma"),
+        ({"--gearbox": "zf-9"}, [], [], "none of"),
+        ({"--gearbox": "manual-6", "--gears": "2,3"}, [], [], "dog"),
+        ({"--gearbox": "zf-8hp70", "--gears": "1,2,3"}, [], [], "LOW,HIGH"),
+        ({"--gearbox": "three-set-3000", "--ratios": "2,1"}, [], [], "state the same"),
+        ({"--mass": "12"}, [], [], "kg"),
+        ({"--mass": "9000", "--vehicle-inertia": "1..2"}, [], [], "state the same"),
+        ({"--engine-inertia": "4,20"}, [], [], "4..20"),
+        ({}, ["B2:gain=0.03"], [], "gain_m3"),
+        ({}, ["gain_m3=0.03,surfaces=4"], [], "state the same"),
+        ({}, ["P0_bar=-1"], [], "at least 0"),
+        ({"--ratios": "2,1.5"}, ["B7:kind=brake"], [], "B7"),
+        ({"--ratios": "2,1"}, ["E2:kind=brake"], [], "ratio 1"),
+        ({"--ratios": "2,1.5", "--elements": "A,B"}, ["i_c=1,i_out=7"], [], "i_c"),
+        ({"--ratios": "2,1.5", "--elements": "A,B"}, ["outer_mm=90,inner_mm=95"], [], "below"),
+        ({}, [], ["output_torque=good"], "torque-flange"),
+        ({}, [], ["output_torque=torque-flange"], "RANGE"),
+        ({}, [], ["torque=torque-flange:1"], "output_torque"),
+    ],
+)
+def test_wrong_options_are_refused_with_the_reason(
+    single: dict[str, str], elements: list[str], sensors: list[str], said: str
+) -> None:
+    with pytest.raises((InputError, CardError)) as raised:
+        session = make_session(CardOptions(single, elements, sensors))
+        session.fill_draft()
+    assert said in str(raised.value)
+
+
+def test_a_draft_without_answers_is_toml_of_comments() -> None:
+    session = make_session()
+    session.fill_draft()
+    document = parse_toml(format_card(session.answers, draft=True))
+    assert "final_drive" not in document
+    assert document["i_in"] == 1.0
+    assert session.list_open()
