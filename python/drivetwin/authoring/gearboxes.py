@@ -38,7 +38,6 @@ class GearboxFit:
     """A built-in gearbox whose gears have the ratios of a log, and the largest difference."""
 
     name: str
-    title: str
     gears: tuple[str, ...]
     difference: float
 
@@ -64,7 +63,7 @@ def match_gearboxes(ratios: Sequence[float]) -> list[GearboxFit]:
         difference = float(np.expm1(apart[rows, columns].max()))
         if difference <= FIT:
             names = tuple(list(gears)[column] for column in columns)
-            fits.append(GearboxFit(name, load_gearbox(name).name, names, difference))
+            fits.append(GearboxFit(name, names, difference))
     return sorted(fits, key=lambda one: one.difference)
 
 

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: MIT
+"""What a log gives to a card: ratios, elements, final drive, P0, inertias, products."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from drivetwin._util.toml import parse_toml
+from drivetwin.authoring.answers import Origin, get_value
+from drivetwin.authoring.card_text import format_card
+from drivetwin.authoring.log_survey import LogGear, assign_pressures, label_pressure, survey_log
+from drivetwin.authoring.options import CardOptions, parse_options
+from drivetwin.authoring.questions import Sources
+from drivetwin.authoring.session import Session
+from drivetwin.channels.read_options import Column
+from drivetwin.vehicle.card import load_card
+from tests.plausibility.fixtures import Synthetic, make_log
+
+SCENARIOS = ("paper_steps", "gearbox_chain", "dual_clutch", "manual", "power_off_down")
+LOGS = Path(__file__).resolve().parents[3] / "shared" / "logs"
+
+
+@pytest.fixture(scope="module", params=SCENARIOS)
+def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Synthetic:
+    return make_log(request.param, tmp_path_factory.mktemp("survey"))
+
+
+read = cache(survey_log)
+
+
+def draft(log: Path, options: CardOptions | None = None, mapping: Path | None = None) -> Session:
+    sources = Sources("draft", read(log, mapping))
+    session = Session(parse_options(options or CardOptions(), sources), sources)
+    session.fill_draft()
+    return session
+
+
+def test_a_draft_agrees_with_the_card_of_the_scenario(made: Synthetic) -> None:
+    card = load_card(made.card)
+    session = draft(made.log)
+    answers, estimates = session.answers, session.estimates
+    ratios = get_value(answers, "gears", "ratios")
+    assert ratios == pytest.approx([gear.ratio for gear in card.gears], rel=2e-3)
+    assert answers["gears", "ratios"].origin is Origin.GUESS
+    assert get_value(answers, "final_drive") == pytest.approx(card.final_drive, rel=5e-3)
+    elements = get_value(answers, "gears", "elements")
+    for element, gear in zip(elements, card.gears, strict=True):
+        label = get_value(answers, "elements", element, "label")
+        if made.log.stem != "manual":
+            assert label == gear.elements[0]
+        P0 = estimates.P0.get(element)
+        if P0 is not None:
+            true = card.get_element(gear.elements[0]).P0.value / 1e5
+            assert abs(P0[0] - true) < 2.0 * P0[1]
+    document = parse_toml(format_card(answers, draft=True))
+    assert all(not {"gain_m3", "area_m2"} & table.keys() for table in document["elements"].values())
+
+
+def test_ranges_of_a_draft_contain_the_truth(made: Synthetic) -> None:
+    truth = json.loads(made.log.with_suffix(".truth.json").read_text("utf-8"))["parameters"]
+    answers = draft(made.log).answers
+    for part in ("J_vehicle", "J_prime"):
+        found = get_value(answers, "inertia", part)
+        true = [one["value"] for name, one in truth.items() if name.startswith(part)]
+        assert true
+        assert found is None or all(found[0] < one < found[1] for one in true)
+
+
+def test_products_follow_from_the_ratios_of_the_elements(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    made = make_log("paper_steps", tmp_path_factory.mktemp("products"))
+    card = load_card(made.card)
+    known = draft(made.log, CardOptions(elements=["kind=brake,P0_bar=0.8"])).estimates.products
+    (name,) = known
+    product = known[name].middle / card.get_element(name).gain
+    assert 0.08 < product < 0.16
+    unknown = draft(made.log, CardOptions({"--elements": "X,Y"})).estimates
+    assert not unknown.products
+    text = format_card(draft(made.log).answers, estimates=draft(made.log).estimates)
+    assert "with μ 0.10 the gain would be" in text
+
+
+def test_a_complete_card_of_a_log_and_options_is_read(made: Synthetic, tmp_path: Path) -> None:
+    stated = ["kind=clutch,i_c=1,P0_bar=0.8,gain_m3=0.01"]
+    options = CardOptions(
+        {"--engine-inertia": "1..30", "--mass": "9000", "--wheel-radius": "0.5"}, stated
+    )
+    session = draft(made.log, options)
+    assert not session.list_open()
+    path = tmp_path / "card.toml"
+    survey = read(made.log, None)
+    path.write_text(format_card(session.answers, survey, session.estimates), encoding="utf-8")
+    assert load_card(path).final_drive == pytest.approx(get_value(session.answers, "final_drive"))
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "label"),
+    [
+        ("PrsBrk2", "bar", "B2"), ("p_K1_ist", "bar", "K1"), ("Druck Bremse 3", "kPa", "B3"),
+        ("p2", "bar", "E2"), ("PrsClutch", "bar", "K"), ("PrsMain", "bar", None),
+        ("PrsBrk2", None, None), ("n2", "rpm", None), ("C03 p", "bar", None),
+    ],
+)  # fmt: skip
+def test_pressures_are_labelled_after_their_elements(
+    name: str, unit: str | None, label: str | None
+) -> None:
+    assert label_pressure(Column(name, unit)) == label
+
+
+def test_pressures_that_are_high_throughout_make_no_gear() -> None:
+    def gear(**pressures: float) -> LogGear:
+        return LogGear(1.0, 1.0, None, pressures)
+
+    assert assign_pressures([gear(a=9, b=0, main=9), gear(a=0, b=8, main=9)]) == ["a", "b"]
+    assert assign_pressures([gear(a=9), gear(a=9)]) == ["a", "a"]
+    assert assign_pressures([gear(a=9, b=0), gear(a=0, b=8), gear(a=9, b=0)]) == ["a", "b", "a"]
+    assert assign_pressures([gear(a=0), gear(a=0)]) == [None, None]
+    assert assign_pressures([]) == []
+
+
+@pytest.mark.parametrize(("name", "ratios"), [("truck_a.csv", (1.86, 1.41)),
+                                              ("truck_b.mf4", (1.91, 1.43, 1.0))])  # fmt: skip
+def test_given_logs(name: str, ratios: tuple[float, ...]) -> None:
+    if not (LOGS / name).is_file():
+        pytest.skip(f"no {name} beside the project")
+    answers = draft(LOGS / name).answers
+    assert get_value(answers, "gears", "ratios") == pytest.approx(ratios, abs=2e-3)
+    assert get_value(answers, "gears", "names") == ("2", "3", "4")[: len(ratios)]
+
+
+def test_a_log_without_units_needs_a_mapping(tmp_path: Path) -> None:
+    log = LOGS / "truck_c.mat"
+    if not log.is_file():
+        pytest.skip("no truck_c.mat beside the project")
+    assert "names no unit" in survey_log(log, None).remark
+    mapping = tmp_path / "channels.toml"
+    mapping.write_text(
+        "".join(
+            f'[channels.{role}]\nsource = "{source}"\nunit = "{unit}"\n'
+            for role, source, unit in (
+                ("engine_torque", "te", "Nm"), ("input_speed", "w_in", "rpm"),
+                ("output_speed", "w_out", "rpm"), ("wheel_speed", "w_wheel", "rpm"),
+                ("pressure.B2", "p2", "bar"), ("pressure.B3", "p3", "bar"),
+            )
+        ),
+        encoding="utf-8",
+    )  # fmt: skip
+    answers = draft(log, mapping=mapping).answers
+    assert get_value(answers, "gears", "ratios") == pytest.approx((1.81, 1.406), abs=2e-3)
+    assert get_value(answers, "gears", "elements") == ("B2", "B3")
