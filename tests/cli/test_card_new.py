@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -84,6 +85,17 @@ def test_a_log_without_terminal_gives_a_draft(
     again = ["card", "new", "-o", str(card), "--force", "--from", str(bench_files.log), *ELEMENTS]
     assert main(again) == 0
     assert main(["card", "check", str(card), str(bench_files.log), "--strict"]) == 0
+
+
+def test_the_result_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    usual = ["card", "new", *COMPLETE, "--json", "-o", str(tmp_path / "a.toml")]
+    assert main(usual) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["open"] == {}
+    assert document["card"] == str(tmp_path / "a.toml")
+    draft = ["card", "new", "--draft", "--json", "-o", str(tmp_path / "b.toml")]
+    assert main(draft) == 0
+    assert "--final-drive RATIO" in json.loads(capsys.readouterr().out)["open"]
 
 
 def test_a_draft_without_a_log_has_comments(tmp_path: Path) -> None:

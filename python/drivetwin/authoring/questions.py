@@ -252,7 +252,8 @@ def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Q
             _parse_mass, "kg", None if guess is None else UNKNOWN,
             shown="" if guess is None else "the inertia that the log shows",
         )  # fmt: skip
-        if get_value(answers, "vehicle", "mass") is not None or guess is None:
+        mass = answers.get(("vehicle", "mass"))
+        if mass is None or mass.value is not None:
             yield Question(
                 ("vehicle", "radius"), "--wheel-radius M (with --mass)", "Radius of the wheels",
                 "Rolling radius of the driven wheels: 0.3 for a car, 0.5 for a truck.",

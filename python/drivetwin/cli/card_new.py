@@ -10,13 +10,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, find_mapping
-from drivetwin.cli.output import print_findings, print_line, print_paragraph, show_step
+from drivetwin.cli.output import (
+    JsonFlag,
+    print_findings,
+    print_json,
+    print_line,
+    print_paragraph,
+    show_step,
+)
 from drivetwin.errors import InputError, Where
 
 if TYPE_CHECKING:
     from drivetwin.authoring.log_survey import LogSurvey
     from drivetwin.authoring.question import Question
     from drivetwin.authoring.session import Session
+    from drivetwin.findings import Finding
 
 
 def new(
@@ -95,17 +103,20 @@ def new(
             help="Sensor class of a channel role, or of `pressure`; repeatable.",
         ),
     ] = None,
+    as_json: JsonFlag = False,
 ) -> None:
     """Write a vehicle card: in a terminal by questions, else from options.
 
     With --from LOG what the log shows is filled in. Without a terminal, or with --draft, that is a
-    draft: each guess is marked, and open entries are comments. A gain is never guessed.
+    draft: each guess is marked, and open entries are comments. A gain is never guessed. With --json
+    nothing is asked.
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.authoring.card_text import format_card, refuse_faults
     from drivetwin.authoring.options import CardOptions, parse_options
     from drivetwin.authoring.questions import Sources
     from drivetwin.authoring.session import Session
+    from drivetwin.files.records import dump_findings
 
     _refuse_existing(output, force=force)
     single = {
@@ -117,18 +128,31 @@ def new(
     given = {option: text for option, text in single.items() if text is not None}
     survey = None if from_log is None else _survey(from_log, channels)
     sources = Sources(_make_default_name(output), survey)
-    if survey is not None and survey.remark:
+    if survey is not None and survey.remark and not as_json:
         print_paragraph(f"{survey.name} gives no ratios: {survey.remark}")
     options = CardOptions(given, element or (), sensor or ())
     session = Session(parse_options(options, sources), sources)
-    is_draft = _complete(session, draft=draft, from_log=from_log is not None)
+    can_ask = has_terminal() and not as_json
+    is_draft = draft or (from_log is not None and not can_ask)
+    if is_draft:
+        session.fill_draft()
+    elif can_ask:
+        print_line("Each question has a sentence on its number; Enter takes the [default].")
+        session.ask_all(_ask)
+    else:
+        session.fill_defaults()
     text = format_card(session.answers, survey, session.estimates, draft=is_draft)
     if not session.list_open():
         refuse_faults(text, str(output))
     _refuse_existing(output, force=force)
     write_text(output, text)
+    findings = () if session.list_open() else _check(output)
+    if as_json:
+        open_ = {question.option: question.prompt for question in session.list_open()}
+        print_json({"card": output, "open": open_, "findings": dump_findings(findings)})
+        return
     print_line(f"wrote {output}")
-    _report(session, output, from_log)
+    _report(session, output, from_log, findings)
 
 
 def _refuse_existing(output: Path, *, force: bool) -> None:
@@ -161,19 +185,6 @@ def has_terminal() -> bool:
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
-def _complete(session: Session, *, draft: bool, from_log: bool) -> bool:
-    """Complete the answers; return True for a draft."""
-    if draft or (from_log and not has_terminal()):
-        session.fill_draft()
-        return True
-    if has_terminal():
-        print_line("Each question is a sentence on the number and its unit; Enter takes [default].")
-        session.ask_all(_ask)
-    else:
-        session.fill_defaults()
-    return False
-
-
 def _ask(question: Question, reason: str) -> str:
     """Ask a question in the terminal, with the reason why the answer before was refused."""
     from drivetwin._util.visible_text import escape_line
@@ -197,11 +208,18 @@ def _ask(question: Question, reason: str) -> str:
         ) from None
 
 
-def _report(session: Session, output: Path, log: Path | None) -> None:
-    """Report open entries of a draft, or implausible ones of a complete card."""
+def _check(output: Path) -> tuple[Finding, ...]:
+    """Return what is implausible on a complete card."""
     from drivetwin.plausibility.check import check_card
     from drivetwin.vehicle.card import load_card
 
+    return check_card(load_card(output))
+
+
+def _report(
+    session: Session, output: Path, log: Path | None, findings: tuple[Finding, ...]
+) -> None:
+    """Report open entries of a draft, or implausible ones of a complete card."""
     if open_ := session.list_open():
         print_line(f"{len(open_)} entries are open, as comments in the file:")
         for question in open_:
@@ -210,6 +228,6 @@ def _report(session: Session, output: Path, log: Path | None) -> None:
             "next: fill them in, or state these options and --force; confirm entries with `guess:`"
         )
         return
-    print_findings(check_card(load_card(output)))
+    print_findings(findings)
     beside = "" if log is None else f" {log}"
     print_line(f"next: drivetwin card check {output}{beside}")
