@@ -153,3 +153,22 @@ def test_a_log_without_units_needs_a_mapping(tmp_path: Path) -> None:
     answers = draft(log, mapping=mapping).answers
     assert get_value(answers, "gears", "ratios") == pytest.approx((1.81, 1.406), abs=2e-3)
     assert get_value(answers, "gears", "elements") == ("B2", "B3")
+
+
+def test_hostile_columns_come_back_from_the_card(tmp_path: Path) -> None:
+    made = make_log("manual", tmp_path)
+    hostile = "Prs \"\\Clutch#'\u202e="
+    text = made.log.read_text(encoding="utf-8")
+    quoted = hostile.replace('"', '""')
+    made.log.write_text(text.replace("PrsClutch", f'"{quoted}"', 1), encoding="utf-8")
+    options = CardOptions(
+        {"--engine-inertia": "0.1..0.6", "--vehicle-inertia": "90..250"},
+        ["i_c=1,P0_bar=0.5,gain_m3=0.0065,kind=clutch"],
+    )
+    session = draft(made.log, options)
+    path = tmp_path / "card.toml"
+    card_text = format_card(session.answers, read(made.log, None), session.estimates, draft=True)
+    path.write_text(card_text, encoding="utf-8")
+    card = load_card(path)
+    assert {spec.source for spec in card.channels.values()} == {hostile}
+    assert len(card.channels) == 2

@@ -25,12 +25,14 @@ UNITS = {Quantity.TORQUE: "Nm", Quantity.SPEED: "rpm", Quantity.PRESSURE: "bar"}
 class SensorClass(StrictModel):
     """Largest constant errors of a kind of sensor.
 
+    `roles` are the channel roles that have such sensors, by default all of the quantity.
     `gain_limit` is relative to the value, `offset_limit` [N·m, rpm or bar] absolute and
     `offset_limit_share` relative to the end of the measuring range. `source` names the document and
     `address` its place.
     """
 
     quantity: str
+    roles: list[str] = Field(default_factory=list)
     title: str = Field(min_length=1)
     gain_limit: float = Field(default=0.0, ge=0, lt=1)
     offset_limit: float = Field(default=0.0, ge=0)
@@ -74,7 +76,11 @@ def read_sensor_classes() -> dict[str, SensorClass]:
 def list_classes(role: str) -> list[str]:
     """List the names of the classes of sensors for a channel role, or for `pressure`."""
     quantity = Quantity.PRESSURE if role == "pressure" else get_quantity(role)
-    return [name for name, one in read_sensor_classes().items() if one.quantity == quantity]
+    return [
+        name
+        for name, one in read_sensor_classes().items()
+        if one.quantity == quantity and (not one.roles or role in one.roles)
+    ]
 
 
 def get_offset_unit(role: str) -> str:
