@@ -157,7 +157,7 @@ def test_a_log_without_units_needs_a_mapping(tmp_path: Path) -> None:
 
 def test_hostile_columns_come_back_from_the_card(tmp_path: Path) -> None:
     made = make_log("manual", tmp_path)
-    hostile = "Prs \"\\Clutch#'\u202e="
+    hostile = "Prs \"Clutch#'\u202e=\\x"
     text = made.log.read_text(encoding="utf-8")
     quoted = hostile.replace('"', '""')
     made.log.write_text(text.replace("PrsClutch", f'"{quoted}"', 1), encoding="utf-8")
