@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from drivetwin._util.toml import parse_toml
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.card_text import format_card
-from drivetwin.authoring.options import CardOptions, parse_options
+from drivetwin.authoring.options import ORDER, CardOptions, parse_options
 from drivetwin.authoring.question import Question
 from drivetwin.authoring.questions import Sources
 from drivetwin.authoring.session import Session
@@ -200,6 +200,36 @@ def test_wrong_options_are_refused_with_the_reason(
     with pytest.raises((InputError, CardError)) as raised:
         make_session(CardOptions(single, elements, sensors)).fill_draft()
     assert said in str(raised.value)
+
+
+PARTS = ("kind", "i_c", "i_out", "P0_bar", "P0_std_bar", "gain_m3", "surfaces", "outer_mm", "x")
+ENTRIES = st.tuples(st.sampled_from(("", "B2:", "E2:", ":", "C4:")), st.sampled_from(PARTS))
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    single=st.dictionaries(st.sampled_from(tuple(ORDER)), st.sampled_from(POOL), max_size=6),
+    elements=st.lists(st.tuples(ENTRIES, st.sampled_from(POOL)), max_size=3),
+    sensors=st.lists(st.sampled_from(POOL).map(lambda text: f"pressure={text}"), max_size=1),
+)
+def test_any_options_make_a_draft_or_are_refused(
+    tmp_path: Path,
+    single: dict[str, str],
+    elements: list[tuple[tuple[str, str], str]],
+    sensors: list[str],
+) -> None:
+    texts = [f"{name}{part}={value}" for (name, part), value in elements]
+    try:
+        session = make_session(CardOptions(single, texts, sensors))
+        session.fill_draft()
+    except (InputError, CardError) as fault:
+        assert fault.what
+        assert fault.remedy
+        return
+    text = format_card(session.answers, draft=True)
+    parse_toml(text)
+    if not session.list_open():
+        load(text, tmp_path)
 
 
 def test_a_draft_without_answers_is_toml_of_comments() -> None:
