@@ -155,6 +155,17 @@ def test_a_log_without_units_needs_a_mapping(tmp_path: Path) -> None:
     assert get_value(answers, "gears", "elements") == ("B2", "B3")
 
 
+def test_the_range_of_inertia_needs_the_input_gear(tmp_path: Path) -> None:
+    made = make_log("input_gear", tmp_path)
+    truth = json.loads(made.log.with_suffix(".truth.json").read_text("utf-8"))["parameters"]
+    assumed = draft(made.log).answers
+    assert assumed["i_in",].origin is Origin.GUESS
+    assert "i_in 1" in assumed["inertia", "J_prime"].note
+    stated = draft(made.log, CardOptions({"--input-gear": "1.2"})).answers
+    low, high = get_value(stated, "inertia", "J_prime")
+    assert low < truth["J_prime_2"]["value"] < high
+
+
 def test_hostile_columns_come_back_from_the_card(tmp_path: Path) -> None:
     made = make_log("manual", tmp_path)
     hostile = "Prs \"Clutch#'\u202e=\\x"

@@ -222,9 +222,7 @@ def test_any_options_make_a_draft_or_are_refused(
     try:
         session = make_session(CardOptions(single, texts, sensors))
         session.fill_draft()
-    except (InputError, CardError) as fault:
-        assert fault.what
-        assert fault.remedy
+    except (InputError, CardError):
         return
     text = format_card(session.answers, draft=True)
     parse_toml(text)

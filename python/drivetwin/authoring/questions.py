@@ -234,7 +234,10 @@ def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
 
 def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
     survey, estimates = sources.survey, sources.estimates
-    note = "" if survey is None else f"torque balance of {survey.name}, efficiency 0.7 to 1"
+    i_in = get_value(answers, "i_in", default=1.0)
+    note = (
+        "" if survey is None else f"torque balance of {survey.name}, for i_in {i_in:g}, η 0.7 to 1"
+    )
     yield Question(
         ("inertia", "J_prime"), "--engine-inertia LOW..HIGH", "Range of the inertia at the engine",
         "J′ is engine, flywheel, converter and gearbox input together, at engine speed: 0.1 to 0.6 "
