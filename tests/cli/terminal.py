@@ -33,7 +33,7 @@ def run_in_terminal(
         stdin=end_of_program, stdout=end_of_program, stderr=end_of_program, cwd=folder,
     )  # fmt: skip
     os.close(end_of_program)
-    shown, since, waiting = b"", 0, list(answers)
+    shown, since, waiting, interrupted = b"", 0, list(answers), False
     end = time.monotonic() + LIMIT
     while time.monotonic() < end:
         if select.select([terminal], [], [], 1.0)[0]:
@@ -41,11 +41,14 @@ def run_in_terminal(
                 shown += os.read(terminal, 65536)
             except OSError:  # the program has ended
                 break
+        elif interrupted:  # the first came between the question and the wait for its answer
+            process.send_signal(signal.SIGINT)
         asked = shown[since:]
         if waiting and asked.endswith(b": ") and waiting[0][0].encode() in asked:
             since = len(shown)
             answer = waiting.pop(0)[1]
             if answer == INTERRUPT:
+                interrupted = True
                 process.send_signal(signal.SIGINT)
             else:
                 os.write(terminal, answer)

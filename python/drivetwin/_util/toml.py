@@ -179,27 +179,3 @@ def _collect_keys(
     step = "items" if isinstance(location[0], int) else "additionalProperties"
     child = node.get("properties", {}).get(location[0], node.get(step))
     return _collect_keys(schema, child, location[1:]) if isinstance(child, dict) else []
-
-
-def format_toml_text(text: str) -> str:
-    """Write a text as a TOML string or quoted key; what cannot be seen is written as an escape.
-
-    Raises ValueError where the text contains surrogates, which TOML does not have.
-    """
-    return f'"{"".join(map(_escape_character, text))}"'
-
-
-def _escape_character(char: str) -> str:
-    if char in '"\\':
-        return f"\\{char}"
-    if char.isprintable():
-        return char
-    code = ord(char)
-    if 0xD800 <= code <= 0xDFFF:
-        raise ValueError(f"the text contains a surrogate, U+{code:04X}")
-    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
-
-
-def format_toml_key(name: str) -> str:
-    """Write a key: bare where TOML allows it, else quoted."""
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else format_toml_text(name)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
-from drivetwin._util.toml import format_toml_key, format_toml_text, parse_toml, raise_faults
+from drivetwin._util.toml import format_key, format_text, parse_toml, raise_faults
 from drivetwin._util.visible_text import escape_line
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Origin, get_value, list_gears
 from drivetwin.authoring.element_text import format_elements
@@ -14,7 +14,7 @@ from drivetwin.authoring.entries import format_entry, format_range
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.sensor_classes import SensorAnswer, get_offset_unit
-from drivetwin.channels.mapping import ChannelSpec
+from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.errors import CardError
 from drivetwin.vehicle.check import check_card
 
@@ -135,7 +135,7 @@ def _format_sensors(answers: Answers) -> Iterator[str]:
 
 
 def _format_sensor(role: str, element: str | None, sensor: SensorAnswer) -> Iterator[str]:
-    place = f"sensors.{role}" if element is None else f"sensors.pressure.{format_toml_key(element)}"
+    place = f"sensors.{role}" if element is None else f"sensors.pressure.{format_key(element)}"
     unit = get_offset_unit(role)
     scale = f", up to {sensor.full_scale:g} {unit}" if sensor.full_scale else ""
     yield f"[{place}]"
@@ -166,7 +166,7 @@ def _format_channels(answers: Answers, survey: LogSurvey | None) -> Iterator[str
         yield f"# Columns of {escape_line(survey.name)} that are high while a gear is held. guess:"
         yield "# the pressure belongs to the element of the gear."
     for element, spec in specs.items():
-        yield f"[channels.pressure.{format_toml_key(element)}]"
+        yield f"[channels.pressure.{format_key(element)}]"
         yield from _format_spec(spec)
         yield ""
 
@@ -177,7 +177,7 @@ def _format_spec(spec: ChannelSpec) -> Iterator[str]:
     }  # fmt: skip
     for key, text in texts.items():
         if text is not None:
-            yield f"{key} = {format_toml_text(text)}"
+            yield f"{key} = {format_text(text)}"
     numbers: Sequence[tuple[str, float, float]] = (
         ("sign", spec.sign, 1),
         ("scale", spec.scale, 1.0),

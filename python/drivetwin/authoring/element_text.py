@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivetwin._util.toml import format_toml_key
+from drivetwin._util.toml import format_key
 from drivetwin._util.visible_text import escape_line
 from drivetwin.authoring.answers import UNKNOWN, Answers, get_value, list_elements
 from drivetwin.authoring.element_questions import describe_product, find_form
@@ -37,7 +37,7 @@ def format_elements(
 def _format_element(
     answers: Answers, name: str, survey: LogSurvey | None, estimates: LogEstimates
 ) -> Iterator[str]:
-    yield f"[elements.{format_toml_key(name)}]"
+    yield f"[elements.{format_key(name)}]"
     kind = answers.get(("elements", name, "kind"), UNKNOWN)
     meaning = '"brake" or "clutch": holds a member still, or connects two that turn'
     yield from format_entry("kind", kind, meaning)

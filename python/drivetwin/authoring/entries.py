@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivetwin._util.toml import format_toml_text
+from drivetwin._util.toml import format_text
 from drivetwin._util.visible_text import escape_line
 from drivetwin.authoring.answers import Answer, Origin
 
@@ -29,7 +29,7 @@ def format_range(key: str, answer: Answer, meaning: str) -> Iterator[str]:
 def format_value(value: object) -> str:
     """Write a value in TOML; a pair of value and standard deviation as a table or, exact, alone."""
     if isinstance(value, str):
-        return format_toml_text(value)
+        return format_text(value)
     if isinstance(value, list):
         return f"[{', '.join(map(format_value, value))}]"
     if isinstance(value, tuple):

@@ -11,16 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.mapping import (
-    ChannelSpec,
-    Mapped,
-    infer_candidates,
-    make_spec,
-    normalise_name,
-)
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping import Mapped, make_spec
 from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.name_table import load_name_table, normalise_name
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column
+from drivetwin.channels.recognition import infer_candidates
 from drivetwin.channels.shiftlog import Quantity, ShiftLog
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import MissingChannelError, TimeError
@@ -40,12 +37,6 @@ ENGAGED = 0.5
 """Least pressure of an engaged element over the largest mean pressure of its column."""
 LEAST_SAMPLES = 20
 """Fewest samples that two speeds are compared at."""
-_PRESSURE_NAME = re.compile(
-    r"(?:p|prs|pres|press|pressure|druck)(?:ist|act|mess)?"
-    r"(?P<kind>br|brk|brake|bremse|brems|b|clutch|clu|clt|cl|kupplung|kuppl|kup|k|c|)"
-    r"0*(?P<number>[0-9]+)(?:ist|act|actual|mess|meas|val|bar)*"
-)
-"""Names of pressure columns by the number of their element."""
 
 
 @dataclass(frozen=True)
@@ -184,10 +175,14 @@ def label_pressure(column: Column) -> str | None:
     if unit is None or unit.quantity is not Quantity.PRESSURE:
         return None
     plain = normalise_name(re.split(r"[./]", column.name)[-1])
-    match = _PRESSURE_NAME.fullmatch(plain)
+    table = load_name_table()
+    pressure, clutch, brake, state = (
+        table.make_alternatives(kind) for kind in ("pressure", "clutch", "brake", "state")
+    )
+    form = f"(?:{pressure})(?:{state})*?(?P<kind>{brake}|{clutch}|)0*(?P<number>[0-9]+)(?:{state})*"
+    match = re.fullmatch(form, plain)
     if match is None:
-        is_clutch = re.fullmatch(r"(?:p|prs|pressure|druck)(?:clutch|kupplung|kuppl|k)", plain)
-        return "K" if is_clutch else None
+        return "K" if re.fullmatch(f"(?:{pressure})(?:{clutch})(?:{state})*", plain) else None
     kind = match["kind"][:1].upper()
     return f"{kind or 'E'}{int(match['number'])}"
 
