@@ -60,6 +60,7 @@ def test_text_fits_80_columns_and_names_the_report(
 ) -> None:
     assert main(_by_the_paper(bench_files, tmp_path / "out")) == 0
     text = capsys.readouterr().out
+    assert text.startswith("Model: ")
     results, _, _ = text.partition("wrote")
     assert "J_vehicle" in results
     assert max(len(line) for line in results.splitlines()) <= 80
@@ -116,7 +117,11 @@ def test_simulate_reproduces_the_fit_of_the_identification(
 def test_report_names_the_page(written: Written, capsys: pytest.CaptureFixture[str]) -> None:
     for source in (written.folder, written.folder / "result.json"):
         assert main(["report", str(source)]) == 0
-        assert capsys.readouterr().out.strip() == str(written.folder / "report.html")
+        first, *_, last = capsys.readouterr().out.splitlines()
+        assert first == "Model: valid"
+        assert last == str(written.folder / "report.html")
+    assert main(["report", str(written.folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["verdict"]["status"] == "valid"
 
 
 def test_report_says_what_is_missing(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drivetwin.cli.arguments import ChannelsFile, read_twin_log
-from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
+from drivetwin.cli.output import JsonFlag, print_json, print_line, print_verdict, show_step
 from drivetwin.errors import InputError, ResultFileError, Where
 
 if TYPE_CHECKING:
@@ -67,8 +67,10 @@ def _is_identification(source: Path) -> bool:
 
 
 def _print_page_name(source: Path, *, as_json: bool) -> None:
+    """Print verdict and path of the report of an identification."""
     from drivetwin.cli.identify_run import REPORT, RESULT
     from drivetwin.files.result_file import load_result
+    from drivetwin.report.model_verdict import explain_result
 
     result = source / RESULT if source.is_dir() else source
     content = load_result(result)
@@ -79,9 +81,13 @@ def _print_page_name(source: Path, *, as_json: bool) -> None:
             "write all three files again with `drivetwin identify LOG --vehicle CARD -o DIR`",
             Where(file=str(page)),
         )
+    verdict = explain_result(content)
     if as_json:
-        print_json({"report": page, "result": result, "inputs": content.inputs})
+        print_json(
+            {"report": page, "result": result, "inputs": content.inputs, "verdict": vars(verdict)}
+        )
         return
+    print_verdict(verdict)
     print_line(str(page))
 
 

@@ -76,6 +76,6 @@ def test_the_page_holds_them() -> None:
 def test_the_first_page_counts_the_tests() -> None:
     passed, total = count_consistent_residuals(found())
     assert passed == total == 4 * 4
-    tiles = build_parameters_section(found()).blocks[0]
+    tiles = build_parameters_section(found()).blocks[1]
     assert isinstance(tiles, TilesBlock)
     assert ("residual tests passed", "16 of 16") in [(one.label, one.value) for one in tiles.tiles]

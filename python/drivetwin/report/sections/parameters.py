@@ -23,6 +23,7 @@ from drivetwin.findings import Finding, render, select_warnings
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.figures.parameters import plot_intervals
 from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.model_verdict import explain_identification
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -33,6 +34,7 @@ from drivetwin.report.sections.blocks import (
     Tile,
     TilesBlock,
     Tone,
+    VerdictBlock,
 )
 
 TONES = {
@@ -62,7 +64,7 @@ UNEVEN = 1.5
 
 def build_parameters_section(found: Identification) -> Section:
     """Verdicts, agreement and warnings at a glance, then the parameter table."""
-    blocks: list[Block] = [TilesBlock(_build_tiles(found))]
+    blocks: list[Block] = [build_verdict_block(found), TilesBlock(_build_tiles(found))]
     blocks += _build_findings(found.findings)
     blocks.append(build_parameter_table(found))
     if found.fit:
@@ -88,7 +90,7 @@ def _build_findings(findings: Sequence[Finding]) -> list[Block]:
 def _write_headline(found: Identification) -> str:
     count = _count_verdicts(found)
     identified = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)}"
-    text = f"{_write_answer(found)} {identified} parameters are identified"
+    text = f"{identified} parameters are identified"
     if count[Verdict.WEAK]:
         text += f", {count[Verdict.WEAK]} only weakly"
     if count[Verdict.NOT_IDENTIFIABLE]:
@@ -103,27 +105,6 @@ def _write_headline(found: Identification) -> str:
             f"fit of {format_significant(fit.fit_percent, 3)} %."
         )
     return text
-
-
-def _write_answer(found: Identification) -> str:
-    """Return the one-word answer, with the objections to a plain yes."""
-    if found.status is ModelStatus.NOT_VALID:
-        return "No: the simulation does not match the measurement; no value is identified."
-    count, (passed, tests) = _count_verdicts(found), count_consistent_residuals(found)
-    against = []
-    if not found.fit:
-        against.append("the model could not be simulated over the log")
-    elif any(_find_missed_phase(fits) for fits in found.fit.values()):
-        against.append("the simulation does not match the measurement")
-    if passed < tests:
-        against.append("the residuals show an effect that the model lacks")
-    if count[Verdict.WEAK] or count[Verdict.NOT_IDENTIFIABLE]:
-        against.append("not every parameter is known well")
-    if select_warnings(found.findings):
-        against.append("there are warnings")
-    if not against:
-        return "Yes, within the range that the log covered."
-    return f"With reservations: {'; '.join(against)}."
 
 
 def count_consistent_residuals(found: Identification) -> tuple[int, int]:
@@ -143,13 +124,20 @@ def _count_verdicts(found: Identification) -> Counter[Verdict]:
 STATUS_TONES = {
     ModelStatus.VALID: Tone.GOOD,
     ModelStatus.LIMITED: Tone.DOUBTFUL,
-    ModelStatus.NOT_VALID: Tone.UNKNOWN,
+    ModelStatus.NOT_VALID: Tone.BAD,
     ModelStatus.NOT_VALIDATED: Tone.DOUBTFUL,
 }
 
 
+def build_verdict_block(found: Identification) -> VerdictBlock:
+    """Build the box with the verdict on the model."""
+    told = explain_identification(found)
+    tone = STATUS_TONES[told.status]
+    return VerdictBlock(told.status.value, told.reason, told.action, tone)
+
+
 def _build_tiles(found: Identification) -> list[Tile]:
-    tiles = [Tile("model", found.status.value, STATUS_TONES[found.status])]
+    tiles = []
     for name, (label, display) in SIGNALS.items():
         fits = found.fit.get(name, {})
         if "all" in fits:

@@ -18,6 +18,7 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     Tile,
     TilesBlock,
+    VerdictBlock,
 )
 from drivetwin.workbench.views.widgets import make_badge, make_graph, make_hint, make_notes
 
@@ -30,6 +31,8 @@ def render_section(section: Section, prefix: str) -> list[Component]:
 
 def _render_block(block: Block, name: str) -> Component:
     match block:
+        case VerdictBlock():
+            return _render_verdict(block)
         case FigureBlock():
             figure = make_graph(name, block.caption.partition(".")[0], block.figure)
             return html.Div([figure, make_hint(block.caption)])
@@ -39,6 +42,15 @@ def _render_block(block: Block, name: str) -> Component:
             return make_notes(block.heading, block.items, block.tone.value)
         case TilesBlock():
             return html.Div([_render_tile(one) for one in block.tiles], className="tiles")
+
+
+def _render_verdict(block: VerdictBlock) -> Component:
+    parts = [
+        html.P(f"Model: {block.status}", className="word"),
+        html.P(block.reason),
+        html.P([html.Strong("Next:"), f" {block.action}"]),
+    ]
+    return html.Div(parts, className=f"verdict {block.tone}", role="status")
 
 
 def _render_tile(tile: Tile) -> Component:
