@@ -14,7 +14,7 @@ from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import OUTPUTS
 from drivetwin.report.find_reports import Agreement, Trial
 from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.style import MEASURED, get_candidate_style, make_axis, make_layout
+from drivetwin.report.style import MUTED, get_candidate_style, make_axis, make_layout
 
 _ROW = 0.7
 """Share of the height of a row that the candidates of one parameter take up."""
@@ -117,7 +117,7 @@ def build_trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
         if name not in first.traces:
             continue
         seen = first.traces[name]
-        over = [Curve("measured", seen.time, seen.measured, MEASURED, width=2.4)]
+        over = [Curve("measured", seen.time, seen.measured, MUTED, width=1.0)]
         left = []
         for candidate, run in trial.runs.items():
             trace, style = run.traces[name], get_candidate_style(order.index(candidate))

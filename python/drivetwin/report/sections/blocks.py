@@ -110,12 +110,16 @@ Block = VerdictBlock | FigureBlock | TableBlock | NotesBlock | TilesBlock
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A titled part of the report; `anchor` is its address in the page."""
+    """A titled part of the report; `anchor` is its address in the page.
+
+    `collapsed` sections are closed until the reader opens them, and are not printed.
+    """
 
     anchor: str
     title: str
     intro: str
     blocks: Sequence[Block]
+    collapsed: bool = False
 
     @property
     def short(self) -> bool:

@@ -25,11 +25,13 @@ from drivetwin.workbench.views.widgets import make_badge, make_graph, make_hint,
 
 def render_section(section: Section, prefix: str) -> list[Component]:
     """A section under its title; `prefix` makes the ids of its figures its own."""
-    blocks = [_render_block(block, f"{prefix}-{k}") for k, block in enumerate(section.blocks)]
-    return [html.H3(section.title), make_hint(section.intro), *blocks]
+    intro = [make_hint(section.intro)] if section.intro else []
+    blocks = [render_block(block, f"{prefix}-{k}") for k, block in enumerate(section.blocks)]
+    return [html.H3(section.title), *intro, *blocks]
 
 
-def _render_block(block: Block, name: str) -> Component:
+def render_block(block: Block, name: str) -> Component:
+    """A block; `name` is the id of its figure."""
     match block:
         case VerdictBlock():
             return _render_verdict(block)
