@@ -99,7 +99,7 @@ def test_simulate_reproduces_the_fit_of_the_identification(
     written: Written, bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     traces = tmp_path / "traces.csv"
-    arguments = [str(written.folder / "twin.toml"), str(bench_files.log)]
+    arguments = [str(written.folder), str(bench_files.log)]
     options = ["--vehicle", str(bench_files.card), "-o", str(traces), "--json"]
     assert main(["simulate", *arguments, *options]) == 0
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
@@ -109,8 +109,10 @@ def test_simulate_reproduces_the_fit_of_the_identification(
         found = shift["fit"][signal]["all"]["fit_percent"]
         assert found == pytest.approx(phases["all"]["fit_percent"], abs=0.01)
     names, units, *rows = traces.read_text().splitlines()
-    assert names == "time,output_torque,input_speed,output_speed"
-    assert units == "s,N*m,rad/s,rad/s"
+    signals = ("output_torque", "input_speed", "output_speed")
+    columns = [f"{name}_{part}" for name in signals for part in ("measured", "simulated")]
+    assert names.split(",")[:7] == ["time", *columns]
+    assert units.split(",")[:7] == ["s", "N*m", "N*m", *["rad/s"] * 4]
     assert len(rows) > 4000
 
 

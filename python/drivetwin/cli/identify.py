@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, VehicleFile
+from drivetwin.cli.arguments import ChannelsFile, VehicleFile, require_logs
 from drivetwin.cli.atomic_outputs import refuse_same_names
 from drivetwin.cli.identify_run import Request
 from drivetwin.cli.output import (
@@ -38,7 +38,10 @@ NOT_VALID = 3
 
 
 def identify(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="One or more shift logs.")],
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG...", help="One or more shift logs.", callback=require_logs),
+    ],
     vehicle: VehicleFile,
     channels: ChannelsFile = None,
     method: Annotated[

@@ -25,9 +25,10 @@ OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
     "output_torque": ("output torque", NM, 1.6),
     "input_speed": ("input speed", RPM, 1.1),
     "output_speed": ("output speed", RPM, 1.1),
+    "engine_speed": ("engine speed", RPM, 1.1),
+    "wheel_speed": ("wheel speed", RPM, 1.1),
 }
 """Compared signals: axis title, unit and panel height."""
-_EXTRA = {"engine_speed": "engine speed", "wheel_speed": "wheel speed"}
 _OVERVIEW = ("output_torque", "input_speed", "output_speed")
 _OVERVIEW_PANELS = 2
 
@@ -86,11 +87,10 @@ def plot_further_signals(validation: Validation) -> go.Figure:
 def build_further_panels(validation: Validation) -> list[Panel]:
     """Return the panels of `plot_further_signals` from top to bottom."""
     panels = list(_build_slip_panels(validation))
-    for name, title in _EXTRA.items():
-        if name in validation.extra_traces:
-            trace = validation.extra_traces[name]
-            panels.append(Panel(title, RPM, build_pair(trace)))
-            panels.append(Panel("residual", RPM, [_build_residual(trace)], 0.5))
+    for name, trace in validation.extra_traces.items():
+        title, display, weight = OUTPUTS[name]
+        panels.append(Panel(title, display, build_pair(trace), weight))
+        panels.append(Panel("residual", display, [_build_residual(trace)], 0.5))
     return panels
 
 
