@@ -178,6 +178,9 @@ def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial
         if trial.refused:
             texts = [f"{name}: {why}" for name, why in trial.refused.items()]
             shifts.append(NotesBlock(f"Not simulated: {trial.label}", texts, Tone.DOUBTFUL))
+    each = Section("shifts", "Shift by shift", "Residuals are measured minus simulated.", shifts)
+    if len(candidates) == 1 and len(trials) == 1:
+        return [each]
     return [
         Section(
             "logs",
@@ -185,7 +188,7 @@ def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial
             "Each model is driven by the measured inputs of each log, its own or another's.",
             [matrix],
         ),
-        Section("shifts", "Shift by shift", "Residuals are measured minus simulated.", shifts),
+        each,
     ]
 
 
