@@ -12,7 +12,15 @@ import pytest
 from drivetwin import findings
 from drivetwin.errors import Where
 from drivetwin.files.records import FindingRecord
-from drivetwin.findings import Code, Number, Severity, load_catalogue, report, select_warnings
+from drivetwin.findings import (
+    Code,
+    Number,
+    Severity,
+    load_catalogue,
+    report,
+    select_warnings,
+    sort_by_severity,
+)
 
 
 def test_every_code_has_an_entry_and_each_entry_a_code() -> None:
@@ -66,3 +74,13 @@ def test_a_record_holds_all_of_a_finding() -> None:
     assert (record.code, record.severity) == (Code.LOADS_DIFFER, Severity.INFO)
     assert record.text == one.text
     assert record.to_finding() == one
+
+
+def test_sorted_by_severity_errors_come_first_and_equals_keep_their_order() -> None:
+    error, first, second, info = (
+        report(Code.LIKELIHOOD_FAILED, why="x"),
+        report(Code.STUCK, "a", places="1 s"),
+        report(Code.STUCK, "b", places="1 s"),
+        report(Code.NO_SENSOR_TOLERANCES),
+    )
+    assert sort_by_severity([info, first, second, error]) == [error, first, second, info]

@@ -283,6 +283,12 @@ def select_warnings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(one for one in findings if one.severity is not Severity.INFO)
 
 
+def sort_by_severity(findings: Iterable[Finding]) -> list[Finding]:
+    """Sort findings from errors to information; equal ones keep their order."""
+    order = list(reversed(Severity))
+    return sorted(findings, key=lambda one: order.index(one.severity))
+
+
 def render(findings: Iterable[Finding]) -> tuple[str, ...]:
     """Return the texts of findings, each once."""
     return tuple(dict.fromkeys(one.text for one in findings))

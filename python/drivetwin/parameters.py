@@ -15,12 +15,14 @@ from drivetwin.errors import InputError
 class ParameterSpec:
     """One identified quantity.
 
-    `stem` is the id without its gear or element suffix; `unit` is SI and ASCII;
+    `stem` is the id without its gear or element suffix; `name` is in words, without an article, as
+    tables show it before the symbol; `unit` is SI and ASCII;
     `lower` and `upper` bound every fit; `weak_above` is the relative half width of
     the 95 % interval from which the verdict is `weak`.
     """
 
     stem: str
+    name: str
     symbol: str
     unit: str
     meaning: str
@@ -33,9 +35,10 @@ class ParameterSpec:
 
 
 _SPECS = (
-    ParameterSpec("eta", "η", "1", "lumped gear efficiency (eq. 3, 10)", 0.3, 1.2),
+    ParameterSpec("eta", "efficiency", "η", "1", "lumped gear efficiency (eq. 3, 10)", 0.3, 1.2),
     ParameterSpec(
         "J_prime",
+        "inertia at engine",
         "J′",
         "kg*m^2",
         "lumped inertia at the engine in a gear (eq. 10)",
@@ -43,20 +46,53 @@ _SPECS = (
         1e4,
         "gear",
     ),
-    ParameterSpec("J_out", "Jo′", "kg*m^2", "output side before the shaft (eq. 7)", 0.0, 1e4),
-    ParameterSpec("J_vehicle", "J3", "kg*m^2", "vehicle inertia at the wheel (eq. 9, 11)", 0, 1e7),
-    ParameterSpec("Tv_over_if", "T_v/i_f", "N*m", "load torque over final drive", -1e6, 1e6, "log"),
-    ParameterSpec("k_o", "k_o", "N*m/rad", "output shaft stiffness (eq. 8, 14)", 0.0, 1e9),
-    ParameterSpec("c_o", "c_o", "N*m*s/rad", "output shaft damping (eq. 8, 14)", 0.0, 1e7),
-    ParameterSpec("f_d", "f_d", "Hz", "frequency of the lock-up oscillation", 0.0, 1e3, "gear"),
-    ParameterSpec("zeta", "ζ", "1", "damping ratio of the lock-up oscillation", 0.0, 1.0, "gear"),
-    ParameterSpec("P0", "P0", "Pa", "pressure at which the clutch fill ends", 0.0, 1e7, "element"),
-    ParameterSpec("mu", "μ", "1", "friction at the slip where a fleet compares", 0, 1, "element"),
     ParameterSpec(
-        "drum", "I_d", "kg*m^2", "drum that runs with the slip (THEORY §2)", 0.0, 1e4, "element"
+        "J_out", "output inertia", "Jo′", "kg*m^2", "output side before the shaft (eq. 7)", 0.0, 1e4
     ),
-    ParameterSpec("te_delay", "τ_e", "s", "age of a fresh engine torque value", -1.0, 1.0, "log"),
-)
+    ParameterSpec(
+        "J_vehicle",
+        "vehicle inertia",
+        "J_vehicle",
+        "kg*m^2",
+        "vehicle inertia at the wheel (eq. 9, 11)",
+        0.0,
+        1e7,
+    ),
+    ParameterSpec(
+        "Tv_over_if", "load torque", "T_v/i_f", "N*m", "load torque over final drive", -1e6, 1e6,
+        "log",
+    ),
+    ParameterSpec(
+        "k_o", "shaft stiffness", "k_o", "N*m/rad", "output shaft stiffness (eq. 8, 14)", 0.0, 1e9
+    ),
+    ParameterSpec(
+        "c_o", "shaft damping", "c_o", "N*m*s/rad", "output shaft damping (eq. 8, 14)", 0.0, 1e7
+    ),
+    ParameterSpec(
+        "f_d", "lock-up frequency", "f_d", "Hz", "frequency of the lock-up oscillation", 0.0, 1e3,
+        "gear",
+    ),
+    ParameterSpec(
+        "zeta", "lock-up damping", "ζ", "1", "damping ratio of the lock-up oscillation", 0.0, 1.0,
+        "gear",
+    ),
+    ParameterSpec(
+        "P0", "fill pressure", "P0", "Pa", "pressure at which the clutch fill ends", 0.0, 1e7,
+        "element",
+    ),
+    ParameterSpec(
+        "mu", "friction", "μ", "1", "friction at the slip where a fleet compares", 0.0, 1.0,
+        "element",
+    ),
+    ParameterSpec(
+        "drum", "drum inertia", "I_d", "kg*m^2", "drum that runs with the slip (THEORY §2)", 0.0,
+        1e4, "element",
+    ),
+    ParameterSpec(
+        "te_delay", "engine torque delay", "τ_e", "s", "age of a fresh engine torque value", -1.0,
+        1.0, "log",
+    ),
+)  # fmt: skip
 
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}
 

@@ -100,7 +100,7 @@ def test_a_moment_under_the_mouse_is_marked_in_the_other_figures(page: Page, rep
     plot.scroll_into_view_if_needed()
     plot.hover(position={"x": 400, "y": 300})
     page.wait_for_function("document.querySelector('#validation .cursor').hidden === false")
-    assert page.locator("#validation .cursor").get_attribute("data-time")
+    assert page.locator("#validation .cursor").first.get_attribute("data-time")
     assert page.evaluate("document.querySelector('#shift .cursor').hidden")
 
 
@@ -126,14 +126,44 @@ def test_nobody_is_locked_out(browser: Browser, report: Path, pictures: Path, sc
         context.close()
 
 
+@pytest.mark.short
+def test_the_first_screen_has_verdict_plot_and_parameters(page: Page, report: Path) -> None:
+    for width, nav_width in ((1440, 210), (900, 168)):
+        page.set_viewport_size({"width": width, "height": 900})
+        opened(page, report)
+        boxes = [
+            page.locator(name).first.bounding_box()
+            for name in ("#result .verdict", "#result .plot", "#result tbody tr", "nav")
+        ]
+        (verdict, plot, row, nav) = (box for box in boxes if box is not None)
+        assert verdict["y"] < plot["y"] < row["y"] < 900 - row["height"]
+        assert nav["width"] == nav_width
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
+def test_the_appendix_is_drawn_when_it_opens(page: Page, report: Path) -> None:
+    opened(page, report)
+    part = page.locator("#appendix-inertia")
+    assert part.locator(".main-svg").count() == 0
+    page.locator("nav a", has_text="Appendix: inertia").click()
+    part.locator(".main-svg").first.wait_for()
+    page.wait_for_function(
+        "document.querySelector('#appendix-inertia .plot .main-svg').clientWidth > 500"
+    )
+
+
 def test_paper_answers_on_its_first_page(page: Page, report: Path, pictures: Path) -> None:
     page.set_viewport_size({"width": A4_WIDTH, "height": A4_HEIGHT})
     opened(page, report)
     page.emulate_media(media="print")
-    (parameters, fit) = (page.locator("#trust table").nth(k).bounding_box() for k in (0, 1))
-    assert parameters is not None
-    assert fit is not None
-    assert parameters["y"] < fit["y"] < A4_HEIGHT - fit["height"]
+    verdict, plot, table = (
+        page.locator(f"#result {part}").first.bounding_box()
+        for part in (".verdict", ".plot", "table")
+    )
+    assert verdict is not None
+    assert plot is not None
+    assert table is not None
+    assert verdict["y"] < plot["y"] < table["y"] < A4_HEIGHT - table["height"]
     page.pdf(path=pictures / "report.pdf", prefer_css_page_size=True, print_background=True)
     pages = (pictures / "report.pdf").read_bytes().count(b"/Type /Page\n")
     assert 5 < pages < 20

@@ -60,6 +60,7 @@ def test_text_fits_80_columns_and_names_the_report(
 ) -> None:
     assert main(_by_the_paper(bench_files, tmp_path / "out")) == 0
     text = capsys.readouterr().out
+    assert text.startswith("Model: ")
     results, _, _ = text.partition("wrote")
     assert "J_vehicle" in results
     assert max(len(line) for line in results.splitlines()) <= 80
@@ -98,7 +99,7 @@ def test_simulate_reproduces_the_fit_of_the_identification(
     written: Written, bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     traces = tmp_path / "traces.csv"
-    arguments = [str(written.folder / "twin.toml"), str(bench_files.log)]
+    arguments = [str(written.folder), str(bench_files.log)]
     options = ["--vehicle", str(bench_files.card), "-o", str(traces), "--json"]
     assert main(["simulate", *arguments, *options]) == 0
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
@@ -108,15 +109,21 @@ def test_simulate_reproduces_the_fit_of_the_identification(
         found = shift["fit"][signal]["all"]["fit_percent"]
         assert found == pytest.approx(phases["all"]["fit_percent"], abs=0.01)
     names, units, *rows = traces.read_text().splitlines()
-    assert names == "time,output_torque,input_speed,output_speed"
-    assert units == "s,N*m,rad/s,rad/s"
+    signals = ("output_torque", "input_speed", "output_speed")
+    columns = [f"{name}_{part}" for name in signals for part in ("measured", "simulated")]
+    assert names.split(",")[:7] == ["time", *columns]
+    assert units.split(",")[:7] == ["s", "N*m", "N*m", *["rad/s"] * 4]
     assert len(rows) > 4000
 
 
 def test_report_names_the_page(written: Written, capsys: pytest.CaptureFixture[str]) -> None:
     for source in (written.folder, written.folder / "result.json"):
         assert main(["report", str(source)]) == 0
-        assert capsys.readouterr().out.strip() == str(written.folder / "report.html")
+        first, *_, last = capsys.readouterr().out.splitlines()
+        assert first == "Model: valid"
+        assert last == str(written.folder / "report.html")
+    assert main(["report", str(written.folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["verdict"]["status"] == "valid"
 
 
 def test_report_says_what_is_missing(

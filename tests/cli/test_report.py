@@ -57,7 +57,7 @@ def test_a_twin_is_shown_over_logs(
     arguments = [str(made[0]), str(bench_files.log), "-o", str(page), "--json"]
     assert main(["report", *arguments]) == 0
     assert json.loads(capsys.readouterr().out)["logs"] == [str(bench_files.log)]
-    assert "first over 1 shifts" in page.read_text(encoding="utf-8")
+    assert "Simulation of first over the log" in page.read_text(encoding="utf-8")
 
 
 def test_a_log_alone_is_refused_with_a_remedy(

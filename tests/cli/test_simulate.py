@@ -21,20 +21,48 @@ from tests.shifts.test_split_gears import CHAIN
 __all__ = ["bench"]
 
 
-def test_traces_are_those_of_the_run(bench: Bench, tmp_path: Path) -> None:
+def test_traces_are_those_of_the_run_beside_the_measurement(bench: Bench, tmp_path: Path) -> None:
     twin, log = map(str, bench.files)
     file = tmp_path / "traces.csv"
     assert main(["simulate", twin, log, "-o", str(file)]) == 0
     read = {channel.name: channel for channel in read_raw(file).channels}
-    assert {name: channel.unit for name, channel in read.items()} == {
-        "output_torque": "N*m", "input_speed": "rad/s", "output_speed": "rad/s",
-    }  # fmt: skip
-    torque = read["output_torque"]
+    units = {name: channel.unit for name, channel in read.items()}
+    assert units["output_torque_simulated"] == "N*m"
+    assert units["input_speed_measured"] == units["wheel_speed_simulated"] == "rad/s"
+    torque = read["output_torque_simulated"]
     exact = np.interp(torque.time, bench.motion.time, bench.motion.shaft_torque)
     assert np.sqrt(np.mean((torque.values - exact) ** 2)) < 80.0
-    ratio = read["input_speed"].values / read["output_speed"].values
+    ratio = read["input_speed_simulated"].values / read["output_speed_simulated"].values
     held = bench.twin.get_gear(bench.shift.start_gear).ratio
     assert ratio[0] == pytest.approx(held, rel=1e-9)
+    for name in bench.log.channels.keys() & {"output_torque", "input_speed", "wheel_speed"}:
+        column = read[f"{name}_measured"]
+        expected = bench.log[name].interpolate(column.time)
+        assert np.nanmax(np.abs(column.values / expected - 1.0)) < 1e-6
+
+
+def test_a_page_compares_both(bench: Bench, tmp_path: Path) -> None:
+    twin, log = map(str, bench.files)
+    page = tmp_path / "page.html"
+    assert main(["simulate", twin, log, "--html", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "Simulation of" in text
+    assert "Shift by shift" in text
+    assert "measured" in text
+    assert main(["simulate", twin, log, "--html", log]) == 2
+
+
+@pytest.mark.parametrize("command", ["simulate", "observe"])
+def test_swapped_arguments_are_named(
+    command: str, bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    twin, log = map(str, bench.files)
+    assert main([command, log, twin]) == 2
+    error = capsys.readouterr().err
+    assert f"{log}: this is a log, not a twin" in error
+    assert "first" in error
+    assert main([command, twin, twin]) == 2
+    assert f"{twin}: this is a twin, not a log" in capsys.readouterr().err
 
 
 def test_time_increases_from_shift_to_shift(bench: Bench, tmp_path: Path) -> None:
@@ -42,8 +70,8 @@ def test_time_increases_from_shift_to_shift(bench: Bench, tmp_path: Path) -> Non
     run = simulate_shift(bench.twin, bench.log, bench.shift)
     runs = [_as(run, shift) for shift in CHAIN[:2]]
     file = tmp_path / "traces.csv"
-    file.write_text(format_traces(runs), encoding="utf-8")
-    torque = read_raw(file).channels[0]
+    file.write_text(format_traces(runs, bench.log), encoding="utf-8")
+    (torque,) = (one for one in read_raw(file).channels if one.name == "output_torque_simulated")
     assert (np.diff(torque.time) > 0.0).all()
     one, other = (each.trajectory for each in runs)
     assert (torque.time[0], torque.time[-1]) == (one.time[0], other.time[-1])

@@ -17,7 +17,7 @@ from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
 from drivetwin.findings import render
 from drivetwin.report.html import build_report_sections, render_report, save_report
-from drivetwin.report.sections.blocks import FigureBlock
+from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.validation.simulate_log import attach_fit
 from tests.report.sample import identification, log, validation
 
@@ -46,10 +46,18 @@ def test_plotly_stands_in_it_once(page: str) -> None:
     assert "plotly.js v" not in page
 
 
-def test_first_section_answers_the_question_of_trust(found: Identification) -> None:
-    first = build_report_sections(found, log())[0]
-    assert first.title == "Can I trust this model?"
-    assert "10 of 12 parameters are identified, 1 only weakly, 1 cannot be told" in first.intro
+def test_the_page_opens_with_the_verdict(page: str, found: Identification) -> None:
+    markup = _without_scripts(page)
+    verdict = markup.index(f"Model: {found.status}")
+    assert verdict < markup.index("<table")
+    assert verdict < markup.index('class="plot"')
+    assert "10 of 12 parameters are identified, 1 only weakly known, 1 not ident" in markup
+
+
+def test_sections_of_other_methods_are_closed(page: str, found: Identification) -> None:
+    sections = build_report_sections(found, log())
+    closed = [section.anchor for section in sections if section.collapsed]
+    assert re.findall(r'<details id="([^"]*)">', page) == closed
 
 
 def test_every_parameter_and_reason_is_shown(page: str, found: Identification) -> None:
@@ -68,7 +76,7 @@ def test_names_from_files_are_escaped(page: str) -> None:
 
 def test_figures_are_json_with_units_on_their_axes(page: str) -> None:
     figures = [json.loads(text) for text in re.findall(r'application/json">(.*?)</script>', page)]
-    assert len(figures) == 5
+    assert len(figures) == 7
     titles = [
         axis["title"]["text"]
         for figure in figures
@@ -107,12 +115,15 @@ def test_sparse_identification_leaves_sections_out(found: Identification) -> Non
 
 def test_several_shifts_are_shown_in_the_whole_log_first(found: Identification) -> None:
     twice = replace(found, shifts=found.shifts * 2)
-    (whole, *_) = build_report_sections(twice, log())[1].blocks
+    (whole, *_) = find_shift_section(twice).blocks
     assert isinstance(whole, FigureBlock)
     assert len(whole.figure.layout.shapes) == 4
-    assert len(build_report_sections(found, log())[1].blocks) < len(
-        build_report_sections(twice, log())[1].blocks
-    )
+    assert len(find_shift_section(found).blocks) < len(find_shift_section(twice).blocks)
+
+
+def find_shift_section(found: Identification) -> Section:
+    (section,) = (one for one in build_report_sections(found, log()) if one.anchor == "shift")
+    return section
 
 
 def _without_scripts(page: str) -> str:

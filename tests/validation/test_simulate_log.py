@@ -21,9 +21,11 @@ from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from drivetwin.validation.initial_state import estimate_start_state
 from drivetwin.validation.simulate_log import (
+    EXTRA_SIGNALS,
     attach_fit,
     attach_validation,
     compute_fit,
+    pool_fits,
     replace_run,
     simulate_shift,
 )
@@ -231,6 +233,28 @@ def test_a_wheel_speed_that_stopped_before_the_shift_takes_no_part(
     assert np.array_equal(
         told.trajectory.shaft_torque, simulate_shift(twin, without, late).trajectory.shaft_torque
     )
+
+
+def test_further_speeds_are_compared_but_no_part_of_the_fit(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    engine = replace(log["input_speed"], role="engine_speed", source_name="engine")
+    both = replace(log, channels={**log.channels, "engine_speed": engine})
+    found = simulate_shift(twin, both, shift)
+    assert set(found.extra_traces) == {"engine_speed", "wheel_speed"}
+    assert set(found.fit) == set(found.traces) == {"output_torque", "input_speed", "output_speed"}
+    for trace in found.extra_traces.values():
+        assert np.abs(trace.measured - trace.simulated).max() < 0.01 * np.abs(trace.measured).max()
+    pooled = pool_fits([found], EXTRA_SIGNALS)
+    assert all(fits["all"].fit_percent > 90.0 for fits in pooled.values())
+
+
+def test_a_speed_that_stands_in_for_a_compared_one_is_shown_once(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    engine = replace(log["input_speed"], role="engine_speed")
+    both = replace(log, channels={**log.channels, "engine_speed": engine})
+    assert set(simulate_shift(twin, both, shift).extra_traces) == {"wheel_speed"}
 
 
 def test_a_torque_that_stopped_before_the_shift_is_named(

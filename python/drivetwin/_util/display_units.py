@@ -55,6 +55,17 @@ def get_display_unit(si_unit: str) -> Display:
     return _BY_SI.get(si_unit, Display(si_unit))
 
 
+LARGE = 1e4
+"""Size in Nm, Nm/rad or Nm·s/rad from which torques, stiffness and damping are shown in kNm."""
+
+
+def scale_display(display: Display, size: float) -> Display:
+    """Return the display unit for values of up to `size` [SI]: kNm in place of Nm if large."""
+    if not display.label.startswith("Nm") or not abs(size) >= LARGE:
+        return display
+    return Display(f"k{display.label}", 1e-3 * display.factor)
+
+
 def format_with_unit(
     value: float, si_unit: str, half_width: float | None = None, digits: int = 4
 ) -> str:

@@ -9,20 +9,89 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from drivetwin.errors import ResultFileError, Where
+
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.twin.twin import Twin
     from drivetwin.vehicle.card import VehicleCard
 
+RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
+"""Files that `identify -o` writes."""
+
+
+def find_twin(source: Path) -> Path:
+    """Return the twin file of a source: the file itself, or that of an output folder or result.
+
+    Raises ResultFileError if the source is another kind of file, or has no twin.
+    """
+    from drivetwin.cli.file_kinds import FileKind, recognise_file, require_kind
+
+    if source.is_dir():
+        path = source / TWIN
+    elif recognise_file(source) is FileKind.RESULT:
+        path = source.with_name(TWIN)
+    else:
+        require_kind(source, FileKind.TWIN)
+        return source
+    if not path.is_file():
+        raise ResultFileError(
+            f"there is no {TWIN} in {path.parent}",
+            "give the folder that `drivetwin identify LOG --vehicle CARD -o DIR` wrote, or its "
+            f"{TWIN}",
+            Where(file=str(source)),
+        )
+    return path
+
+
+def require_log(source: Path) -> Path:
+    """Return the path of a log; raises FileFormatError if it is a twin, a card or another file."""
+    from drivetwin.cli.file_kinds import FileKind, require_kind
+
+    require_kind(source, FileKind.LOG)
+    return source
+
+
+def require_logs(sources: list[Path]) -> list[Path]:
+    """Return paths of logs; raises FileFormatError as `require_log` does."""
+    return [require_log(source) for source in sources]
+
+
+def require_card(source: Path | None) -> Path | None:
+    """Return the path of a card; raises CardError if it is a log, a twin or another file."""
+    from drivetwin.cli.file_kinds import FileKind, require_kind
+
+    if source is not None:
+        require_kind(source, FileKind.CARD)
+    return source
+
+
+TwinFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="TWIN",
+        help="Identified model: twin.toml, or the folder of `identify -o`.",
+        callback=find_twin,
+    ),
+]
 LogFile = Annotated[
-    Path, typer.Argument(metavar="LOG", help="Shift log: CSV, MDF, MAT, Parquet, bus log.")
+    Path,
+    typer.Argument(
+        metavar="LOG", help="Shift log: CSV, MDF, MAT, Parquet, bus log.", callback=require_log
+    ),
 ]
 VehicleFile = Annotated[
-    Path, typer.Option("--vehicle", metavar="CARD", help="Vehicle card (TOML).")
+    Path,
+    typer.Option("--vehicle", metavar="CARD", help="Vehicle card (TOML).", callback=require_card),
 ]
 OptionalVehicleFile = Annotated[
     Path | None,
-    typer.Option("--vehicle", metavar="CARD", help="Vehicle card, in place of the twin's own."),
+    typer.Option(
+        "--vehicle",
+        metavar="CARD",
+        help="Vehicle card, in place of the twin's own.",
+        callback=require_card,
+    ),
 ]
 ChannelsFile = Annotated[
     Path | None,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.cli.arguments import RESULT, TWIN, TwinFile
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -32,9 +33,7 @@ CALIBRATION, CERTIFICATE, REPORT = "calibration.toml", "certificate.json", "repo
 
 
 def calibrate(
-    twin: Annotated[
-        Path, typer.Argument(metavar="TWIN", help="twin.toml, or the folder of `identify -o`.")
-    ],
+    twin: TwinFile,
     shift: Annotated[
         str, typer.Option("--shift", metavar="GEAR-GEAR", help="Which shift, as 2-3.")
     ],
@@ -88,7 +87,7 @@ def calibrate(
     from drivetwin.files.limits_file import Requirements, load_limits
 
     given = Requirements(()) if limits is None else load_limits(limits)
-    source, model = _load_valid_twin(twin)
+    model = _load_valid_twin(twin)
     gears = parse_gears(shift)
     request = Request(
         gears=gears,
@@ -107,7 +106,7 @@ def calibrate(
         found = run_calibration(build_task(model, request))
     findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
     with show_step(f"writing {output}"):
-        _write_results(output, found, findings, (model, request, source))
+        _write_results(output, found, findings, (model, request, twin))
     if as_json:
         print_json(_to_document(found, findings, output))
         return
@@ -116,14 +115,12 @@ def calibrate(
     print_line(f"wrote {output / REPORT}")
 
 
-def _load_valid_twin(path: Path) -> tuple[Path, Twin]:
-    """File and twin; raises IdentificationError where its result says that it is not valid."""
-    from drivetwin.cli.identify_run import RESULT, TWIN
+def _load_valid_twin(source: Path) -> Twin:
+    """Load a twin; raises IdentificationError where its result says that it is not valid."""
     from drivetwin.estimation.result.status import ModelStatus
     from drivetwin.files.result_file import load_result
     from drivetwin.files.twin_conversion import load_twin
 
-    source = path / TWIN if path.is_dir() else path
     model = load_twin(source)
     result = source.with_name(RESULT)
     if source.name == TWIN and result.is_file():
@@ -134,7 +131,7 @@ def _load_valid_twin(path: Path) -> tuple[Path, Twin]:
                 f"see {RESULT} for the reasons, correct the vehicle card and identify again",
                 Where(file=str(source)),
             )
-    return source, model
+    return model
 
 
 def _load_start(path: Path | None, policy: PolicyKind) -> dict[str, float]:

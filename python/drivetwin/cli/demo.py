@@ -38,8 +38,9 @@ def demo(
     as_json: JsonFlag = False,
 ) -> None:
     """Make a log with the paper's numbers, identify it both ways, compare with the truth."""
+    from drivetwin.cli.arguments import REPORT
     from drivetwin.cli.comparison import compare
-    from drivetwin.cli.identify_run import REPORT, Request, run_identification, write_outcome
+    from drivetwin.cli.identify_run import Request, run_identification, write_outcome
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run as run_dyno
     from drivetwin.dyno.scenario_file import load_scenario

@@ -175,8 +175,8 @@ def _identify_friction(outcome: Outcome, shape: FrictionShape) -> Answer:
 
 def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     """Write all files or none."""
+    from drivetwin.cli.arguments import TWIN
     from drivetwin.cli.atomic_outputs import write_atomically
-    from drivetwin.cli.identify_run import TWIN
     from drivetwin.files.twin_conversion import save_twin
 
     names: list[str] = []

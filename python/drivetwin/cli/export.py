@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, read_twin_log
+from drivetwin.cli.arguments import ChannelsFile, TwinFile, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
 from drivetwin.errors import InputError
 from drivetwin.export.fmu.version import FmiVersion
@@ -59,7 +59,7 @@ _Platforms = Annotated[
 
 
 def export(
-    twin: Annotated[Path, typer.Argument(metavar="TWIN", help="Identified model (twin.toml).")],
+    twin: TwinFile,
     to: Annotated[Target, typer.Option("--to", help="What to write.")],
     output: _Output = None,
     names: Annotated[

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, VehicleFile
+from drivetwin.cli.arguments import ChannelsFile, VehicleFile, require_logs
 from drivetwin.cli.atomic_outputs import refuse_same_names
 from drivetwin.cli.identify_run import Request
 from drivetwin.cli.output import (
@@ -20,6 +20,7 @@ from drivetwin.cli.output import (
     print_line,
     print_paragraph,
     print_table,
+    print_verdict,
     show_error,
     to_error_document,
 )
@@ -37,7 +38,10 @@ NOT_VALID = 3
 
 
 def identify(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="One or more shift logs.")],
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG...", help="One or more shift logs.", callback=require_logs),
+    ],
     vehicle: VehicleFile,
     channels: ChannelsFile = None,
     method: Annotated[
@@ -176,7 +180,9 @@ def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) 
         build_suggestion_table,
         list_remarks,
     )
+    from drivetwin.report.model_verdict import explain_identification
 
+    print_verdict(explain_identification(found))
     for source, own in shifts.items():
         print_table(build_shift_table(own, source))
     print_table(build_parameter_table(found.estimates, f"Parameters ({found.method} method)"))
@@ -191,5 +197,4 @@ def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) 
         print_table(build_suggestion_table(suggestions, found.estimates))
     if found.fit:
         print_table(build_fit_table(found.fit, "Simulation over measurement"))
-    print_line(f"model: {found.status}")
     print_findings(found.findings)

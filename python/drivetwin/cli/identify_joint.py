@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.arguments import find_mapping
+from drivetwin.cli.arguments import REPORT, RESULT, TWIN, find_mapping
 from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
 from drivetwin.cli.holdout_args import parse_holdouts
-from drivetwin.cli.identify_run import REPORT, RESULT, TWIN, Request
+from drivetwin.cli.identify_run import Request
 from drivetwin.cli.numbers import format_percent, format_quantity
 from drivetwin.cli.output import (
     make_table,

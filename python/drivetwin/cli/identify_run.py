@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.arguments import find_mapping
+from drivetwin.cli.arguments import REPORT, RESULT, TWIN, find_mapping
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_findings, show_step
 from drivetwin.estimation.result.method import Method
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from drivetwin.estimation.identification import Identification
     from drivetwin.twin.twin import Twin
     from drivetwin.vehicle.card import VehicleCard
-
-RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
 
 
 @dataclass(frozen=True)

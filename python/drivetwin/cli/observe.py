@@ -14,6 +14,7 @@ from drivetwin.cli.arguments import (
     ChannelsFile,
     LogFile,
     OptionalVehicleFile,
+    TwinFile,
     read_twin_log,
 )
 from drivetwin.cli.output import (
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def observe(
-    twin: Annotated[Path, typer.Argument(metavar="TWIN", help="Identified model (twin.toml).")],
+    twin: TwinFile,
     log: LogFile,
     vehicle: OptionalVehicleFile = None,
     channels: ChannelsFile = None,

@@ -13,11 +13,21 @@ import typer
 
 from drivetwin._util.visible_text import escape_json
 from drivetwin.errors import DrivetwinError
-from drivetwin.findings import Finding
+from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.findings import Finding, sort_by_severity
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+
+    from drivetwin.report.model_verdict import ModelVerdict
+
+_STATUS_COLOURS = {
+    ModelStatus.VALID: "green",
+    ModelStatus.LIMITED: "yellow",
+    ModelStatus.NOT_VALID: "red",
+    ModelStatus.NOT_VALIDATED: "yellow",
+}
 
 JsonFlag = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON on stdout, nothing else.")
@@ -109,9 +119,20 @@ def show_step(text: str) -> Iterator[None]:
             yield
 
 
+def print_verdict(verdict: ModelVerdict) -> None:
+    """Print the verdict on a model: status in colour, reason and next action."""
+    from rich.text import Text
+
+    out = make_console()
+    out.print(Text(f"Model: {verdict.status}", style=f"bold {_STATUS_COLOURS[verdict.status]}"))
+    print_paragraph(verdict.reason)
+    print_paragraph(verdict.action)
+    out.print()
+
+
 def print_findings(findings: Iterable[Finding]) -> None:
-    """Print findings with their severity, each on its own line."""
-    for one in findings:
+    """Print findings with their severity, the gravest first, each on its own line."""
+    for one in sort_by_severity(findings):
         print_paragraph(f"{one.severity}: {one.text}")
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, read_twin_log
-from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
+from drivetwin.cli.arguments import REPORT, RESULT, ChannelsFile, find_twin, read_twin_log
+from drivetwin.cli.output import JsonFlag, print_json, print_line, print_verdict, show_step
 from drivetwin.errors import InputError, ResultFileError, Where
 
 if TYPE_CHECKING:
@@ -67,8 +67,9 @@ def _is_identification(source: Path) -> bool:
 
 
 def _print_page_name(source: Path, *, as_json: bool) -> None:
-    from drivetwin.cli.identify_run import REPORT, RESULT
+    """Print verdict and path of the report of an identification."""
     from drivetwin.files.result_file import load_result
+    from drivetwin.report.model_verdict import explain_result
 
     result = source / RESULT if source.is_dir() else source
     content = load_result(result)
@@ -79,9 +80,13 @@ def _print_page_name(source: Path, *, as_json: bool) -> None:
             "write all three files again with `drivetwin identify LOG --vehicle CARD -o DIR`",
             Where(file=str(page)),
         )
+    verdict = explain_result(content)
     if as_json:
-        print_json({"report": page, "result": result, "inputs": content.inputs})
+        print_json(
+            {"report": page, "result": result, "inputs": content.inputs, "verdict": vars(verdict)}
+        )
         return
+    print_verdict(verdict)
     print_line(str(page))
 
 
@@ -117,24 +122,20 @@ def _assign_names(made: Sequence[Path]) -> dict[str, Path]:
 
 
 def _load_candidate(name: str, source: Path) -> Candidate:
-    from drivetwin.cli.identify_run import RESULT
     from drivetwin.files.result_file import load_result
     from drivetwin.files.twin_conversion import load_twin
     from drivetwin.report.find_reports import Candidate
 
     if source.suffix == ".toml":
-        return Candidate.from_twin(name, load_twin(source))
+        return Candidate.from_twin(name, load_twin(find_twin(source)))
     return Candidate.from_result(name, load_result(source / RESULT if source.is_dir() else source))
 
 
 def _load_twin(source: Path) -> Twin:
     """Load the twin of a source: the file itself, or the twin file next to its result."""
-    from drivetwin.cli.identify_run import TWIN
     from drivetwin.files.twin_conversion import load_twin
 
-    if source.suffix == ".toml":
-        return load_twin(source)
-    return load_twin(source / TWIN if source.is_dir() else source.with_name(TWIN))
+    return load_twin(find_twin(source))
 
 
 def _simulate_trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list[Trial]:

@@ -13,6 +13,7 @@ from drivetwin.cli.arguments import (
     ChannelsFile,
     LogFile,
     OptionalVehicleFile,
+    TwinFile,
     read_twin_log,
 )
 from drivetwin.cli.output import (
@@ -26,18 +27,30 @@ from drivetwin.cli.output import (
 from drivetwin.export.input_kind import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
+    from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.estimation.result.validation import Validation
     from drivetwin.twin.twin import Twin
 
 
 def simulate(
-    twin: Annotated[Path, typer.Argument(metavar="TWIN", help="Identified model (twin.toml).")],
+    twin: TwinFile,
     log: LogFile,
     vehicle: OptionalVehicleFile = None,
     channels: ChannelsFile = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FILE.csv", help="Where the traces go (SI)."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE.csv",
+            help="Where measured and simulated signals go, side by side (SI).",
+        ),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            "--html", metavar="FILE.html", help="Where a page goes that compares both in plots."
+        ),
     ] = None,
     step_size: Annotated[
         float | None,
@@ -64,7 +77,8 @@ def simulate(
     """Simulate the shifts of a log with an identified model and compare.
 
     Measured engine torque and pressures drive the model; the log may be another than the twin's.
-    Ratios and shift elements are the twin's own, so no vehicle card is needed.
+    Ratios and shift elements are the twin's own, so no vehicle card is needed. The twin may be
+    given as the folder that `identify -o` wrote.
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.cli.tables import build_fit_table
@@ -84,7 +98,10 @@ def simulate(
             stepping = Stepping(DEFAULT_STEP if step_size is None else step_size, input_kind)
             runs = [rerun_fixed_step(run, model, recording, stepping) for run in runs]
     if output is not None:
-        write_text(output, format_traces(runs))
+        write_text(output, format_traces(runs, recording))
+    if html is not None:
+        with show_step(f"writing {html.name}"):
+            _write_page(html, model, runs, log.name)
     if as_json:
         print_json({"shifts": [_to_document(run) for run in runs]})
         return
@@ -95,8 +112,18 @@ def simulate(
             )
         )
         print_findings(run.findings)
-    if output is not None:
-        print_line(f"wrote {output}")
+    for file in (output, html):
+        if file is not None:
+            print_line(f"wrote {file}")
+
+
+def _write_page(path: Path, twin: Twin, runs: Sequence[Validation], log: str) -> None:
+    """Write a page with measurement and simulation of each shift."""
+    from drivetwin.report.comparison import make_trial_label, save_comparison
+    from drivetwin.report.find_reports import Candidate, Trial
+
+    trials = [Trial(make_trial_label(log, run.shift), {twin.name: run}, {}) for run in runs]
+    save_comparison(path, [Candidate.from_twin(twin.name, twin)], trials)
 
 
 def _apply_parameters(twin: Twin, parameters: Path) -> Twin:
@@ -131,10 +158,13 @@ def _to_document(run: Validation) -> dict[str, object]:
     }
 
 
-def format_traces(runs: Sequence[Validation]) -> str:
-    """CSV with a unit row: time and the simulated signals, SI, one shift after the other.
+def format_traces(runs: Sequence[Validation], log: ShiftLog) -> str:
+    """CSV with a unit row: time, and each signal as measured and as simulated, SI.
 
-    A gear that is held between two shifts is divided in its middle: time increases throughout.
+    The rows are the times of the simulation. Measured values are interpolated between samples and
+    empty where the log has none; a signal without a channel has no measured column. The shifts
+    follow each other, and a gear that is held between two shifts is divided in its middle: time
+    increases throughout.
     """
     import numpy as np
 
@@ -142,13 +172,32 @@ def format_traces(runs: Sequence[Validation]) -> str:
     from drivetwin.shifts.split_gears import compute_exclusive_masks
     from drivetwin.validation.simulate_log import SIGNALS, compute_run_signals
 
+    measured = dict.fromkeys(name for run in runs for name in run.all_traces)
+    names = list(dict.fromkeys((*SIGNALS, *measured)))
+    columns = [
+        (name, part)
+        for name in names
+        for part in ("measured", "simulated")
+        if part == "simulated" or name in measured
+    ]
+    lines = [
+        ",".join(["time", *(f"{name}_{part}" for name, part in columns)]),
+        ",".join(["s", *(get_channel_unit(name) for name, _ in columns)]),
+    ]
     own = compute_exclusive_masks(
         [run.shift for run in runs], [run.trajectory.time for run in runs]
     )
-    lines = [",".join(["time", *SIGNALS]), ",".join(["s", *map(get_channel_unit, SIGNALS)])]
     for run, kept in zip(runs, own, strict=True):
-        simulated = compute_run_signals(run.model, run.trajectory)
-        columns = (run.trajectory.time, *(simulated[name] for name in SIGNALS))
-        rows = np.column_stack(columns)[kept].tolist()
-        lines += [",".join(f"{value:.12g}" for value in row) for row in rows]
+        time, simulated = run.trajectory.time, compute_run_signals(run.model, run.trajectory)
+        values = (
+            simulated[name] if part == "simulated" else log[name].interpolate(time)
+            for name, part in columns
+        )
+        rows = np.column_stack((time, *values))[kept].tolist()
+        lines += [",".join(map(_format_value, row)) for row in rows]
     return "\n".join(lines) + "\n"
+
+
+def _format_value(value: float) -> str:
+    """Format a value; empty for none."""
+    return f"{value:.12g}" if value == value else ""

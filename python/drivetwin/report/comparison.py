@@ -43,10 +43,15 @@ def render_comparison(candidates: Sequence[Candidate], trials: Sequence[Trial]) 
     ]
     names = ", ".join(one.name for one in candidates)
     return render_page(
-        title=f"Comparison of {names}" if several else f"{names} over {len(trials)} shifts",
+        title=f"Comparison of {names}" if several else f"Simulation of {names} over the log",
         subtitle=f"made with drivetwin {get_program_version()}",
         sections=[section for section in sections if section.blocks],
     )
+
+
+def make_trial_label(log: str, shift: Shift) -> str:
+    """Name log and shift of a trial."""
+    return f"{log}, {shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.1f} s"
 
 
 def simulate_trials(
@@ -58,7 +63,7 @@ def simulate_trials(
     """
     trials = []
     for count, shift in enumerate(shifts):
-        label = f"{name}, {shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.1f} s"
+        label = make_trial_label(name, shift)
         runs: dict[str, Validation] = {}
         refused: dict[str, str] = {}
         for place, (twin_name, twin) in enumerate(twins.items()):

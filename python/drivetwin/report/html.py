@@ -21,7 +21,7 @@ from drivetwin.report.embedded_data import Store, encode_content
 from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.report.sections.identifiability import build_limits_section
 from drivetwin.report.sections.likelihood import build_likelihood_sections
-from drivetwin.report.sections.parameters import build_parameters_section
+from drivetwin.report.sections.parameters import build_findings_section, build_result_section
 from drivetwin.report.sections.provenance import build_provenance_section
 from drivetwin.report.sections.stage_results import build_stage_sections
 from drivetwin.report.sections.summary import (
@@ -54,15 +54,18 @@ def render_report(found: Identification, log: ShiftLog, library: str | None = No
 
 def build_report_sections(found: Identification, log: ShiftLog) -> list[Section]:
     """All sections in reading order; those without content are left out."""
+    stages = build_stage_sections(found)
     sections = [
-        build_parameters_section(found),
-        build_shift_section(found, log),
+        build_result_section(found),
+        build_findings_section(found),
         build_validation_section(found.evidence.validation),
-        *build_stage_sections(found),
+        build_shift_section(found, log),
+        *(one for one in stages if not one.collapsed),
         build_friction_section(found),
         *build_likelihood_sections(found),
         build_limits_section(found),
         build_provenance_section(found),
+        *(one for one in stages if one.collapsed),
     ]
     return [section for section in sections if section.blocks]
 

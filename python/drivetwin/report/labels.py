@@ -15,6 +15,12 @@ def get_parameter_label(parameter_id: str) -> str:
     return f"{spec.symbol} ({suffix})" if suffix else spec.symbol
 
 
+def get_parameter_name(parameter_id: str) -> str:
+    """Name before symbol, e.g. `Efficiency η` or `Inertia at engine J′ (2)`."""
+    name = get_parameter_spec(parameter_id).name
+    return f"{name[0].upper()}{name[1:]} {get_parameter_label(parameter_id)}"
+
+
 def get_channel_label(role: str) -> str:
     """Role of a channel in words, e.g. `output torque` or `pressure B2`."""
     return role.replace("_", " ").replace(".", " ")

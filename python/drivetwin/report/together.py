@@ -16,7 +16,7 @@ from drivetwin.report.html import build_report_sections, render_page
 from drivetwin.report.sections.blocks import Section
 from drivetwin.report.sections.identifiability import build_limits_section
 from drivetwin.report.sections.likelihood import build_likelihood_sections
-from drivetwin.report.sections.parameters import build_parameters_section
+from drivetwin.report.sections.parameters import build_findings_section, build_result_section
 from drivetwin.report.sections.provenance import build_provenance_section
 from drivetwin.report.sections.summary import (
     build_friction_section,
@@ -28,6 +28,9 @@ from drivetwin.report.sections.together import (
     build_joint_section,
     prefix_log_section,
 )
+
+_OPENING = ("result", "findings", "logs")
+"""Sections before that of the held-out shifts."""
 
 
 def save_joint_report(path: Path | str, found: Identification, logs: Sequence[ShiftLog]) -> None:
@@ -45,7 +48,8 @@ def render_joint_report(found: Identification, logs: Sequence[ShiftLog]) -> str:
         else:
             sections = list(_build_joint_sections(found, several, logs))
     if held:
-        sections.insert(1 if several is None else 2, build_holdout_section(found, held))
+        place = sum(section.anchor in _OPENING for section in sections)
+        sections.insert(place, build_holdout_section(found, held))
     names = " and ".join(Path(log.source).name for log in logs)
     predicted = f" · {_format_shift_count(len(held))} predicted" if held else ""
     return render_page(
@@ -67,13 +71,14 @@ def _build_joint_sections(
     found: Identification, several: Several, logs: Sequence[ShiftLog]
 ) -> Iterator[Section]:
     """The sections of all logs in reading order; stages of single shifts are in their reports."""
-    yield build_parameters_section(found)
+    yield build_result_section(found)
+    yield build_findings_section(found)
     yield build_joint_section(found, several)
     for share, log in zip(several.logs, logs, strict=True):
-        yield prefix_log_section(build_shift_section(extract_log(found, share), log), share)
         own = {id(shift) for shift in share.shifts}  # a log that was not simulated has no runs
         runs = tuple(run for run in found.evidence.validation if id(run.shift) in own)
         yield prefix_log_section(build_validation_section(runs), share)
+        yield prefix_log_section(build_shift_section(extract_log(found, share), log), share)
     yield build_friction_section(found)
     yield from build_likelihood_sections(found)
     yield build_limits_section(found)

@@ -33,6 +33,8 @@ from drivetwin.validation.initial_state import estimate_start_state, find_quiesc
 from drivetwin.vehicle.spec import PriorValue
 
 SIGNALS = ("output_torque", "input_speed", "output_speed")
+EXTRA_SIGNALS = ("engine_speed", "wheel_speed")
+"""Signals that follow from the compared ones by fixed ratios or the final drive: displayed only."""
 _GRID = 1e-3
 """Output step [s] of the simulation: 80 points per period of a 12 Hz oscillation."""
 
@@ -105,6 +107,7 @@ def _simulate_window(
         fit={name: _compute_phase_fits(trace, phases) for name, trace in traces.items()},
         status=trajectory.status,
         findings=(),
+        extra_traces=_build_extra_traces(model, log, trajectory),
     )
     return replace(validation, findings=_check_run(twin, validation))
 
@@ -118,6 +121,7 @@ def replace_run(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) 
         traces=traces,
         fit={name: _compute_phase_fits(trace, before.phases) for name, trace in traces.items()},
         status=run.status,
+        extra_traces=_build_extra_traces(before.model, log, run),
     )
     return replace(made, findings=_check_run(twin, made))
 
@@ -134,7 +138,7 @@ def attach_fit(found: Identification, validations: Sequence[Validation]) -> Iden
     return assess_model(
         replace(
             found,
-            fit=_compute_pooled_fit(validations),
+            fit=pool_fits(validations),
             evidence=replace(found.evidence, validation=tuple(validations)),
             findings=found.findings + findings,
         )
@@ -223,18 +227,23 @@ def _apply_delay(channel: Channel, shift: float) -> Signal:
 
 
 def compute_run_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatArray]:
-    """Compute each of SIGNALS (n,) from a run, on its own time; SI."""
+    """Compute each of SIGNALS and EXTRA_SIGNALS (n,) from a run, on its own time; SI."""
     return {
         "output_torque": run.shaft_torque,
         "input_speed": run.engine_speed / model.i_in,
         "output_speed": run.output_speed,
+        "engine_speed": run.engine_speed,
+        "wheel_speed": run.wheel_speed,
     }
 
 
-def _build_traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str, SignalTrace]:
+def _build_traces(
+    model: DualClutch, log: ShiftLog, run: Trajectory, names: Sequence[str] = SIGNALS
+) -> dict[str, SignalTrace]:
+    """Pair simulated signals with the measurement; without a channel there is no trace."""
     simulated = compute_run_signals(model, run)
     traces = {}
-    for name in SIGNALS:
+    for name in names:
         if name not in log:
             continue
         channel = log[name]
@@ -249,6 +258,17 @@ def _build_traces(model: DualClutch, log: ShiftLog, run: Trajectory) -> dict[str
     return traces
 
 
+def _build_extra_traces(
+    model: DualClutch, log: ShiftLog, run: Trajectory
+) -> dict[str, SignalTrace]:
+    """Traces of EXTRA_SIGNALS, without those that stand in for a compared signal
+    or have no sample in the run."""
+    used = {log[name].source_name for name in SIGNALS if name in log}
+    own = [one for one in EXTRA_SIGNALS if one in log and log[one].source_name not in used]
+    traces = _build_traces(model, log, run, own)
+    return {name: one for name, one in traces.items() if one.time.size}
+
+
 def _compute_phase_fits(
     trace: SignalTrace, phases: Mapping[str, tuple[float, float]]
 ) -> dict[str, SignalFit]:
@@ -259,11 +279,14 @@ def _compute_phase_fits(
     }
 
 
-def _compute_pooled_fit(validations: Sequence[Validation]) -> dict[str, dict[str, SignalFit]]:
+def pool_fits(
+    validations: Sequence[Validation], signals: Sequence[str] = SIGNALS
+) -> dict[str, dict[str, SignalFit]]:
     """Fits over the samples of all shifts together, by signal and phase."""
     pooled: dict[str, dict[str, SignalFit]] = {}
-    for name in SIGNALS:
-        traces = [(one.traces[name], one.phases) for one in validations if name in one.traces]
+    for name in signals:
+        runs = [(one.all_traces, one.phases) for one in validations]
+        traces = [(own[name], phases) for own, phases in runs if name in own]
         if not traces:
             continue
         pooled[name] = {}

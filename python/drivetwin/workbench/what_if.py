@@ -20,7 +20,7 @@ from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import build_validation_panels
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.blocks import make_link
-from drivetwin.report.style import MUTED
+from drivetwin.report.style import COMPARED
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
@@ -201,6 +201,6 @@ def _add_identified(panel: Panel, identified: Validation) -> Panel:
         return panel
     name = panel.quantity.replace(" ", "_")
     trace = identified.traces[name]
-    behind = Curve("as identified", trace.time, trace.simulated, MUTED, 1.0, "dot")
+    behind = Curve("as identified", trace.time, trace.simulated, COMPARED, 1.2, "dot")
     measured, simulated = panel.curves
     return replace(panel, curves=[measured, behind, simulated])

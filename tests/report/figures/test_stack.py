@@ -18,14 +18,14 @@ from drivetwin.report.figures.stack import (
     stack_panels,
 )
 from drivetwin.report.figures.validation import plot_validation
-from drivetwin.report.style import MEASURED, SIMULATED
+from drivetwin.report.style import MEASURED, MUTED, SIMULATED
 from tests.report.sample import SHIFT, TIME, log, validation
 
 
 def test_panels_share_time_and_do_not_overlap() -> None:
     figure = plot_shift_phases(log(), SHIFT)
     assert {trace.xaxis for trace in figure.data} == {"x"}
-    names = ("yaxis", "yaxis2", "yaxis3", "yaxis4")
+    names = [name for name in figure.layout.to_plotly_json() if name.startswith("yaxis")]
     domains = sorted(tuple(figure.layout[name].domain) for name in names)
     assert all(low[1] < high[0] for low, high in pairwise(domains))
     assert (domains[0][0], domains[-1][1]) == pytest.approx((0.0, 1.0))
@@ -63,7 +63,7 @@ def test_values_are_shown_in_display_units() -> None:
 def test_measured_and_simulated_keep_their_colours() -> None:
     figure = plot_validation(validation())
     colours = {trace.name: trace.line.color for trace in figure.data}
-    assert colours["measured"] == MEASURED
+    assert colours["measured"] == MUTED
     assert colours["simulated"] == SIMULATED
 
 

@@ -1,48 +1,53 @@
 # SPDX-License-Identifier: MIT
-"""First page: verdicts, agreement, intervals."""
+"""First sections: verdict, overview, parameters, findings by severity."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin._util.display_units import RPM, format_significant
+from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import SignalFit, Verdict
+from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.findings import Code, report
 from drivetwin.report.figures.parameters import plot_intervals
-from drivetwin.report.sections.blocks import TilesBlock, Tone
+from drivetwin.report.sections.blocks import Cell, FigureBlock, NotesBlock, Tone, VerdictBlock
 from drivetwin.report.sections.parameters import (
-    build_fit_table,
+    build_findings_section,
     build_parameter_table,
-    build_parameters_section,
+    build_result_section,
 )
 from drivetwin.validation.simulate_log import attach_fit
 from tests.report.sample import identification, validation
 
 
-def test_rows_carry_value_interval_unit_and_verdict() -> None:
-    rows = {
-        row[0].note.split(" · ")[1]: row for row in build_parameter_table(identification()).rows
-    }
+def rows_by_id(found: Identification | None = None) -> dict[str, list[Cell]]:
+    found = found or identification()
+    rows = map(list, build_parameter_table(found).rows)
+    return dict(zip(found.estimates, rows, strict=True))
+
+
+def test_rows_carry_name_value_interval_unit_and_verdict() -> None:
+    rows = rows_by_id()
     texts = [cell.text for cell in rows["J_prime_2"]]
-    assert texts[0] == "J′ (2)"
+    assert texts[0] == "Inertia at engine J′ (2)"
     assert texts[1:] == ["17.50", "0.42", "0.16", "kg·m²", "identified", "integral"]
+    assert rows["J_prime_2"][0].note == "J_prime_2"
+    assert (rows["J_vehicle"][0].text, rows["J_vehicle"][0].note) == (
+        "Vehicle inertia J_vehicle", "",
+    )  # fmt: skip
     assert rows["P0.B3"][1].text == "0.820"
     assert rows["P0.B3"][4].text == "bar"
     assert rows["c_o"][5].tone is Tone.DOUBTFUL
 
 
+def test_large_torque_units_are_shown_in_kilo() -> None:
+    rows = rows_by_id()
+    assert [rows["k_o"][k].text for k in (1, 4)] == ["176.0", "kNm/rad"]
+    assert [rows["Tv_over_if"][k].text for k in (1, 4)] == ["2\u202f300", "Nm"]
+
+
 def test_parameter_that_cannot_be_told_shows_no_number() -> None:
-    rows = {
-        row[0].note.split(" · ")[1]: row for row in build_parameter_table(identification()).rows
-    }
-    assert [cell.text for cell in rows["te_delay"][1:4]] == ["–", "–", "–"]
-
-
-def test_the_reason_of_a_verdict_stands_in_its_row() -> None:
-    rows = {
-        row[0].note.split(" · ")[1]: row for row in build_parameter_table(identification()).rows
-    }
-    assert rows["c_o"][0].remark == "the oscillation is short"
-    assert rows["J_prime_2"][0].remark == ""
+    assert [cell.text for cell in rows_by_id()["te_delay"][1:4]] == ["–", "–", "–"]
 
 
 def test_missing_sensor_tolerances_are_said() -> None:
@@ -52,16 +57,47 @@ def test_missing_sensor_tolerances_are_said() -> None:
     assert "no sensor tolerance" in build_parameter_table(replace(found, estimates=plain)).caption
 
 
-def test_fit_table_shows_percent_and_rmse_in_display_units() -> None:
+def test_the_first_section_opens_with_verdict_plot_and_table() -> None:
     found = attach_fit(identification(), [validation()])
-    speed = next(row for row in build_fit_table(found).rows if row[0].text == "input speed")
-    rmse = found.fit["input_speed"]["all"].rmse
-    assert speed[1].note == f"{format_significant(rmse * RPM.factor, 3)} rpm"
+    blocks = build_result_section(found).blocks
+    assert [block.kind for block in blocks] == ["verdict", "figure", "table", "notes"]
 
 
-def test_warnings_stand_above_the_table() -> None:
-    kinds = [block.kind for block in build_parameters_section(identification()).blocks]
-    assert kinds == ["tiles", "notes", "table", "figure"]
+def test_the_colour_of_the_verdict_is_that_of_the_status() -> None:
+    tones = {}
+    for status in ModelStatus:
+        first = build_result_section(replace(identification(), status=status)).blocks[0]
+        assert isinstance(first, VerdictBlock)
+        assert first.status == status.value
+        tones[status] = first.tone
+    assert tones[ModelStatus.VALID] is Tone.GOOD
+    assert tones[ModelStatus.NOT_VALID] is Tone.BAD
+    assert Tone.GOOD not in (tones[ModelStatus.LIMITED], tones[ModelStatus.NOT_VALIDATED])
+
+
+def test_the_overview_is_of_the_shift_with_the_lowest_fit() -> None:
+    good = validation()
+    shift = replace(good.shift, start_gear="4", end_gear="5")
+    fit = {"output_torque": {"all": SignalFit(1.0, 12.0)}}
+    found = attach_fit(identification(), [good, replace(good, shift=shift, fit=fit)])
+    figure = build_result_section(found).blocks[1]
+    assert isinstance(figure, FigureBlock)
+    assert figure.caption.startswith("Shift 4→5")
+
+
+def test_a_shared_remark_stands_once_with_its_parameters() -> None:
+    found = identification()
+    shared = {
+        name: replace(one, reason="poorly excited") if name in ("eta", "k_o") else one
+        for name, one in found.estimates.items()
+    }
+    told = replace(found, estimates=shared)
+    notes = build_result_section(told).blocks[-1]
+    assert isinstance(notes, NotesBlock)
+    assert notes.items[0] == "(1) η, k_o: poorly excited"
+    marks = {name: row[5].text for name, row in rows_by_id(told).items()}
+    assert (marks["eta"], marks["k_o"]) == ("identified (1)", "identified (1)")
+    assert marks["J_vehicle"] == "identified"
 
 
 def test_intervals_of_what_was_found_only() -> None:
@@ -80,51 +116,21 @@ def test_design_values_do_not_count_as_identified() -> None:
         **found.estimates,
         "J_out": replace(found.estimates["J_out"], verdict=Verdict.DESIGN),
     }
-    intro = build_parameters_section(replace(found, estimates=estimates)).intro
-    assert "9 of 12 parameters are identified" in intro
-    assert "1 taken from the vehicle card" in intro
+    caption = build_parameter_table(replace(found, estimates=estimates)).caption
+    assert "9 of 12 parameters are identified" in caption
+    assert "1 taken from the vehicle card" in caption
 
 
-def test_a_shared_remark_stands_once() -> None:
-    found = identification()
-    shared = {
-        name: replace(one, reason="poorly excited") if name in ("eta", "k_o") else one
-        for name, one in found.estimates.items()
-    }
-    rows = build_parameter_table(replace(found, estimates=shared)).rows
-    remarks = {row[0].text: row[0].remark for row in rows}
-    assert (remarks["η"], remarks["k_o"], remarks["J3"]) == ("poorly excited", "as for η", "")
-
-
-def test_the_question_is_answered_with_what_stands_against_it() -> None:
-    found = attach_fit(identification(), [validation()])
-    text = build_parameters_section(found).intro
-    assert text.startswith("With reservations: not every parameter is known well; there are warn")
-    sound = {
-        name: one for name, one in found.estimates.items() if one.verdict is Verdict.IDENTIFIED
-    }
-    clean = replace(found, estimates=sound, findings=())
-    assert build_parameters_section(clean).intro.startswith(
-        "Yes, within the range that the log covered."
+def test_findings_are_listed_by_severity() -> None:
+    findings = (
+        report(Code.NO_SENSOR_TOLERANCES),
+        report(Code.GEAR_POORLY_EXCITED, variation=1.0, gear="2"),
+        report(Code.LIKELIHOOD_FAILED, why="no minimum"),
     )
-    unseen = replace(clean, fit={})
-    assert "could not be simulated" in build_parameters_section(unseen).intro
-
-
-def test_a_phase_that_the_simulation_misses_stands_against_a_good_fit_of_the_whole() -> None:
-    found = attach_fit(identification(), [validation()])
-    whole = SignalFit(rmse=1.0, fit_percent=92.7)
-    missed = {"all": whole, "before": whole, "inertia": SignalFit(3.7, 60.1)}
-    still = {"all": whole, "before": SignalFit(1.1, 55.0), "inertia": whole}
-    told = replace(found, fit={"input_speed": missed, "output_speed": still}, findings=())
-    section = build_parameters_section(told)
-    first = section.blocks[0]
-    assert isinstance(first, TilesBlock)
-    tiles = {tile.label: tile for tile in first.tiles}
-    assert tiles["fit of input speed"].tone is Tone.DOUBTFUL
-    assert tiles["fit of input speed"].note.endswith("; 3 inertia phase: 60.1 %")
-    assert tiles["fit of output speed"].tone is Tone.GOOD
-    assert "the simulation does not match" in section.intro
-    assert (
-        "too much" not in build_parameters_section(replace(told, fit={"output_speed": still})).intro
-    )
+    blocks = build_findings_section(replace(identification(), findings=findings)).blocks
+    told = [(one.heading, one.tone) for one in blocks if isinstance(one, NotesBlock)]
+    assert told == [
+        ("Errors", Tone.BAD),
+        ("Warnings", Tone.DOUBTFUL),
+        ("Information", Tone.PLAIN),
+    ]

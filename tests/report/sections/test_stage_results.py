@@ -11,10 +11,11 @@ import pytest
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.report.html import render_report
-from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, TableBlock, Tone
+from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, Section, TableBlock, Tone
 from drivetwin.report.sections.stage_results import build_stage_sections
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
@@ -36,17 +37,40 @@ def given() -> tuple[Identification, ShiftLog]:
     return attach_validation(found, build_twin(found, card), log), log
 
 
+def build_appendix(found: Identification) -> list[Section]:
+    return [section for section in build_stage_sections(found) if section.collapsed]
+
+
 def test_each_question_shows_both_methods(given: tuple[Identification, ShiftLog]) -> None:
-    sections = {section.anchor: section.blocks for section in build_stage_sections(given[0])}
+    sections = {section.anchor: section.blocks for section in build_appendix(given[0])}
     figures = {
         anchor: sum(isinstance(block, FigureBlock) for block in blocks)
         for anchor, blocks in sections.items()
     }
-    assert figures == {"inertia": 2, "load": 2, "shaft": 2}
+    assert figures == {"appendix-inertia": 2, "appendix-load": 2, "appendix-shaft": 2}
+
+
+@pytest.mark.parametrize("method", [Method.INTEGRAL, Method.PAPER])
+def test_only_the_evidence_of_other_methods_is_collapsed(
+    given: tuple[Identification, ShiftLog], method: Method
+) -> None:
+    evidence = replace(given[0].evidence, likelihood=None)
+    found = replace(given[0], method=method, evidence=evidence)
+    open_, closed = (
+        [section for section in build_stage_sections(found) if section.collapsed is collapsed]
+        for collapsed in (False, True)
+    )
+    for sections, is_paper in (
+        (open_, method is Method.PAPER),
+        (closed, method is Method.INTEGRAL),
+    ):
+        captions = [b.caption for one in sections for b in one.blocks if isinstance(b, FigureBlock)]
+        assert captions
+        assert all(text.startswith("The paper's") is is_paper for text in captions)
 
 
 def test_tables_are_those_of_the_paper(given: tuple[Identification, ShiftLog]) -> None:
-    inertia, load, _ = build_stage_sections(given[0])
+    inertia, load, _ = build_appendix(given[0])
     tables = [block for block in (*inertia.blocks, *load.blocks) if isinstance(block, TableBlock)]
     assert [row[0].text for row in tables[0].rows][::3] == ["1", "0.85", "0.7"]
     assert {"0", "500", "4000"} <= {row[0].text for row in tables[1].rows}
@@ -54,7 +78,7 @@ def test_tables_are_those_of_the_paper(given: tuple[Identification, ShiftLog]) -
 
 
 def test_a_doubtful_grid_is_not_marked_as_good(given: tuple[Identification, ShiftLog]) -> None:
-    load = build_stage_sections(given[0])[1]
+    load = build_appendix(given[0])[1]
     (table,) = (block for block in load.blocks if isinstance(block, TableBlock))
     (doubt,) = (block for block in load.blocks if isinstance(block, NotesBlock))
     marks = [row[3] for row in table.rows if row[3].text]

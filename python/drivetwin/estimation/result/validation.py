@@ -31,7 +31,8 @@ class Validation(DisplayMixin):
     """One shift simulated from its measured inputs.
 
     `phases` maps `before`, `torque`, `inertia`, `after` to their intervals [s]; `fit` is by signal
-    and phase, with `all` for the whole window. `status` is the simulation's.
+    and phase, with `all` for the whole window. `status` is the simulation's. `extra_traces` are
+    further measured signals, displayed but no part of `fit`.
     """
 
     shift: Shift
@@ -44,6 +45,12 @@ class Validation(DisplayMixin):
     fit: Mapping[str, Mapping[str, SignalFit]]
     status: str
     findings: tuple[Finding, ...]
+    extra_traces: Mapping[str, SignalTrace] = field(default_factory=dict)
+
+    @property
+    def all_traces(self) -> dict[str, SignalTrace]:
+        """Every measured signal that the simulation has too."""
+        return {**self.traces, **self.extra_traces}
 
 
 ALLOWED = 1.1

@@ -49,6 +49,11 @@ _REFUSED = {
 """First bytes of unsupported formats that an error names instead of `binary`."""
 
 
+def is_binary_log(head: bytes) -> bool:
+    """Return whether the first bytes of a file are those of a binary log format."""
+    return any(head.startswith(magic) for magic in _BY_MAGIC)
+
+
 def open_recording(
     path: Path, options: ReadOptions | None = None
 ) -> AbstractContextManager[Recording]:

@@ -14,7 +14,7 @@ from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import OUTPUTS
 from drivetwin.report.find_reports import Agreement, Trial
 from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.style import MEASURED, get_candidate_style, make_axis, make_layout
+from drivetwin.report.style import MUTED, get_candidate_style, make_axis, make_layout
 
 _ROW = 0.7
 """Share of the height of a row that the candidates of one parameter take up."""
@@ -114,13 +114,15 @@ def build_trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
     first = next(iter(trial.runs.values()))
     panels = []
     for name, (title, display, weight) in OUTPUTS.items():
-        if name not in first.traces:
+        if name not in first.all_traces:
             continue
-        seen = first.traces[name]
-        over = [Curve("measured", seen.time, seen.measured, MEASURED, width=2.4)]
+        seen = first.all_traces[name]
+        over = [Curve("measured", seen.time, seen.measured, MUTED, width=1.0)]
         left = []
         for candidate, run in trial.runs.items():
-            trace, style = run.traces[name], get_candidate_style(order.index(candidate))
+            if name not in run.all_traces:
+                continue
+            trace, style = run.all_traces[name], get_candidate_style(order.index(candidate))
             over.append(
                 Curve(candidate, trace.time, trace.simulated, style.colour, 1.3, style.dash)
             )

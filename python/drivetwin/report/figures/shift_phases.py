@@ -11,17 +11,18 @@ from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.style import ACCENT, COMPARED, MEASURED, SECOND
 from drivetwin.shifts.shift import Shift
 
-_SPEEDS = {
-    "engine_speed": ("engine", ACCENT),
-    "input_speed": ("gearbox input", MEASURED),
-    "output_speed": ("gearbox output", COMPARED),
-    "wheel_speed": ("wheel", SECOND),
-}
+_SPEEDS = (
+    ("input speed", {"engine_speed": ("engine", ACCENT), "input_speed": ("gearbox", MEASURED)}),
+    ("output speed", {"output_speed": ("gearbox output", COMPARED)}),
+    ("wheel speed", {"wheel_speed": ("wheel", SECOND)}),
+)
+"""Speeds of one magnitude share an axis: title, and by role the curve with its colour."""
 
 
 def plot_shift_phases(log: ShiftLog, shift: Shift) -> go.Figure:
     """Engine torque, pressures, output torque and speeds over time, as measured."""
-    return stack_panels(build_shift_panels(log, shift), get_shift_spans(shift), height=760)
+    panels = build_shift_panels(log, shift)
+    return stack_panels(panels, get_shift_spans(shift), height=120 + 130 * len(panels))
 
 
 def build_shift_panels(log: ShiftLog, shift: Shift) -> list[Panel]:
@@ -37,12 +38,15 @@ def build_shift_panels(log: ShiftLog, shift: Shift) -> list[Panel]:
     if "output_torque" in log:
         curve = _build_curve("T_o", log["output_torque"], MEASURED)
         panels.append(Panel("output torque", NM, [curve], 1.3))
-    speeds = [
-        _build_curve(name, log[role], colour)
-        for role, (name, colour) in _SPEEDS.items()
-        if role in log
-    ]
-    return [*panels, Panel("speed", RPM, speeds, 1.2)]
+    for title, speeds in _SPEEDS:
+        curves = [
+            _build_curve(name, log[role], colour)
+            for role, (name, colour) in speeds.items()
+            if role in log
+        ]
+        if curves:
+            panels.append(Panel(title, RPM, curves, 0.9))
+    return panels
 
 
 def get_shift_spans(shift: Shift) -> dict[str, tuple[float, float]]:

@@ -19,6 +19,7 @@ class Tone(StrEnum):
     PLAIN = "plain"
     GOOD = "good"
     DOUBTFUL = "doubtful"
+    BAD = "bad"
     UNKNOWN = "unknown"
 
 
@@ -93,17 +94,32 @@ class TilesBlock:
     kind: str = field(default="tiles", init=False)
 
 
-Block = FigureBlock | TableBlock | NotesBlock | TilesBlock
+@dataclass(frozen=True)
+class VerdictBlock:
+    """Verdict on a model in a coloured box: status, reason and next action."""
+
+    status: str
+    reason: str
+    action: str
+    tone: Tone
+    kind: str = field(default="verdict", init=False)
+
+
+Block = VerdictBlock | FigureBlock | TableBlock | NotesBlock | TilesBlock
 
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A titled part of the report; `anchor` is its address in the page."""
+    """A titled part of the report; `anchor` is its address in the page.
+
+    `collapsed` sections are closed until the reader opens them, and are not printed.
+    """
 
     anchor: str
     title: str
     intro: str
     blocks: Sequence[Block]
+    collapsed: bool = False
 
     @property
     def short(self) -> bool:

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from drivetwin._util.display_units import (
     Display,
     format_significant,
-    format_uncertainty,
     get_display_unit,
 )
-from drivetwin.estimation.result.estimate import Z95, Estimate
+from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.report.figures.comparison import (
     build_trial_panels,
     plot_agreement,
@@ -34,7 +33,8 @@ from drivetwin.report.sections.blocks import (
     Tone,
     make_cells,
 )
-from drivetwin.report.sections.parameters import PHASES, SIGNALS, make_fit_cell
+from drivetwin.report.sections.fits import SIGNALS, make_fit_head, make_fit_row
+from drivetwin.report.sections.parameters import format_estimate
 from drivetwin.shifts.shift import Shift
 
 
@@ -120,9 +120,8 @@ def make_value_cell(one: Estimate | None, display: Display) -> Cell:
     """Format a value with its total 95 % half width below; a dash without a value."""
     if one is None or one.value is None:
         return Cell("–", number=True, note="" if one is None else one.verdict.value)
-    half = None if one.std_total is None else Z95 * one.std_total * display.factor
-    value, width = format_uncertainty(one.value * display.factor, half)
-    return Cell(value, number=True, note=f"± {width}" if width else "")
+    value, width = format_estimate(one, one.std_total, display)
+    return Cell(value, number=True, note="" if width == "–" else f"± {width}")
 
 
 def _make_verdict_cell(one: Agreement, candidates: Sequence[Candidate]) -> Cell:
@@ -179,6 +178,9 @@ def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial
         if trial.refused:
             texts = [f"{name}: {why}" for name, why in trial.refused.items()]
             shifts.append(NotesBlock(f"Not simulated: {trial.label}", texts, Tone.DOUBTFUL))
+    each = Section("shifts", "Shift by shift", "Residuals are measured minus simulated.", shifts)
+    if len(candidates) == 1 and len(trials) == 1:
+        return [each]
     return [
         Section(
             "logs",
@@ -186,7 +188,7 @@ def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial
             "Each model is driven by the measured inputs of each log, its own or another's.",
             [matrix],
         ),
-        Section("shifts", "Shift by shift", "Residuals are measured minus simulated.", shifts),
+        each,
     ]
 
 
@@ -204,15 +206,8 @@ def _collect_fit_percent(order: Sequence[str], trials: Sequence[Trial]) -> list[
 
 
 def _build_trial_table(trial: Trial, shift: Shift) -> TableBlock:
-    head = (
-        *make_cells("model", "signal"),
-        *(Cell(label, number=True) for label in PHASES.values()),
-    )
     rows = [
-        (
-            *make_cells(name, label),
-            *(make_fit_cell(run.fit[signal].get(phase), display) for phase in PHASES),
-        )
+        make_fit_row((name, label), run.fit[signal], display)
         for name, run in trial.runs.items()
         for signal, (label, display) in SIGNALS.items()
         if signal in run.fit
@@ -220,7 +215,7 @@ def _build_trial_table(trial: Trial, shift: Shift) -> TableBlock:
     caption = (
         f"Fit by phase, {trial.label}: {shift.offgoing} off-going, {shift.oncoming} on-coming."
     )
-    return TableBlock(caption, head, rows)
+    return TableBlock(caption, make_fit_head("model", "signal"), rows)
 
 
 def build_origin_section(candidates: Sequence[Candidate]) -> Section:

@@ -11,7 +11,11 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.suggestion import ExperimentRanking
 from drivetwin.estimation.result.verdict import get_advice
-from drivetwin.report.figures.parameters import compute_half_width_percent, plot_correlation
+from drivetwin.report.figures.parameters import (
+    compute_half_width_percent,
+    plot_correlation,
+    plot_intervals,
+)
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.blocks import (
     Block,
@@ -28,7 +32,7 @@ _INSEPARABLE = (
     "μ and the clutch geometry N·D·A·r: only their product acts.",
     "η and a gain error of the engine torque: only their product acts.",
     "The common scale of all torques rests on the output-torque sensor's gain: an error of it "
-    "scales J′, J3, T_v/i_f, k_o, c_o and μ alike.",
+    "scales J′, J_vehicle, T_v/i_f, k_o, c_o and μ alike.",
     "J1·η + J2: the inertias before and behind the input gear act as one number.",
 )
 _CLOSE = 0.9
@@ -38,19 +42,24 @@ _LEAST_KNOWN = 5
 
 
 def build_limits_section(found: Identification) -> Section:
-    """Build the section on parameters that the log cannot determine, and helpful experiments."""
+    """Build the section on intervals, correlated parameters, and helpful experiments."""
     suggestions = found.evidence.suggestions
     narrower = (
         _build_suggestion_tables(suggestions, found)
         if suggestions
         else _build_uncertainty_tables(found)
     )
-    blocks: list[Block] = [*_build_remark_tables(found), *narrower]
+    intervals = FigureBlock(
+        plot_intervals(found.estimates),
+        "Relative 95 % interval of each parameter. Dots: noise, sensor tolerances on the card and "
+        "effects that the model leaves out; bars: noise alone.",
+    )
+    blocks: list[Block] = [intervals, *narrower]
     blocks.append(NotesBlock("Not separable from any one shift", _INSEPARABLE))
     if found.correlation is not None:
         pairs = list(_list_correlated_pairs(found))
         if pairs:
-            blocks.append(NotesBlock("Known together better than apart", pairs))
+            blocks.append(NotesBlock("Strongly correlated parameters", pairs))
         blocks.append(
             FigureBlock(
                 plot_correlation(found.correlation_ids, found.correlation),
@@ -60,32 +69,10 @@ def build_limits_section(found: Identification) -> Section:
         )
     return Section(
         "limits",
-        "What this log cannot tell",
-        "Limits of the data, not of the computation.",
+        "Uncertainty and further tests",
+        "Limits of the data, and the recordings that would narrow the intervals.",
         blocks,
     )
-
-
-def _build_remark_tables(found: Identification) -> Iterator[TableBlock]:
-    """Build a table with one row for each reason of a verdict."""
-    remarked: dict[tuple[Verdict, str], list[str]] = {}
-    for one in found.estimates.values():
-        if one.reason:
-            remarked.setdefault((one.verdict, one.reason), []).append(get_parameter_label(one.id))
-    if remarked:
-        rows = [
-            (
-                Cell(", ".join(labels)),
-                Cell(verdict.value, badge=True, tone=TONES[verdict]),
-                Cell(reason),
-            )
-            for (verdict, reason), labels in remarked.items()
-        ]
-        yield TableBlock(
-            "Parameters that call for a remark.",
-            make_cells("parameter", "verdict", "remark: why, and which experiment would help"),
-            rows,
-        )
 
 
 def _build_suggestion_tables(
@@ -174,9 +161,5 @@ def _list_correlated_pairs(found: Identification) -> Iterator[str]:
     for i, one in enumerate(ids):
         for j in range(i + 1, len(ids)):
             if abs(matrix[i, j]) >= _CLOSE:
-                way = "rise and fall together" if matrix[i, j] > 0 else "go against each other"
                 number = f"{matrix[i, j]:+.2f}".replace("-", "−")
-                yield (
-                    f"{get_parameter_label(one)} and {get_parameter_label(ids[j])} {way} "
-                    f"({number})."
-                )
+                yield f"{get_parameter_label(one)} and {get_parameter_label(ids[j])}: r = {number}."

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Evidence of the likelihood method: what the fit leaves over, and what sensor errors would do."""
+"""Evidence of the likelihood method: residuals of the fit, sensitivity to sensor errors."""
 
 from __future__ import annotations
 
@@ -45,6 +45,7 @@ def build_likelihood_sections(found: Identification) -> list[Section]:
 
 def _build_fit_section(found: Identification, fit: LikelihoodFit) -> Section:
     labels = _list_labels(found.evidence.signals)
+    passed, total = count_consistent_residuals(fit)
     tests = run_residual_tests(fit).values()
     blocks: list[Block] = [_build_test_table(list(zip(labels, tests, strict=True)))]
     for label, shift, residuals in zip(
@@ -69,9 +70,17 @@ def _build_fit_section(found: Identification, fit: LikelihoodFit) -> Section:
         "The likelihood fit",
         f"All shifts together: {fit.problem.size:,} samples, {len(fit.point.names)} unknowns, "
         f"misfit per sample {fit.chi2:.2f} (1 where noise explains everything; above 1 all "
-        "intervals are widened). Noise of the inputs is part of the model.",
+        "intervals are widened). Noise of the inputs is part of the model. "
+        f"{passed} of {total} residual tests passed.",
         blocks,
     )
+
+
+def count_consistent_residuals(fit: LikelihoodFit) -> tuple[int, int]:
+    """Tests of the residuals: how many passed, of how many."""
+    tests = [test for group in run_residual_tests(fit).values() for test in group]
+    total = sum(1 + len(test.correlation) for test in tests)
+    return total - sum(len(test.findings) for test in tests), total
 
 
 def _list_labels(signals: Sequence[ShiftSignals]) -> list[str]:
@@ -138,7 +147,7 @@ def _build_sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
     )
     return Section(
         "sensors",
-        "What a sensor error would do",
+        "Sensitivity to sensor errors",
         "Noise averages out over a log; an error of a sensor's gain, offset or age does not.",
         [FigureBlock(plot_sensitivity(change), text)],
     )

@@ -1,28 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""First page: can I trust this model?"""
+"""First sections: verdict on the model, its parameters, and the findings by severity."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from drivetwin._util.display_units import (
-    NM,
-    RPM,
     Display,
-    format_significant,
     format_uncertainty,
     get_display_unit,
+    scale_display,
 )
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.diagnostics.residual_tests import run_residual_tests
-from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
+from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.status import ModelStatus
-from drivetwin.findings import Finding, render, select_warnings
-from drivetwin.parameters import get_parameter_spec
-from drivetwin.report.figures.parameters import plot_intervals
-from drivetwin.report.labels import get_parameter_label
+from drivetwin.estimation.result.validation import Validation
+from drivetwin.findings import Severity, render
+from drivetwin.report.figures.validation import build_overview_panels, plot_overview
+from drivetwin.report.labels import get_parameter_label, get_parameter_name
+from drivetwin.report.model_verdict import explain_identification
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -30,9 +27,9 @@ from drivetwin.report.sections.blocks import (
     NotesBlock,
     Section,
     TableBlock,
-    Tile,
-    TilesBlock,
     Tone,
+    VerdictBlock,
+    make_link,
 )
 
 TONES = {
@@ -41,142 +38,82 @@ TONES = {
     Verdict.NOT_IDENTIFIABLE: Tone.UNKNOWN,
     Verdict.DESIGN: Tone.PLAIN,
 }
-SIGNALS: dict[str, tuple[str, Display]] = {
-    "output_torque": ("output torque", NM),
-    "input_speed": ("input speed", RPM),
-    "output_speed": ("output speed", RPM),
-}
-PHASES = {
-    "all": "whole",
-    "before": "1 before",
-    "torque": "2 torque phase",
-    "inertia": "3 inertia phase",
-    "after": "4 after lock-up",
-}
-
-FITS = 80.0
-"""Fit [%] from which the simulation counts as one of the signal ..."""
-UNEVEN = 1.5
-"""... in every phase too that has an error so many times that of the whole."""
-
-
-def build_parameters_section(found: Identification) -> Section:
-    """Verdicts, agreement and warnings at a glance, then the parameter table."""
-    blocks: list[Block] = [TilesBlock(_build_tiles(found))]
-    blocks += _build_findings(found.findings)
-    blocks.append(build_parameter_table(found))
-    if found.fit:
-        blocks.append(build_fit_table(found))
-    blocks.append(
-        FigureBlock(
-            plot_intervals(found.estimates),
-            "How narrowly each parameter is known. Dots: noise, sensor tolerances on the card and "
-            "effects that the model leaves out; bars: noise alone.",
-        )
-    )
-    return Section("trust", "Can I trust this model?", _write_headline(found), blocks)
-
-
-def _build_findings(findings: Sequence[Finding]) -> list[Block]:
-    """Build the lists of warnings and of remarks."""
-    warnings = select_warnings(findings)
-    remarks = [one for one in findings if one not in warnings]
-    named = (("Warnings", warnings, Tone.DOUBTFUL), ("Remarks", remarks, Tone.PLAIN))
-    return [NotesBlock(head, render(those), tone) for head, those, tone in named if those]
-
-
-def _write_headline(found: Identification) -> str:
-    count = _count_verdicts(found)
-    identified = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)}"
-    text = f"{_write_answer(found)} {identified} parameters are identified"
-    if count[Verdict.WEAK]:
-        text += f", {count[Verdict.WEAK]} only weakly"
-    if count[Verdict.NOT_IDENTIFIABLE]:
-        text += f", {count[Verdict.NOT_IDENTIFIABLE]} cannot be told from this log"
-    if count[Verdict.DESIGN]:
-        text += f", {count[Verdict.DESIGN]} taken from the vehicle card"
-    text += "."
-    fit = found.fit.get("output_torque", {}).get("all")
-    if fit is not None and math.isfinite(fit.fit_percent):
-        text += (
-            f" Driven by the measured inputs alone, the model reproduces the output torque with a "
-            f"fit of {format_significant(fit.fit_percent, 3)} %."
-        )
-    return text
-
-
-def _write_answer(found: Identification) -> str:
-    """Return the one-word answer, with the objections to a plain yes."""
-    if found.status is ModelStatus.NOT_VALID:
-        return "No: the simulation does not match the measurement; no value is identified."
-    count, (passed, tests) = _count_verdicts(found), count_consistent_residuals(found)
-    against = []
-    if not found.fit:
-        against.append("the model could not be simulated over the log")
-    elif any(_find_missed_phase(fits) for fits in found.fit.values()):
-        against.append("the simulation does not match the measurement")
-    if passed < tests:
-        against.append("the residuals show an effect that the model lacks")
-    if count[Verdict.WEAK] or count[Verdict.NOT_IDENTIFIABLE]:
-        against.append("not every parameter is known well")
-    if select_warnings(found.findings):
-        against.append("there are warnings")
-    if not against:
-        return "Yes, within the range that the log covered."
-    return f"With reservations: {'; '.join(against)}."
-
-
-def count_consistent_residuals(found: Identification) -> tuple[int, int]:
-    """Tests of the likelihood's residuals: how many passed, of how many; (0, 0) without any."""
-    fit = found.evidence.likelihood
-    if fit is None:
-        return 0, 0
-    tests = [test for group in run_residual_tests(fit).values() for test in group]
-    total = sum(1 + len(test.correlation) for test in tests)
-    return total - sum(len(test.findings) for test in tests), total
-
-
-def _count_verdicts(found: Identification) -> Counter[Verdict]:
-    return Counter(estimate.verdict for estimate in found.estimates.values())
-
-
 STATUS_TONES = {
     ModelStatus.VALID: Tone.GOOD,
     ModelStatus.LIMITED: Tone.DOUBTFUL,
-    ModelStatus.NOT_VALID: Tone.UNKNOWN,
+    ModelStatus.NOT_VALID: Tone.BAD,
     ModelStatus.NOT_VALIDATED: Tone.DOUBTFUL,
 }
+_SEVERITIES = (
+    (Severity.ERROR, "Errors", Tone.BAD),
+    (Severity.WARNING, "Warnings", Tone.DOUBTFUL),
+    (Severity.INFO, "Information", Tone.PLAIN),
+)
 
 
-def _build_tiles(found: Identification) -> list[Tile]:
-    tiles = [Tile("model", found.status.value, STATUS_TONES[found.status])]
-    for name, (label, display) in SIGNALS.items():
-        fits = found.fit.get(name, {})
-        if "all" in fits:
-            fit, missed = fits["all"], _find_missed_phase(fits)
-            note = f"rmse {format_significant(fit.rmse * display.factor, 3)} {display.label}"
-            if missed not in ("", "all"):
-                note += f"; {PHASES[missed]}: {_format_percent(fits[missed])}"
-            tone = Tone.DOUBTFUL if missed else Tone.GOOD
-            tiles.append(Tile(f"fit of {label}", _format_percent(fit), tone, note))
-    passed, tests = count_consistent_residuals(found)
-    if tests:
-        tone = Tone.GOOD if passed == tests else Tone.DOUBTFUL
-        tiles.append(Tile("residual tests passed", f"{passed} of {tests}", tone, "see the fit"))
-    count = _count_verdicts(found)
-    complete = not count[Verdict.WEAK] and not count[Verdict.NOT_IDENTIFIABLE]
-    tiles.append(
-        Tile(
-            "identified",
-            f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)}",
-            Tone.GOOD if complete else Tone.DOUBTFUL,
-            "parameters",
-        )
-    )
-    warnings = select_warnings(found.findings)
-    tone = Tone.DOUBTFUL if warnings else Tone.GOOD
-    tiles.append(Tile("warnings", str(len(warnings)), tone))
-    return tiles
+def build_result_section(found: Identification) -> Section:
+    """Verdict, simulation over measurement of one shift, parameters and their remarks."""
+    blocks: list[Block] = [_build_verdict_block(found)]
+    if found.evidence.validation:
+        blocks.append(_build_overview(found.evidence.validation))
+    blocks.append(build_parameter_table(found))
+    remarks = [
+        f"({number}) {', '.join(_list_labels(found, reason))}: {reason}"
+        for reason, number in _number_reasons(found.estimates.values()).items()
+    ]
+    if remarks:
+        blocks.append(NotesBlock("Remarks on parameters", remarks))
+    return Section("result", "Result", "", blocks)
+
+
+def build_findings_section(found: Identification) -> Section:
+    """Findings by severity, errors first."""
+    blocks = [
+        NotesBlock(heading, render(told), tone)
+        for severity, heading, tone in _SEVERITIES
+        if (told := [one for one in found.findings if one.severity is severity])
+    ]
+    intro = "Remarks on log, vehicle card and fit: cause, and what to do."
+    return Section("findings", "Findings", intro, blocks)
+
+
+def _build_verdict_block(found: Identification) -> VerdictBlock:
+    told = explain_identification(found)
+    tone = STATUS_TONES[told.status]
+    return VerdictBlock(told.status.value, told.reason, told.action, tone)
+
+
+def _build_overview(validations: Sequence[Validation]) -> FigureBlock:
+    """Draw the shift whose output torque, else input speed, is followed least."""
+    shown = min(validations, key=_get_fit_percent)
+    shift = shown.shift
+    text = f"Shift {shift.start_gear}→{shift.end_gear}, measured and simulated"
+    if len(validations) > 1:
+        text += f": the one of {len(validations)} shifts with the lowest fit"
+    panels = build_overview_panels(shown)
+    text += ". 1 gear held, 2 torque phase, 3 inertia phase, 4 new gear locked."
+    return FigureBlock(plot_overview(shown), text, panels, make_link(shift))
+
+
+def _get_fit_percent(one: Validation) -> float:
+    """Fit of the first compared signal [%]; one without a fit comes last."""
+    fits = next(iter(one.fit.values()), {})
+    percent = fits["all"].fit_percent if "all" in fits else float("nan")
+    return percent if percent == percent else float("inf")
+
+
+def _count_parameters(found: Identification) -> str:
+    """Count the verdicts in a sentence."""
+    count = Counter(estimate.verdict for estimate in found.estimates.values())
+    text = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)} parameters are identified"
+    for verdict, words in (
+        (Verdict.WEAK, "only weakly known"),
+        (Verdict.NOT_IDENTIFIABLE, "not identifiable from this log"),
+        (Verdict.DESIGN, "taken from the vehicle card"),
+    ):
+        if count[verdict]:
+            text += f", {count[verdict]} {words}"
+    return f"{text}."
 
 
 def build_parameter_table(found: Identification) -> TableBlock:
@@ -185,92 +122,54 @@ def build_parameter_table(found: Identification) -> TableBlock:
         Cell("parameter"),
         Cell("value", number=True),
         Cell("± 95 %", number=True, note="sensors and effects"),
-        Cell("± 95 %", number=True, note="noise alone"),
+        Cell("± 95 %", number=True, note="noise alone", secondary=True),
         Cell("unit"),
         Cell("verdict"),
         Cell("method", secondary=True),
     )
-    caption = "Parameters."
+    caption = _count_parameters(found)
     if not any(one.std_systematic for one in found.estimates.values()):
         caption += (
             " The vehicle card states no sensor tolerance, so both intervals are of noise alone."
         )
-    first: dict[str, str] = {}
-    rows = []
-    for one in found.estimates.values():
-        label = get_parameter_label(one.id)
-        owner = first.setdefault(one.reason, label)
-        rows.append(_build_parameter_row(one, one.reason if owner == label else f"as for {owner}"))
+    numbers = _number_reasons(found.estimates.values())
+    rows = [
+        _build_parameter_row(one, f" ({numbers[one.reason]})" if one.reason else "")
+        for one in found.estimates.values()
+    ]
     return TableBlock(caption, head, rows)
 
 
-def _build_parameter_row(estimate: Estimate, remark: str) -> tuple[Cell, ...]:
-    spec = get_parameter_spec(estimate.id)
-    display = get_display_unit(estimate.unit)
-    value, total = _format_estimate(estimate, estimate.std_total, display)
-    _, noise = _format_estimate(estimate, estimate.std_noise, display)
+def _number_reasons(estimates: Iterable[Estimate]) -> dict[str, int]:
+    """The different reasons of verdicts, numbered from 1 in the order of the parameters."""
+    reasons = dict.fromkeys(one.reason for one in estimates if one.reason)
+    return {reason: number for number, reason in enumerate(reasons, start=1)}
+
+
+def _list_labels(found: Identification, reason: str) -> list[str]:
+    return [get_parameter_label(one.id) for one in found.estimates.values() if one.reason == reason]
+
+
+def _build_parameter_row(estimate: Estimate, mark: str) -> tuple[Cell, ...]:
+    display = scale_display(get_display_unit(estimate.unit), estimate.value or 0.0)
+    value, total = format_estimate(estimate, estimate.std_total, display)
+    _, noise = format_estimate(estimate, estimate.std_noise, display)
+    is_symbol = get_parameter_label(estimate.id) == estimate.id
     return (
-        Cell(
-            get_parameter_label(estimate.id),
-            note=f"{spec.meaning} · {estimate.id}",
-            remark=remark if estimate.reason else "",
-        ),
+        Cell(get_parameter_name(estimate.id), note="" if is_symbol else estimate.id),
         Cell(value, number=True),
         Cell(total, number=True),
-        Cell(noise, number=True),
+        Cell(noise, number=True, secondary=True),
         Cell(display.label),
-        Cell(estimate.verdict.value, badge=True, tone=TONES[estimate.verdict]),
+        Cell(f"{estimate.verdict.value}{mark}", badge=True, tone=TONES[estimate.verdict]),
         Cell(estimate.method, secondary=True),
     )
 
 
-def _format_estimate(estimate: Estimate, std: float | None, display: Display) -> tuple[str, str]:
+def format_estimate(estimate: Estimate, std: float | None, display: Display) -> tuple[str, str]:
+    """Format a value and the half width of its 95 % interval; dashes for what is missing."""
     if estimate.value is None:
         return "–", "–"
     half = None if std is None else Z95 * std * display.factor
     value, width = format_uncertainty(estimate.value * display.factor, half)
     return value, width or "–"
-
-
-def build_fit_table(found: Identification) -> TableBlock:
-    """Fit % and rmse by signal and phase."""
-    head = [Cell("signal"), *(Cell(label, number=True) for label in PHASES.values())]
-    rows = []
-    for name, (label, display) in SIGNALS.items():
-        if name not in found.fit:
-            continue
-        fits = [found.fit[name].get(phase) for phase in PHASES]
-        rows.append([Cell(label), *(make_fit_cell(fit, display) for fit in fits)])
-    return TableBlock(
-        "Simulation against measurement: fit % = 100·(1 − ‖y − ŷ‖ / ‖y − mean(y)‖), the mean taken "
-        "over the whole log for every phase; root mean square error below. Where a signal hardly "
-        "moves, fit % is low although only noise is left: the error in its unit tells.",
-        head,
-        rows,
-    )
-
-
-def make_fit_cell(fit: SignalFit | None, display: Display) -> Cell:
-    """Format the fit in % with the error in its unit below; a dash without a fit."""
-    if fit is None:
-        return Cell("–", number=True)
-    note = f"{format_significant(fit.rmse * display.factor, 3)} {display.label}"
-    return Cell(_format_percent(fit), number=True, note=note)
-
-
-def _format_percent(fit: SignalFit) -> str:
-    return f"{fit.fit_percent:.1f} %" if math.isfinite(fit.fit_percent) else "–"
-
-
-def _find_missed_phase(fits: Mapping[str, SignalFit]) -> str:
-    """Phase of a signal that the simulation misses: "all", else the worst; empty for none.
-
-    A phase in which the signal hardly moves has a low fit although only noise is left, of which it
-    has no more than the others.
-    """
-    whole = fits["all"]
-    if not whole.fit_percent >= FITS:
-        return "all"
-    uneven = [phase for phase, one in fits.items() if one.rmse > UNEVEN * whole.rmse]
-    low = [phase for phase in uneven if fits[phase].fit_percent < FITS]
-    return min(low, key=lambda phase: fits[phase].fit_percent, default="")

@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from drivetwin._util.display_units import BAR, NM, RAD_PER_S, RPM, Display, format_significant
-from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.report.sections.blocks import (
@@ -28,7 +25,7 @@ _RANGES: dict[str, tuple[str, Display]] = {
 
 
 def build_provenance_section(found: Identification) -> Section:
-    """Assumptions, range of validity, settings, versions, hashes."""
+    """Assumptions, range of validity, versions, hashes; the settings are in the result file."""
     blocks: list[Block] = []
     assumed = (*found.assumptions, *list_borrowed_friction(found))
     if assumed:
@@ -41,13 +38,10 @@ def build_provenance_section(found: Identification) -> Section:
             [make_cells(name, sha) for name, sha in found.inputs.items()],
         )
     )
-    settings = {"method": found.method.value, "loss law": found.loss_law, **found.settings}
-    rows = [make_cells(name, value) for name, value in _flatten("", to_plain_values(settings))]
-    blocks.append(TableBlock("Settings, SI.", make_cells("setting", "value"), rows))
     return Section(
         "provenance",
-        "Assumptions, settings, origin",
-        f"Made with drivetwin {get_program_version()}.",
+        "Assumptions and origin",
+        f"Made with drivetwin {get_program_version()}. All settings are in the result file.",
         blocks,
     )
 
@@ -66,18 +60,3 @@ def _build_validity_table(found: Identification) -> TableBlock:
         )
     head = (Cell("quantity"), Cell("from", number=True), Cell("to", number=True), Cell("unit"))
     return TableBlock("Range the log covered; the model is not proven outside it.", head, rows)
-
-
-def _flatten(name: str, value: object) -> Iterator[tuple[str, str]]:
-    """Rows of nested settings: dotted name and short text."""
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _flatten(f"{name}.{key}" if name else str(key), item)
-    elif isinstance(value, list):
-        yield name, ", ".join(_format_value(item) for item in value)
-    else:
-        yield name, _format_value(value)
-
-
-def _format_value(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

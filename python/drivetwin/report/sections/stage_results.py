@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from drivetwin._util.display_units import format_significant
@@ -12,6 +12,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.paper.wlse import GridFit
+from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
 from drivetwin.report.figures.load import plot_load
 from drivetwin.report.figures.momentum import plot_momentum
@@ -57,9 +58,36 @@ _AnyStages = _Stages[IntegralShift] | _Stages[PaperShift]
 
 
 def build_stage_sections(found: Identification) -> list[Section]:
-    """One section per question: inertia and efficiency, load, output shaft."""
+    """Evidence by question: that of the method of the result, then collapsed that of the others.
+
+    The questions are inertia and efficiency, load, and output shaft.
+    """
     integral = _collect_stages(found, found.evidence.integral, "integral method")
     paper = _collect_stages(found, found.evidence.paper, "the paper's method")
+    by_likelihood = found.evidence.likelihood is not None
+    by_paper = not by_likelihood and found.method is Method.PAPER
+    by_integral = not by_likelihood and not by_paper
+    others = _build_sections(found, [] if by_integral else integral, [] if by_paper else paper)
+    return [
+        *_build_sections(found, integral if by_integral else [], paper if by_paper else []),
+        *(
+            replace(
+                one,
+                anchor=f"appendix-{one.anchor}",
+                title=f"Appendix: {one.title[0].lower()}{one.title[1:]}",
+                intro=f"Evidence of the other methods, for comparison. {one.intro}",
+                collapsed=True,
+            )
+            for one in others
+        ),
+    ]
+
+
+def _build_sections(
+    found: Identification,
+    integral: Sequence[_Stages[IntegralShift]],
+    paper: Sequence[_Stages[PaperShift]],
+) -> list[Section]:
     return [
         Section(
             "inertia",
@@ -78,7 +106,7 @@ def build_stage_sections(found: Identification) -> list[Section]:
         Section(
             "load",
             "Load and vehicle inertia",
-            "Eq. 11: T_o − T_v/i_f = (J3/i_f)·ω_w′.",
+            "Eq. 11: T_o − T_v/i_f = (J3/i_f)·ω_w′, J3 being J_vehicle.",
             [
                 *_build_load_blocks(found, integral),
                 *(

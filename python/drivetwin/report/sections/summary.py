@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The story of an identification: the log and its shift, simulation over measurement."""
+"""Sections on simulation over measurement, the log with its shift phases, and friction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,12 @@ from drivetwin.findings import render
 from drivetwin.report.figures.friction import plot_friction
 from drivetwin.report.figures.recording import build_log_panels, plot_log
 from drivetwin.report.figures.shift_phases import build_shift_panels, plot_shift_phases
-from drivetwin.report.figures.validation import build_validation_panels, plot_validation
+from drivetwin.report.figures.validation import (
+    build_further_panels,
+    build_validation_panels,
+    plot_further_signals,
+    plot_validation,
+)
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -24,7 +29,9 @@ from drivetwin.report.sections.blocks import (
     make_cells,
     make_link,
 )
+from drivetwin.report.sections.fits import EXTRA_SIGNALS, SIGNALS, build_fit_table
 from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.validation.simulate_log import pool_fits
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 _TORQUE_PHASE = {
@@ -45,6 +52,12 @@ OF_SPEEDS = (
     "does to the speeds, which tells it over η alone. So the curve is "
     "μ/η = T_c/η / (N·D·A·r·(P − P0)), the slip from both speeds (eq. 15); the twin has μ where "
     "the vehicle card states η."
+)
+
+_OF_SIMULATION = (
+    "inputs, then each output as measured (grey) and simulated, with the residual below. While an "
+    "element slips, the noise of its pressure sensor passes into the simulated torque and output "
+    "speed, and moves the lock-up by a millisecond or two: the residual then rings after it."
 )
 
 
@@ -147,27 +160,26 @@ def _format_law(curve: FrictionCurve) -> str:
 
 
 def build_validation_section(validations: tuple[Validation, ...]) -> Section:
-    """Simulation over measurement (Fig. 11)."""
+    """Fit by phase, and simulation over measurement (Fig. 11)."""
     blocks: list[Block] = []
+    if validations:
+        fit = pool_fits(validations, (*SIGNALS, *EXTRA_SIGNALS))
+        blocks.append(build_fit_table(fit))
     names = make_shift_labels([one.shift for one in validations])
     for name, one in zip(names, validations, strict=True):
-        text = (
-            f"Shift {name}: the measured engine torque and pressures "
-            "drive the identified model; nothing else is fed in after the start. Below each output "
-            "stands what is left, measured minus simulated. While an element slips, the "
-            "noise of its pressure sensor passes into the simulated torque and output speed, and "
-            "moves the lock-up by a millisecond or two: the residual then swings on after it."
-        )
-        blocks.append(
-            FigureBlock(
-                plot_validation(one), text, build_validation_panels(one), make_link(one.shift)
-            )
-        )
+        panels = build_validation_panels(one)
+        text = f"Shift {name}: {_OF_SIMULATION}"
+        blocks.append(FigureBlock(plot_validation(one), text, panels, make_link(one.shift)))
+        if further := build_further_panels(one):
+            text = f"Shift {name}: slip of the shift elements, and speeds beyond those of the fit."
+            figure = plot_further_signals(one)
+            blocks.append(FigureBlock(figure, text, further, make_link(one.shift)))
         blocks.append(_build_event_table(one))
     return Section(
         "validation",
         "Simulation over measurement",
-        "The proof of the model: does it do what the vehicle did?",
+        "Measured engine torque and pressures drive the identified model; nothing else is fed in "
+        "after the start.",
         blocks,
     )
 

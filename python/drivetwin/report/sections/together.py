@@ -32,7 +32,7 @@ from drivetwin.report.sections.blocks import (
     make_link,
 )
 from drivetwin.report.sections.comparison import make_value_cell
-from drivetwin.report.sections.parameters import PHASES, SIGNALS, make_fit_cell
+from drivetwin.report.sections.fits import SIGNALS, build_fit_table, make_fit_cell
 
 _TONES = {
     Outcome.ALLOWED: Tone.GOOD,
@@ -266,13 +266,7 @@ def _build_prediction_blocks(one: HeldOut, run: Validation) -> Iterator[Block]:
         build_validation_panels(run),
         make_link(one.shift),
     )
-    rows = [
-        (Cell(label), *(make_fit_cell(run.fit[signal].get(phase), display) for phase in PHASES))
-        for signal, (label, display) in SIGNALS.items()
-        if signal in run.fit
-    ]
-    head = (Cell("signal"), *(Cell(label, number=True) for label in PHASES.values()))
-    yield TableBlock(f"Fit % and rmse of the prediction by phase, {one.name}.", head, rows)
+    yield build_fit_table(run.fit, f"Fit % and rmse of the prediction by phase, {one.name}.")
 
 
 def prefix_log_section(section: Section, share: LogShare) -> Section:

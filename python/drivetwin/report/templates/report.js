@@ -7,7 +7,7 @@
     modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
   };
   /* Paper is narrower than the screen and always light. */
-  const paper = { width: 690, shrink: 0.8, tallest: 770 };
+  const paper = { width: 690, shrink: 0.8, shortest: 320, tallest: 770 };
   /* Points drawn of one curve: more than a screen has columns. */
   const mostPoints = 4000;
   const plots = [];
@@ -232,6 +232,7 @@
       });
     }
     plots.push(plot);
+    plot.ownHeight = figure.layout.height;
     await Plotly.newPlot(plot, figure.data, figure.layout, options);
     if (!plot.curves) return;
     plot.on("plotly_relayout", (change) => zoomed(plot, change));
@@ -241,26 +242,61 @@
   }
 
   function prepareForPaper() {
-    const heights = plots.map((plot) => plot.layout.height);
     window.addEventListener("beforeprint", () => {
       paint(false);
-      plots.forEach((plot, index) => {
-        const height = Math.min(heights[index] * paper.shrink, paper.tallest);
+      plots.forEach((plot) => {
+        const shrunk = Math.min(plot.ownHeight * paper.shrink, paper.tallest);
+        const height = Math.max(shrunk, Math.min(plot.ownHeight, paper.shortest));
         Plotly.relayout(plot, { width: paper.width, height });
       });
     });
     window.addEventListener("afterprint", () => {
       paint(dark.matches);
-      plots.forEach((plot, index) => {
-        Plotly.relayout(plot, { width: null, height: heights[index], autosize: true });
-      });
+      plots.forEach((plot) => Plotly.relayout(plot, { width: null, height: plot.ownHeight, autosize: true }));
     });
   }
 
-  async function start() {
-    const [samples] = await Promise.all([loadSamples(), loadLibrary()]);
-    for (const plot of document.querySelectorAll(".plot")) await draw(plot, samples);
+  /* Figures of a closed appendix have no width: they are drawn when it opens. */
+  function drawWhenOpened(samples) {
+    document.querySelectorAll("details").forEach((part) => {
+      part.addEventListener("toggle", async () => {
+        if (part.open) await drawAll(part.querySelectorAll(".plot"), samples);
+      });
+    });
+    const open = () => {
+      const part = location.hash && element(decodeURIComponent(location.hash.slice(1)));
+      if (part && part.tagName === "DETAILS") part.open = true;
+    };
+    window.addEventListener("hashchange", open);
+    open();
+  }
+
+  async function drawAll(found, samples) {
+    for (const plot of found) if (!plots.includes(plot)) await draw(plot, samples);
     paint(dark.matches);
+  }
+
+  /* The section in view is marked in the navigation. */
+  function markSections() {
+    const links = new Map();
+    document.querySelectorAll("nav a").forEach((link) => links.set(element(link.hash.slice(1)), link));
+    const mark = () => {
+      const passed = [...links.keys()].filter((part) => part.getBoundingClientRect().top < window.innerHeight / 3);
+      links.forEach((link, part) => {
+        if (part === passed[passed.length - 1]) link.setAttribute("aria-current", "true");
+        else link.removeAttribute("aria-current");
+      });
+    };
+    document.addEventListener("scroll", mark, { passive: true });
+    mark();
+  }
+
+  async function start() {
+    markSections();
+    const [samples] = await Promise.all([loadSamples(), loadLibrary()]);
+    const shown = [...document.querySelectorAll(".plot")].filter((plot) => !plot.closest("details:not([open])"));
+    await drawAll(shown, samples);
+    drawWhenOpened(samples);
     dark.addEventListener("change", (event) => paint(event.matches));
     prepareForPaper();
     document.body.dataset.drawn = "all";

@@ -18,18 +18,23 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     Tile,
     TilesBlock,
+    VerdictBlock,
 )
 from drivetwin.workbench.views.widgets import make_badge, make_graph, make_hint, make_notes
 
 
 def render_section(section: Section, prefix: str) -> list[Component]:
     """A section under its title; `prefix` makes the ids of its figures its own."""
-    blocks = [_render_block(block, f"{prefix}-{k}") for k, block in enumerate(section.blocks)]
-    return [html.H3(section.title), make_hint(section.intro), *blocks]
+    intro = [make_hint(section.intro)] if section.intro else []
+    blocks = [render_block(block, f"{prefix}-{k}") for k, block in enumerate(section.blocks)]
+    return [html.H3(section.title), *intro, *blocks]
 
 
-def _render_block(block: Block, name: str) -> Component:
+def render_block(block: Block, name: str) -> Component:
+    """A block; `name` is the id of its figure."""
     match block:
+        case VerdictBlock():
+            return _render_verdict(block)
         case FigureBlock():
             figure = make_graph(name, block.caption.partition(".")[0], block.figure)
             return html.Div([figure, make_hint(block.caption)])
@@ -39,6 +44,15 @@ def _render_block(block: Block, name: str) -> Component:
             return make_notes(block.heading, block.items, block.tone.value)
         case TilesBlock():
             return html.Div([_render_tile(one) for one in block.tiles], className="tiles")
+
+
+def _render_verdict(block: VerdictBlock) -> Component:
+    parts = [
+        html.P(f"Model: {block.status}", className="word"),
+        html.P(block.reason),
+        html.P([html.Strong("Next:"), f" {block.action}"]),
+    ]
+    return html.Div(parts, className=f"verdict {block.tone}", role="status")
 
 
 def _render_tile(tile: Tile) -> Component:

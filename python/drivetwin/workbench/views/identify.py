@@ -11,12 +11,13 @@ from dash.development.base_component import Component
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.sections.parameters import build_parameters_section
+from drivetwin.report.sections.fits import build_fit_table
+from drivetwin.report.sections.parameters import build_findings_section, build_result_section
 from drivetwin.workbench.locks import LockKind
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.blocks import render_section
+from drivetwin.workbench.views.blocks import render_block, render_section
 from drivetwin.workbench.views.log import build_facts_line
 
 _UP_TO = {
@@ -139,7 +140,11 @@ def _build_content(work: SessionState) -> list[Component]:
             ui.make_hint("From the saved workspace; identify again for evidence and report.")
         )
     else:
-        content += render_section(build_parameters_section(outcome.found), "trust")
+        content += render_section(build_result_section(outcome.found), "result")
+        if outcome.found.findings:
+            content += render_section(build_findings_section(outcome.found), "findings")
+        if outcome.found.fit:
+            content.append(render_block(build_fit_table(outcome.found.fit), "fit"))
     content.append(ui.make_notes("Assumptions", outcome.twin.assumptions, "plain"))
     return content
 

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Kinds of files by content, whatever they are called."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.cli.arguments import find_twin
+from drivetwin.cli.file_kinds import FileKind, recognise_file, require_kind
+from drivetwin.errors import CardError, FileFormatError, ResultFileError
+
+CARD = 'name = "truck"\nfinal_drive = 5.0\n[[gears]]\nname = "2"\n[elements.B2]\nP0_bar = 0.8\n'
+TWIN = 'schema = "drivetwin/twin-2"\nname = "truck"\n[gears]\n[elements]\n'
+CONTENTS = {
+    "comma": ("time,torque\ns,Nm\n0.0,1.5\n0.1,1.6\n", FileKind.LOG),
+    "german": ("Zeit;M_ist\ns;Nm\n0,0;1,5\n0,1;1,6\n", FileKind.LOG),
+    "tabs": ("t\tM\n0\t-1.5e3\n", FileKind.LOG),
+    "asc": ("date Mon\n0.01 1 2 3\n", FileKind.LOG),
+    "mdf": ("MDF     4.10    ", FileKind.LOG),
+    "parquet": ("PAR1....", FileKind.LOG),
+    "card": (CARD, FileKind.CARD),
+    "commented card": ("# a card\n\n" + CARD, FileKind.CARD),
+    "twin": (TWIN, FileKind.TWIN),
+    "result": (json.dumps({"schema": "drivetwin/result-5"}), FileKind.RESULT),
+    "mapping": ('[channels.engine_torque]\nname = "M"\n', FileKind.MAPPING),
+    "other json": ("{}", FileKind.UNKNOWN),
+    "damaged twin": (TWIN + "law = [1.0, 2.0,\n3.0 4.0\n", FileKind.UNKNOWN),
+    "prose": ("A drive, on a Monday; it rained.\n", FileKind.UNKNOWN),
+    "nothing": ("", FileKind.UNKNOWN),
+}
+
+
+@pytest.mark.parametrize(("content", "kind"), CONTENTS.values(), ids=list(CONTENTS))
+def test_content_decides(content: str, kind: FileKind, tmp_path: Path) -> None:
+    for name in ("a.csv", "a.toml", "a"):
+        file = tmp_path / name
+        file.write_text(content, encoding="utf-8")
+        assert recognise_file(file) is kind
+
+
+@given(
+    rows=st.lists(
+        st.lists(st.floats(-1e6, 1e6, allow_nan=False), min_size=2, max_size=4),
+        min_size=1,
+        max_size=5,
+    ),
+    delimiter=st.sampled_from(",;\t"),
+)
+def test_tables_of_numbers_are_logs(
+    rows: list[list[float]], delimiter: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    file = tmp_path_factory.mktemp("table") / "file"
+    lines = [delimiter.join(("time", "torque")), *(delimiter.join(map(repr, row)) for row in rows)]
+    file.write_text("\n".join(lines), encoding="utf-8")
+    assert recognise_file(file) is FileKind.LOG
+
+
+@given(content=st.binary(max_size=200))
+def test_no_content_breaks_the_recognition(
+    content: bytes, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    file = tmp_path_factory.mktemp("any") / "file"
+    file.write_bytes(content)
+    assert recognise_file(file) in FileKind
+
+
+@pytest.mark.parametrize(
+    ("content", "wanted", "error", "remedy"),
+    [
+        ("card", FileKind.TWIN, ResultFileError, "identify with this card first"),
+        ("comma", FileKind.TWIN, ResultFileError, "give the twin first"),
+        ("twin", FileKind.LOG, FileFormatError, "the twin comes first"),
+        ("card", FileKind.LOG, FileFormatError, "--vehicle"),
+        ("result", FileKind.LOG, FileFormatError, "the log that was identified"),
+        ("comma", FileKind.CARD, CardError, "with --vehicle"),
+        ("twin", FileKind.CARD, CardError, "need no card"),
+        ("mapping", FileKind.CARD, CardError, "--channels"),
+    ],
+)
+def test_a_wrong_kind_is_named_with_the_remedy(
+    content: str, wanted: FileKind, error: type[Exception], remedy: str, tmp_path: Path
+) -> None:
+    text, found = CONTENTS[content]
+    file = tmp_path / "file"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(error, match=f"this is {found}, not {wanted}") as fault:
+        require_kind(file, wanted)
+    assert remedy in str(fault.value)
+
+
+def test_what_is_not_recognised_is_left_to_its_reader(tmp_path: Path) -> None:
+    damaged = tmp_path / "twin.toml"
+    damaged.write_text(CONTENTS["damaged twin"][0], encoding="utf-8")
+    for wanted in (FileKind.TWIN, FileKind.LOG, FileKind.CARD):
+        require_kind(damaged, wanted)
+        require_kind(tmp_path / "missing", wanted)
+
+
+def test_a_folder_or_a_result_stands_for_the_twin_beside_it(tmp_path: Path) -> None:
+    result, twin = tmp_path / "result.json", tmp_path / "twin.toml"
+    result.write_text(CONTENTS["result"][0], encoding="utf-8")
+    with pytest.raises(ResultFileError, match=r"no twin\.toml"):
+        find_twin(tmp_path)
+    twin.write_text(TWIN, encoding="utf-8")
+    assert find_twin(tmp_path) == find_twin(result) == find_twin(twin) == twin
