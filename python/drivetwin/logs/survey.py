@@ -130,11 +130,15 @@ def survey_recording(
 def _make_column(
     column: LogColumn, channel: RawChannel, filling: Filling | None, roles: tuple[str, ...]
 ) -> Column:
+    if filling is None:
+        rate = _estimate_update_rate(channel)
+    else:
+        rate = None if filling.kind is FillKind.UNKNOWN else 1.0 / filling.period
     return Column(
         name=column.name,
         group=column.group,
         unit=column.unit,
-        rate=_estimate_update_rate(channel) if filling is None else 1.0 / filling.period,
+        rate=rate,
         range=channel.range,
         gaps=int(np.count_nonzero(~np.isfinite(channel.values))) + channel.pauses,
         roles=roles,
