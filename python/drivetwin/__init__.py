@@ -6,6 +6,7 @@ it is first asked for, so that `import drivetwin` costs nothing.
 
     card = drivetwin.load_card(path)                              vehicle card: design data
     log = drivetwin.read_log(path, card)                          channels, SI
+    log = drivetwin.read_arrays(data, card, units)                the same from memory
     shifts = drivetwin.detect_shifts(log, card)                   shifts and their phases
     result = drivetwin.identify(log, card, shifts)                estimates with verdicts
     twin = drivetwin.build_twin(result, card)                     identified model
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.result.method import Method
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_conversion import load_twin, save_twin
+    from drivetwin.logs.arrays import read_arrays
     from drivetwin.logs.read import read_log
     from drivetwin.pipeline import identify
     from drivetwin.report.html import save_report
@@ -54,6 +56,7 @@ _HOME = {
     "identify": ("pipeline", "identify"),
     "load_card": ("vehicle.card", "load_card"),
     "load_twin": ("files.twin_conversion", "load_twin"),
+    "read_arrays": ("logs.arrays", "read_arrays"),
     "read_log": ("logs.read", "read_log"),
     "save_report": ("report.html", "save_report"),
     "save_result": ("files.result_file", "save_result"),
@@ -76,6 +79,7 @@ __all__ = [
     "load_card",
     "load_twin",
     "rank_experiments",
+    "read_arrays",
     "read_log",
     "save_report",
     "save_result",
@@ -83,6 +87,11 @@ __all__ = [
     "simulate",
     "simulate_shift",
 ]
+
+
+def __dir__() -> list[str]:
+    """Return the public names, for tab completion."""
+    return [*__all__]
 
 
 if not TYPE_CHECKING:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`plot()`, `summary()` and the notebook representation of results.
+"""`plot()`, `summary()`, `to_frame()` and the notebook representation of results.
 
 The report draws results and stands above them. The package registers the report's presenter here
 when it is imported, so that results do not import the report.
@@ -19,6 +19,9 @@ class Presenter(Protocol):
 
     def summarise(self, shown: Any, /) -> Any:
         """Return the summary of a result, as text and HTML."""
+
+    def make_frame(self, shown: Any, /) -> Any:
+        """Return the pandas data frame of a result."""
 
 
 _loaders: list[Callable[[], Any]] = []
@@ -44,6 +47,10 @@ class DisplayMixin:
     def summary(self) -> Any:
         """Return a summary in a few lines: text for `print`, a table in a notebook."""
         return _load_presenter().summarise(self)
+
+    def to_frame(self) -> Any:
+        """Return a pandas data frame: channels or signals over time, or parameters, in SI."""
+        return _load_presenter().make_frame(self)
 
     def _repr_html_(self) -> str:
         """Return the HTML representation for notebooks."""

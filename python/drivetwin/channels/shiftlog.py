@@ -165,7 +165,7 @@ class Channel:
         return () if self.quantity is Quantity.STATE else find_pauses(self.time)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ShiftLog(DisplayMixin):
     """All mapped channels of one recording, by role.
 
@@ -197,6 +197,9 @@ class ShiftLog(DisplayMixin):
                     f"let time count from the start of the log, or lie within {LATEST:g} s",
                     Where(file=self.source, channel=channel.source_name),
                 )
+
+    def __repr__(self) -> str:
+        return f"<ShiftLog {self.source!r}: {', '.join(self.channels)}>"
 
     def __contains__(self, role: object) -> bool:
         return role in self.channels

@@ -15,6 +15,7 @@ from drivetwin.estimation.result.estimate import (
     FrictionCurve,
     LoadLaw,
     SignalFit,
+    Verdict,
 )
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.status import ModelStatus
@@ -22,7 +23,7 @@ from drivetwin.findings import Finding
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Identification(DisplayMixin):
     """Everything one `identify` run found. Immutable; the twin, report and exports read it.
 
@@ -52,3 +53,9 @@ class Identification(DisplayMixin):
     status: ModelStatus = ModelStatus.NOT_VALIDATED
     mapping: RememberedMapping = field(default_factory=RememberedMapping)
     """Channel mapping by which the log was read, of several the first."""
+
+    def __repr__(self) -> str:
+        known = sum(one.verdict is Verdict.IDENTIFIED for one in self.estimates.values())
+        names = ", ".join(map(repr, self.inputs))
+        share = f"{known} of {len(self.estimates)} parameters identified"
+        return f"<Identification of {names}: {self.method.value}, {self.status.value}, {share}>"

@@ -133,14 +133,30 @@ def read_recording(
 
     See `read_log`; the log names no mapping file.
     """
+    log = assemble_log(recording, str(path), card, stated, demands, window)
+    return replace(log, sha256=_compute_digest(path))
+
+
+def assemble_log(
+    recording: Recording,
+    source: str,
+    card: VehicleCard | None,
+    stated: Mapped,
+    demands: Demands,
+    window: Window | None = None,
+) -> ShiftLog:
+    """Return the log of a `recording` that errors name `source`, without a digest.
+
+    See `read_log`.
+    """
     elements = {} if card is None else card.elements
     kinds = {name: element.kind for name, element in elements.items()}
     specs = {**({} if card is None else card.channels), **stated.channels}
     needed, sound = frozenset(demands.needed), demands.sound
     fallback = Fallback({} if card is None else card.remembered.channels, stated.names)
-    mapped = resolve_roles(recording.columns, specs, kinds, needed, str(path), sound, fallback)
+    mapped = resolve_roles(recording.columns, specs, kinds, needed, source, sound, fallback)
     strict = _select_strict_roles(mapped.channels, card, specs, needed, sound)
-    _refuse_unitless(recording, mapped.channels, strict, str(path))
+    _refuse_unitless(recording, mapped.channels, strict, source)
     findings = [report(Code.RECORDING, text=text) for text in recording.warnings]
     findings += [*stated.findings, *mapped.findings]
     channels: dict[str, Channel] = {}
@@ -149,7 +165,7 @@ def read_recording(
         notify_progress(count / len(mapped.channels))
         try:
             raw = recording.load(_load_column(recording, spec), window)
-            checked = _make_checked_channel(role, spec, raw, str(path))
+            checked = _make_checked_channel(role, spec, raw, source)
         except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
             if role in strict:
                 raise
@@ -158,9 +174,8 @@ def read_recording(
         channels[role] = checked.channel
         used[role] = RememberedChannel(spec, raw.unit)
         findings += checked.findings
-    channels, dropped = _drop_inconsistent(
-        channels, strict, card if demands.gearing else None, str(path)
-    )
+    gearing = card if demands.gearing else None
+    channels, dropped = _drop_inconsistent(channels, strict, gearing, source)
     findings += [*dropped, *check_coverage(channels)]
     if card is not None:
         findings += [*check_torque_balance(channels, card), *check_final_drive(channels, card)]
@@ -171,8 +186,8 @@ def read_recording(
         findings += late
     return ShiftLog(
         channels,
-        str(path),
-        _compute_digest(path),
+        source,
+        "",
         tuple(dict.fromkeys(findings)),
         mapping=RememberedMapping(used, stated.options),
         absent=mapped.absent,

@@ -18,12 +18,15 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.findings import render
+from drivetwin.report.data_frames import make_frame
 from drivetwin.report.figures.comparison import plot_friction_overlay
 from drivetwin.report.figures.parameters import plot_intervals
 from drivetwin.report.figures.recording import QUANTITIES, plot_log
 from drivetwin.report.figures.validation import plot_validation
 from drivetwin.report.labels import get_channel_label, get_channel_unit
 from drivetwin.twin.twin import Twin
+
+__all__ = ["Summary", "Table", "draw_figure", "make_frame", "summarise"]
 
 Row = Sequence[str]
 

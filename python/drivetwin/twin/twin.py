@@ -71,7 +71,7 @@ class TwinElement:
         return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Twin(DisplayMixin):
     """Identified model of one driveline; immutable, SI.
 
@@ -104,6 +104,10 @@ class Twin(DisplayMixin):
     mapping: RememberedMapping = field(default_factory=RememberedMapping)
     load_law: LoadLaw | None = None
     converter: Converter | None = None
+
+    def __repr__(self) -> str:
+        gears = ", ".join(self.gears)
+        return f"<Twin {self.name!r}: gears {gears}, {len(self.parameters)} parameters>"
 
     def build_dual_clutch(
         self,

@@ -26,7 +26,7 @@ class SignalTrace:
     """Mean of the measurement over the whole log, the reference of fit %."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Validation(DisplayMixin):
     """One shift simulated from its measured inputs.
 
@@ -46,6 +46,11 @@ class Validation(DisplayMixin):
     status: str
     findings: tuple[Finding, ...]
     extra_traces: Mapping[str, SignalTrace] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        shift = f"{self.shift.start_gear}→{self.shift.end_gear}"
+        fits = (f"{name} {one['all'].fit_percent:.1f} %" for name, one in self.fit.items())
+        return f"<Validation of shift {shift}: {self.status}, fit {', '.join(fits)}>"
 
     @property
     def all_traces(self) -> dict[str, SignalTrace]:

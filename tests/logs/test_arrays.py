@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""Logs from data in memory: the same channels as from a file, and typed errors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import DrivetwinError, FileFormatError, MappingError, UnitError
+from drivetwin.logs.arrays import read_arrays
+from drivetwin.logs.read import read_log
+from tests.logs.fixtures import UNITS, card, columns, write
+
+
+def list_signals() -> list[SimpleNamespace]:
+    """Return the columns as signals with stamps of their own."""
+    table = columns()
+    time = table.pop("time")
+    return [
+        SimpleNamespace(name=name, unit=UNITS[name], timestamps=time, samples=values)
+        for name, values in table.items()
+    ]
+
+
+def make_frame(*, indexed: bool) -> Any:
+    """Return the columns as a data frame, with the time as a column or as index."""
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(columns())
+    return frame.set_index("time") if indexed else frame
+
+
+def compare(log: ShiftLog, folder: Path) -> None:
+    """Compare a log with that of the file."""
+    expected = read_log(write(folder, columns()), card(folder))
+    assert set(log.channels) == set(expected.channels)
+    for role, channel in expected.channels.items():
+        assert log[role].time == pytest.approx(channel.time)
+        assert log[role].values == pytest.approx(channel.values, rel=1e-12)
+
+
+def test_a_table_of_arrays_is_a_log(tmp_path: Path) -> None:
+    compare(read_arrays(columns(), card(tmp_path), UNITS), tmp_path)
+
+
+@pytest.mark.parametrize("indexed", [True, False])
+def test_a_data_frame_is_a_log(tmp_path: Path, *, indexed: bool) -> None:
+    compare(read_arrays(make_frame(indexed=indexed), card(tmp_path), UNITS), tmp_path)
+
+
+def test_signals_are_a_log(tmp_path: Path) -> None:
+    compare(read_arrays(list_signals(), card(tmp_path)), tmp_path)
+
+
+def test_a_mapping_names_columns_and_signs(tmp_path: Path) -> None:
+    table = columns()
+    table["Kanal 7"] = -table.pop("TrqOut")
+    mapping = {"output_torque": ChannelSpec("Kanal 7", unit="Nm", sign=-1)}
+    log = read_arrays(table, card(tmp_path), UNITS, mapping)
+    assert log["output_torque"].values == pytest.approx(columns()["TrqOut"])
+
+
+def test_equal_numbers_have_equal_digests(tmp_path: Path) -> None:
+    first = read_arrays(columns(), card(tmp_path), UNITS)
+    table = columns()
+    assert read_arrays(table, card(tmp_path), UNITS).sha256 == first.sha256
+    table["SpdIn"][3] += 1e-9
+    assert read_arrays(table, card(tmp_path), UNITS).sha256 != first.sha256
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "what"),
+    [
+        ({"time": None}, FileFormatError, "is a time"),
+        ({"SpdIn": np.zeros(7)}, FileFormatError, "7 values for 200"),
+        ({"SpdIn": np.zeros((200, 2))}, FileFormatError, "no row of numbers"),
+        ({"SpdIn": ["fast"] * 200}, FileFormatError, "no row of numbers"),
+    ],
+)
+def test_what_is_no_table_is_refused(
+    tmp_path: Path, change: dict[str, Any], error: type[DrivetwinError], what: str
+) -> None:
+    table = {name: one for name, one in (columns() | change).items() if one is not None}
+    with pytest.raises(error, match=what):
+        read_arrays(table, card(tmp_path), UNITS)
+
+
+def test_units_and_columns_are_not_guessed(tmp_path: Path) -> None:
+    with pytest.raises(UnitError, match="names no unit"):
+        read_arrays(columns(), card(tmp_path))
+    with pytest.raises(MappingError):
+        read_arrays(columns(), card(tmp_path), UNITS, {"input_speed": "SpdInn"})
+
+
+@given(st.dictionaries(st.text(max_size=8), st.lists(st.floats() | st.text(max_size=3))))
+def test_any_table_without_speeds_is_a_typed_error(table: dict[str, list[Any]]) -> None:
+    """Speeds are needed, which such names do not give."""
+    with pytest.raises(DrivetwinError) as caught:
+        read_arrays(table, None)
+    assert caught.value.remedy
