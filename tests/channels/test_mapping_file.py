@@ -46,7 +46,7 @@ def test_the_time_column_can_be_mapped(tmp_path: Path) -> None:
 
 
 def test_every_role_has_its_table() -> None:
-    assert set(ByRole[ChannelTable].model_fields) == {*ROLES, "pressure"}
+    assert set(ByRole[ChannelTable].model_fields) == {*ROLES, "pressure", "pressure_command"}
 
 
 def test_all_faults_are_told_with_their_keys(tmp_path: Path) -> None:

@@ -91,6 +91,7 @@ def test_plain_names() -> None:
         ("requested_gear", "TransSelectedGear|Gang_soll|Zielgang"),
         ("shift_in_process", "TransShiftInProcess|Schaltung aktiv"),
         ("lockup_engaged", "TransTorqueConverterLockupEngaged|WK_zu"),
+        ("pressure_command.K1", "p_K1_soll|pK1Cmd|p_soll_K1|K1 Druck Vorgabe|Soll_Druck_K1"),
         ("pressure.K1", "p_K1|pK1_ist|p_ist_K1|Druck K1|Druck_Kupplung_1|PrsClu1|K1-Druck"),
     ],
 )
@@ -101,7 +102,7 @@ def test_german_and_english_bench_names_and_those_of_j1939(role: str, names: str
 
 
 @pytest.mark.parametrize(
-    "name", ["p_K1_soll", "M_soll", "nMot_soll", "ActualEngPercentTorque", "WheelBasedVehicleSpeed"]
+    "name", ["p_K2_soll", "M_soll", "nMot_soll", "ActualEngPercentTorque", "WheelBasedVehicleSpeed"]
 )
 def test_demands_and_related_quantities_are_no_measurements(name: str) -> None:
     assert infer_candidates(columns([name]), {"K1": "clutch"}) == {}

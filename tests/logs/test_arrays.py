@@ -105,3 +105,21 @@ def test_any_table_without_speeds_is_a_typed_error(table: dict[str, list[Any]]) 
     with pytest.raises(DrivetwinError) as caught:
         read_arrays(table, None)
     assert caught.value.remedy
+
+
+def test_a_command_is_optional(tmp_path: Path) -> None:
+    """A commanded pressure is found by its name; one that cannot be used is left out."""
+    table = columns()
+    time = table["time"]
+    units = UNITS | {"p_B3_soll": "bar", "p_B2_soll": "bar"}
+    table["p_B3_soll"] = np.where(time < 0.6, 0.0, 14.0)
+    table["p_B2_soll"] = np.full(time.size, np.nan)
+    log = read_arrays(table, card(tmp_path), units)
+    assert log["pressure_command.B3"].values.max() == pytest.approx(14e5)
+    assert "pressure_command.B2" not in log
+    assert log.get_pressure("B3").values.max() == pytest.approx(14e5)
+
+
+def test_a_command_of_a_strange_element_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(MappingError, match="'B7'"):
+        read_arrays(columns(), card(tmp_path), UNITS, {"pressure_command.B7": "PrsBrk3"})

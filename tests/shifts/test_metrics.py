@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.shifts.metrics import (
+    compute_command_response_time,
     compute_duration,
     compute_largest_rate,
     compute_response_time,
@@ -52,6 +53,27 @@ def test_response_counts_from_the_last_request_of_the_gear() -> None:
 @pytest.mark.parametrize("changes", [(), ((1.4, 3.0),), ((-4.0, 3.0),), ((0.8, 4.0),)])
 def test_no_response_without_a_request_of_this_shift(changes: tuple[tuple[float, float]]) -> None:
     assert compute_response_time(_request(*changes), _SHIFT) is None
+
+
+def _command(*changes: tuple[float, float]) -> Channel:
+    """Return a commanded pressure [Pa] that is zero before the first change."""
+    time = np.arange(-5.0, 3.0, 0.01)
+    values = np.zeros(time.size)
+    for when, pressure in changes:
+        values[time >= when - 1e-9] = pressure
+    return Channel("pressure_command.B3", Quantity.PRESSURE, time, values, "p_B3_soll", "Pa")
+
+
+def test_response_counts_from_the_fill_of_the_oncoming_element() -> None:
+    """A fill pulse, the kiss pressure, and the ramp: the first of them is the request."""
+    command = _command((0.5, 6e5), (0.6, 1e5), (1.0, 1e6))
+    assert compute_command_response_time(command, _SHIFT) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("changes", [(), ((1.3, 1e6),), ((-4.0, 1e6),)])
+def test_no_response_without_a_command(changes: tuple[tuple[float, float]]) -> None:
+    """Of none, of one after the inertia phase began, of one that was there before."""
+    assert compute_command_response_time(_command(*changes), _SHIFT) is None
 
 
 def test_no_response_of_a_gear_without_a_number() -> None:

@@ -8,7 +8,12 @@ from dataclasses import dataclass, field
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
-from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
+from drivetwin.channels.pressure_roles import (
+    get_command_element,
+    get_pressure_element,
+    make_command_role,
+    make_pressure_role,
+)
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.recall import recall_channels
 from drivetwin.channels.recognition import infer_candidates, prefer_filled
@@ -87,7 +92,7 @@ def resolve_roles(
     absent = {role: one.spec.source for role, one in open_roles.items() if role not in channels}
     _refuse_double_use(channels, {*stated, *recalled}, file)
     _refuse_absent(needed, channels, columns, file, absent)
-    order = [*ROLES, *(make_pressure_role(element) for element in elements)]
+    order = [*ROLES, *map(make_pressure_role, elements), *map(make_command_role, elements)]
     without = [element for element in elements if make_pressure_role(element) not in channels]
     if without:
         findings.append(report(Code.NO_PRESSURE, elements=", ".join(without)))
@@ -179,12 +184,13 @@ def _refuse_unknown_elements(
     stated: Mapping[str, ChannelSpec], elements: Mapping[str, str], file: str
 ) -> None:
     for role in stated:
-        element = get_pressure_element(role)
+        element = get_pressure_element(role) or get_command_element(role)
         if element is not None and element not in elements:
+            table = role.removesuffix(element)
             raise MappingError(
                 f"the mapping has a pressure of {element!r}, which is no element of the vehicle "
                 f"card{suggest_spelling(element, elements)}",
-                "use the element names of the card: [channels.pressure.<element>]",
+                f"use the element names of the card: [channels.{table}<element>]",
                 Where(file=file),
             )
 

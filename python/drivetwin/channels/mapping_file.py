@@ -13,7 +13,7 @@ from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.name_table import normalise_name
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.channels.roles import ROLES
 from drivetwin.errors import MappingError, Where
@@ -22,7 +22,7 @@ Entry = TypeVar("Entry")
 
 
 class ByRole(StrictModel, Generic[Entry]):
-    """A table with one entry for each channel role; pressures stand under `pressure.<element>`."""
+    """A table with one entry for each channel role; pressures stand under their element."""
 
     engine_torque: Entry | None = None
     output_torque: Entry | None = None
@@ -36,6 +36,7 @@ class ByRole(StrictModel, Generic[Entry]):
     shift_in_process: Entry | None = None
     lockup_engaged: Entry | None = None
     pressure: dict[str, Entry] = Field(default_factory=dict)
+    pressure_command: dict[str, Entry] = Field(default_factory=dict)
 
     def iterate_roles(self) -> Iterator[tuple[str, Entry]]:
         """Yield role and entry of all that are given."""
@@ -45,6 +46,8 @@ class ByRole(StrictModel, Generic[Entry]):
                 yield role, entry
         for element, entry in self.pressure.items():
             yield make_pressure_role(element), entry
+        for element, entry in self.pressure_command.items():
+            yield make_command_role(element), entry
 
 
 class ChannelTable(StrictModel):

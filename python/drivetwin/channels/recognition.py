@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from drivetwin.channels.name_table import NameTable, load_name_table, normalise_name
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.read_options import Column
 
 _WHOLE_WORD = 3
@@ -33,6 +33,7 @@ def infer_candidates(
             make_pressure_role(element): _list_pressure_forms(element, kind, table)
             for element, kind in elements.items()
         },
+        **{make_command_role(one): _list_command_forms(one, table) for one in elements},
     }
     wholes = [normalise_name(column.name) for column in columns]
     parts = [normalise_name(re.split(r"[./]", column.name)[-1]) for column in columns]
@@ -110,3 +111,13 @@ def _list_pressure_forms(element: str, kind: str, table: NameTable) -> list[str]
         forms.append(f"({pressure})({words})({label}){state}")
         forms.append(f"({pressure})0*{digits}{state}")
     return forms
+
+
+def _list_command_forms(element: str, table: NameTable) -> list[str]:
+    """List the expressions of a commanded pressure: pressure and full name with a word for it."""
+    label = re.escape(normalise_name(element))
+    pressure, command = table.make_alternatives("pressure"), table.make_alternatives("command")
+    named = f"({pressure})({label})|({label})({pressure})"
+    if not label:
+        return []
+    return [f"({named})({command})|({command})({named})|({pressure})({command})({label})"]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.pressure_roles import get_command_element, get_pressure_element
 from drivetwin.channels.shiftlog import Quantity
 
 ROLES: dict[str, Quantity] = {
@@ -19,7 +19,7 @@ ROLES: dict[str, Quantity] = {
     "shift_in_process": Quantity.STATE,
     "lockup_engaged": Quantity.STATE,
 }
-"""Roles that exist once; beside them stands one pressure for each shift element."""
+"""Roles that exist once; beside them stand a pressure and a command for each shift element."""
 
 NEEDED = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
 """Roles without which a log cannot be identified in absolute terms (pressures come on top)."""
@@ -39,4 +39,5 @@ MEASURED = frozenset(role for role in ROLES if ROLES[role] in (Quantity.TORQUE, 
 
 def get_quantity(role: str) -> Quantity:
     """Return the quantity of a role; raises KeyError for a role that does not exist."""
-    return ROLES[role] if get_pressure_element(role) is None else Quantity.PRESSURE
+    is_pressure = get_pressure_element(role) or get_command_element(role)
+    return Quantity.PRESSURE if is_pressure else ROLES[role]

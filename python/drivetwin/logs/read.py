@@ -13,6 +13,7 @@ from drivetwin._util.progress import notify_progress
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
 from drivetwin.channels.mapping import Fallback, Mapped, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.recall import recall_options
 from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity
@@ -212,6 +213,7 @@ def _select_strict_roles(
         return frozenset(mapped).intersection(strict | frozenset(sound))
     has_converter = card is not None and card.converter is not None
     spare = {"engine_speed"} if "input_speed" in mapped and not has_converter else set()
+    spare |= {role for role in mapped if get_command_element(role) is not None}
     usual = {role for role in mapped if role in specs or get_quantity(role) not in AUXILIARY}
     return frozenset(mapped).intersection(strict | (usual - spare))
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.pressure_roles import get_command_element, get_pressure_element
 from drivetwin.channels.roles import get_quantity
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 
@@ -38,6 +38,8 @@ _SYMBOLS = {
 
 def get_channel_symbol(role: str) -> str:
     """Return the symbol of a channel, e.g. `T_o` or `P B2`; the role itself without a symbol."""
+    if (commanded := get_command_element(role)) is not None:
+        return f"P* {commanded}"
     element = get_pressure_element(role)
     return _SYMBOLS.get(role, role) if element is None else f"P {element}"
 

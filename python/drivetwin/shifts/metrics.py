@@ -11,6 +11,8 @@ from drivetwin.shifts.shift import Shift
 
 _LATEST_REQUEST = 3.0
 """Longest time [s] from a request to the begin of the inertia phase."""
+_COMMANDED = 0.05
+"""Share of the largest command from which an element is commanded to close."""
 
 
 def compute_duration(shift: Shift) -> float:
@@ -35,6 +37,24 @@ def compute_response_time(request: Channel, shift: Shift) -> float | None:
     begin = shift.inertia_phase[0]
     starts = starts[(starts <= begin) & (starts >= begin - _LATEST_REQUEST)]
     return begin - float(starts[-1]) if starts.size else None
+
+
+def compute_command_response_time(command: Channel, shift: Shift) -> float | None:
+    """Time [s] from the first command to the on-coming element to the begin of the inertia phase.
+
+    `command` is the channel of role `pressure_command.<element>`. The first command is the rise
+    above a twentieth of its largest value until lock-up, at most 3 s before the inertia phase;
+    None without one. Source: definition of this program, as `compute_response_time`.
+    """
+    begin = shift.inertia_phase[0]
+    inside = (command.time >= begin - _LATEST_REQUEST) & (command.time <= shift.lockup_time)
+    time, values = command.time[inside], command.values[inside]
+    if not values.size or not values.max() > 0.0:
+        return None
+    closing = values > _COMMANDED * values.max()
+    starts = time[1:][closing[1:] & ~closing[:-1]]
+    starts = starts[starts <= begin]
+    return begin - float(starts[0]) if starts.size else None
 
 
 def compute_rates(time: FloatArray, values: FloatArray) -> FloatArray:

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.low_pass import filter_zero_phase
+from drivetwin.channels.pressure_roles import make_command_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.metrics import (
+    compute_command_response_time,
     compute_duration,
     compute_largest_rate,
     compute_response_time,
@@ -88,7 +90,8 @@ def compute_shift_quality(
     `slip_at_lockup`: mean slip of the on-coming element (eq. 15) over 0.1 s from lock-up;
     `flare_speed`: input speed above the higher of the two synchronous speeds; `undershoot_speed`:
     below the lower one (both from smoothed speeds, 0 in a clean shift).
-    `response_time`: see `compute_response_time`, with a channel `requested_gear`.
+    `response_time`: see `compute_response_time`, with a channel `requested_gear`, else
+    `compute_command_response_time`, with one of the on-coming element's commanded pressure.
     Without an output torque `wheel_jerk_of_speed_max`: largest second derivative of the output
     speed over i_f (low-pass 8 Hz, zero phase), from torque phase to 0.5 s after lock-up.
     With an output torque T_o (low-pass 32 Hz, zero phase):
@@ -112,9 +115,8 @@ def compute_shift_quality(
         "torque_phase_time": shift.torque_phase[1] - start,
         "inertia_phase_time": end - shift.inertia_phase[0],
     }
-    if "requested_gear" in log:
-        response = compute_response_time(log["requested_gear"], shift)
-        figures |= {} if response is None else {"response_time": response}
+    response = _compute_response_time(log, shift)
+    figures |= {} if response is None else {"response_time": response}
     speeds = speeds or resample_speeds(log, card)
     figures |= _compute_speed_excess(speeds, compute_gear_ratios(card), shift)
     figures |= _compute_residual_slip(speeds, card.get_clutch_ratios(shift.oncoming), shift)
@@ -129,6 +131,17 @@ def compute_shift_quality(
     else:
         figures |= _compute_speed_jerk(speeds, shift, card.final_drive)
     return figures
+
+
+def _compute_response_time(log: ShiftLog, shift: Shift) -> float | None:
+    """Compute the time [s] from request or command to the inertia phase; None without either."""
+    response = None
+    if "requested_gear" in log:
+        response = compute_response_time(log["requested_gear"], shift)
+    command = make_command_role(shift.oncoming)
+    if response is None and command in log:
+        response = compute_command_response_time(log[command], shift)
+    return response
 
 
 def _compute_speed_jerk(

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.channels.filling import FillKind, find_filling
+from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.channels.update_raster import UpdateRaster
@@ -29,7 +30,8 @@ def replace_filling(channel: Channel) -> tuple[Channel, list[Finding]]:
 
     Comes before all other checks, which know the noise of measured samples only.
     """
-    if channel.quantity in AUXILIARY or find_raster(channel) is not None:
+    computed = channel.quantity in AUXILIARY or get_command_element(channel.role) is not None
+    if computed or find_raster(channel) is not None:
         return channel, []
     filling = find_filling(channel.time, channel.values)
     if filling is None:
