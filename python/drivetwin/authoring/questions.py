@@ -47,7 +47,7 @@ SENSOR_ROLES = ("engine_torque", "output_torque", "input_speed", "output_speed",
 """Roles whose sensors are asked for without a log; `pressure` stands for all pressures."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sources:
     """What questions draw defaults from: a name for the card, a log, and estimates from it."""
 
