@@ -33,10 +33,8 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def simulated(log: Path, twin: Path, path: Path, kind: str) -> np.ndarray:
-    """Columns of `drivetwin simulate` at 1 ms steps."""
-    arguments = ["simulate", str(twin), str(log), "--step", "0.001", "--input", kind]
-    assert main([*arguments, "-o", str(path)]) == 0
-    return np.genfromtxt(path, delimiter=",", skip_header=2)
+    """Time and simulated columns of `drivetwin simulate` at 1 ms steps."""
+    return traces([str(twin), str(log), "--step", "0.001", "--input", kind], path)
 
 
 def stimulus_of(path: Path) -> np.ndarray:
@@ -132,9 +130,12 @@ def test_c_sources_and_what_is_refused(
 
 
 def traces(arguments: list[str], path: Path) -> np.ndarray:
-    """Columns of `drivetwin simulate`."""
+    """Time and simulated columns of `drivetwin simulate`: torque, speeds of input and output."""
     assert main(["simulate", *arguments, "-o", str(path)]) == 0
-    return np.genfromtxt(path, delimiter=",", skip_header=2)
+    head = path.read_text().splitlines()[0].split(",")
+    signals = ("output_torque", "input_speed", "output_speed")
+    places = [0, *(head.index(f"{name}_simulated") for name in signals)]
+    return np.genfromtxt(path, delimiter=",", skip_header=2)[:, places]
 
 
 def test_an_edited_parameter_file_drives_the_simulation(
