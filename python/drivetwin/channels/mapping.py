@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
 from drivetwin.channels.pressure_roles import (
-    get_command_element,
-    get_pressure_element,
+    get_element,
     make_command_role,
     make_pressure_role,
 )
@@ -184,7 +183,7 @@ def _refuse_unknown_elements(
     stated: Mapping[str, ChannelSpec], elements: Mapping[str, str], file: str
 ) -> None:
     for role in stated:
-        element = get_pressure_element(role) or get_command_element(role)
+        element = get_element(role)
         if element is not None and element not in elements:
             table = role.removesuffix(element)
             raise MappingError(

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from drivetwin._util.toml import format_key, format_text
 from drivetwin._util.visible_text import escape_line
 from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.pressure_roles import get_command_element, get_pressure_element
+from drivetwin.channels.pressure_roles import get_element
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.unit_proposals import Proposal
@@ -109,7 +109,7 @@ def _comment(text: str) -> str:
 
 
 def _format_path(role: str) -> str:
-    element = get_pressure_element(role) or get_command_element(role)
+    element = get_element(role)
     return role if element is None else role.removesuffix(element) + format_key(element)
 
 

@@ -24,3 +24,9 @@ def make_command_role(element: str) -> str:
 def get_command_element(role: str) -> str | None:
     """Return the element whose commanded pressure a role is; None for another role."""
     return role.removeprefix(_COMMAND) if role.startswith(_COMMAND) else None
+
+
+def get_element(role: str) -> str | None:
+    """Return the element whose pressure or commanded pressure a role is; None for another role."""
+    element = get_pressure_element(role)
+    return get_command_element(role) if element is None else element

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.channels.pressure_roles import get_command_element, get_pressure_element
+from drivetwin.channels.pressure_roles import get_element
 from drivetwin.channels.shiftlog import Quantity
 
 ROLES: dict[str, Quantity] = {
@@ -39,5 +39,4 @@ MEASURED = frozenset(role for role in ROLES if ROLES[role] in (Quantity.TORQUE, 
 
 def get_quantity(role: str) -> Quantity:
     """Return the quantity of a role; raises KeyError for a role that does not exist."""
-    is_pressure = get_pressure_element(role) or get_command_element(role)
-    return Quantity.PRESSURE if is_pressure else ROLES[role]
+    return ROLES[role] if get_element(role) is None else Quantity.PRESSURE
