@@ -92,7 +92,7 @@ def register(page: ui.Page) -> None:
         Output("card-names", "children"),
         Input(ui.make_due_id("log"), "data"),
     )
-    def show(session: Session, _: int) -> tuple[Any, ...]:
+    def show(session: Session, _: str) -> tuple[Any, ...]:
         """Render the open log."""
         work, folder = session.work, session.folder
         content = [] if work.opened is None else _build_content(work.opened)
