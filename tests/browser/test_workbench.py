@@ -362,7 +362,7 @@ def test_a_typed_time_of_any_detail_counts(shown: Page, bench: Bench) -> None:
     _message(page, "The phases are set")
     expect(field).to_have_value(f"{float(typed):.4f}")
     about = page.locator("#phases-content .notes")
-    expect(about).to_contain_text("boundary 3 inertia phase starts: set by hand")
+    expect(about).to_contain_text("Boundary 3 inertia phase starts is set by hand")
 
 
 @pytest.mark.parametrize(
