@@ -29,7 +29,7 @@ COMPLETE = (
 
 
 @pytest.fixture(autouse=True)
-def _without_terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _remove_terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     with Path(os.devnull).open(encoding="utf-8") as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         yield

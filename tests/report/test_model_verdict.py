@@ -29,9 +29,9 @@ def simulated(status: ModelStatus) -> Identification:
 
 @pytest.mark.parametrize("status", ModelStatus)
 def test_each_status_has_reason_and_action(status: ModelStatus) -> None:
-    told = explain_with(status)
-    assert told.status is status
-    for text in (told.reason, told.action):
+    verdict = explain_with(status)
+    assert verdict.status is status
+    for text in (verdict.reason, verdict.action):
         assert text.endswith(".")
         assert text[0].isupper()
         assert ".." not in text
@@ -44,16 +44,16 @@ def test_a_result_file_has_the_verdict_of_its_identification(status: ModelStatus
 
 
 def test_a_valid_model_names_the_fit() -> None:
-    told = explain_identification(simulated(ModelStatus.VALID))
+    verdict = explain_identification(simulated(ModelStatus.VALID))
     fit = simulated(ModelStatus.VALID).fit["output_torque"]["all"].fit_percent
-    assert f"(output torque: fit {fit:.1f} %)" in told.reason
+    assert f"(output torque: fit {fit:.1f} %)" in verdict.reason
 
 
 def test_limits_name_open_and_weak_parameters_and_the_recording_that_helps() -> None:
-    told = explain_identification(replace(simulated(ModelStatus.LIMITED), findings=()))
-    assert "engine torque delay τ_e is not identifiable" in told.reason
-    assert "shaft damping c_o is known weakly" in told.reason
-    assert "step the pedal in gear" in told.action
+    verdict = explain_identification(replace(simulated(ModelStatus.LIMITED), findings=()))
+    assert "engine torque delay τ_e is not identifiable" in verdict.reason
+    assert "shaft damping c_o is known weakly" in verdict.reason
+    assert "step the pedal in gear" in verdict.action
 
 
 def test_many_open_parameters_are_counted_not_listed() -> None:
@@ -62,9 +62,9 @@ def test_many_open_parameters_are_counted_not_listed() -> None:
         name: replace(one, value=None, verdict=Verdict.NOT_IDENTIFIABLE)
         for name, one in found.estimates.items()
     }
-    told = explain_identification(replace(found, estimates=missing))
-    assert f"and {len(missing) - 3} others are not identifiable" in told.reason
-    assert len(told.text) < 500
+    verdict = explain_identification(replace(found, estimates=missing))
+    assert f"and {len(missing) - 3} others are not identifiable" in verdict.reason
+    assert len(verdict.text) < 500
 
 
 def test_an_effect_comes_before_open_parameters() -> None:
@@ -72,39 +72,39 @@ def test_an_effect_comes_before_open_parameters() -> None:
         Code.EFFECT_FOUND, effect="tyre slip", size="0.01", evidence=30.0, changes="η by 2 %",
         advice="Add the tyre to the model",
     )  # fmt: skip
-    told = explain_with(ModelStatus.LIMITED, effect)
-    assert "tyre slip (0.01)" in told.reason
-    assert told.action == "Add the tyre to the model."
+    verdict = explain_with(ModelStatus.LIMITED, effect)
+    assert "tyre slip (0.01)" in verdict.reason
+    assert verdict.action == "Add the tyre to the model."
 
 
 def test_without_torque_scale_the_sensor_is_asked_for() -> None:
     found = replace(simulated(ModelStatus.LIMITED), findings=())
     reason = explain(Code.NO_TORQUE_SCALE)
     open_ids = {**found.estimates, "eta": replace(found.estimates["eta"], reason=reason)}
-    told = explain_identification(replace(found, estimates=open_ids))
-    assert "divided by η" in told.reason
-    assert told.action == "Add an output-shaft torque sensor."
+    verdict = explain_identification(replace(found, estimates=open_ids))
+    assert "divided by η" in verdict.reason
+    assert verdict.action == "Add an output-shaft torque sensor."
 
 
 def test_a_model_that_is_not_valid_names_error_and_suspect() -> None:
     suspect = report(Code.CARD_SUSPECT, entry="gain of B3", size=9.0)
-    told = explain_with(ModelStatus.NOT_VALID, MISSES, suspect)
-    assert told.reason.startswith(
+    verdict = explain_with(ModelStatus.NOT_VALID, MISSES, suspect)
+    assert verdict.reason.startswith(
         "Simulated output torque does not match the measurement (fit -235"
     )
-    assert "No value counts as identified" in told.reason
-    assert "gain of B3" in told.action
+    assert "No value counts as identified" in verdict.reason
+    assert "gain of B3" in verdict.action
 
 
 def test_without_a_suspect_the_remedy_of_the_error_is_the_action() -> None:
-    told = explain_with(ModelStatus.NOT_VALID, report(Code.EFFICIENCY_IMPLAUSIBLE, value=0.6))
-    assert told.action == "Check scale, unit and sign of both torque signals."
+    verdict = explain_with(ModelStatus.NOT_VALID, report(Code.EFFICIENCY_IMPLAUSIBLE, value=0.6))
+    assert verdict.action == "Check scale, unit and sign of both torque signals."
     assert "following findings" not in explain_with(ModelStatus.NOT_VALID, MISSES).action
 
 
 def test_a_model_that_was_not_simulated_names_what_it_lacks() -> None:
     lacks = report(Code.NOT_VALIDATED, why="the twin cannot be simulated without te_delay (long)")
-    told = explain_with(ModelStatus.NOT_VALIDATED, lacks)
-    assert "engine torque delay τ_e is not identifiable" in told.reason
+    verdict = explain_with(ModelStatus.NOT_VALIDATED, lacks)
+    assert "engine torque delay τ_e is not identifiable" in verdict.reason
     gap = report(Code.NOT_VALIDATED, why="'TrqOut' was recorded from 1 s to 2 s only")
     assert "'TrqOut' was recorded" in explain_with(ModelStatus.NOT_VALIDATED, gap).reason

@@ -35,7 +35,7 @@ CARD = (
     *("--element", "B2:gain_m3=0.0378,P0_bar=0.8", "--element", "B3:gain_m3=0.027,P0_bar=0.8"),
     *("--mass", "20000..36000", "--wheel-radius", "0.5"),
 )
-"""What the log does not show."""
+"""Data that the log does not show."""
 
 
 def run_command(folder: Path, *arguments: str) -> str:

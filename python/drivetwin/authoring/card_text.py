@@ -30,14 +30,19 @@ def format_card(
 
     Parameters
     ----------
-    answers : all answers; unknown ones become comments
-    survey : log that guesses come from
-    estimates : estimates from the log; the products of μ and gain become comments
-    draft : begin with the remark that guesses are to be confirmed
+    answers : Answers
+        All answers; unknown ones become comments.
+    survey : LogSurvey or None
+        Log that guesses come from.
+    estimates : LogEstimates or None
+        Estimates from the log; the products of μ and gain become comments.
+    draft : bool
+        Begin with the remark that guesses are to be confirmed.
 
     Returns
     -------
-    TOML; a card that `load_card` reads if no required answer is unknown.
+    str
+        TOML; a card that `load_card` reads if no required answer is unknown.
     """
     parts = [
         _format_head(answers, survey, draft=draft),

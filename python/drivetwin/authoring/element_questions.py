@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 
 from drivetwin.authoring.answers import Answer, Answers, Origin, get_value, list_gears
 from drivetwin.authoring.derive import GEOMETRY
@@ -21,8 +22,15 @@ from drivetwin.authoring.parsing import (
 from drivetwin.authoring.question import Question
 from drivetwin.vehicle.check import RATIO_TOLERANCE
 
-FORMS = ("gain", "area", "diameters")
-"""Ways to state the gain of an element: one number, area and radius, or diameters."""
+
+class GainForm(StrEnum):
+    """Form in which the gain of an element is stated."""
+
+    GAIN = "gain"  # one number
+    AREA = "area"  # with area and effective radius
+    DIAMETERS = "diameters"  # which both follow from
+
+
 MOST_GAIN = 10.0
 """Largest gain [m^3] that a clutch can have."""
 
@@ -258,9 +266,9 @@ def _iterate_gain_questions(
             f"Is the gain of {element or 'the element'} known as gain, area or diameters",
             "The gain N·D·A·r turns pressure into torque: friction surfaces, de-rating, area and "
             f"effective radius; it is one number, or computed from its parts.{hint}",
-            make_choice_parser(FORMS),
+            make_choice_parser(tuple(GainForm)),
         )
-    elif form == "gain":
+    elif form is GainForm.GAIN:
         yield _make_question(element, "gain_m3", hint=hint)
     else:
         yield _make_question(element, "surfaces")
@@ -268,12 +276,12 @@ def _iterate_gain_questions(
         yield from _iterate_size_questions(answers, element, form)
 
 
-def _iterate_size_questions(answers: Answers, element: str, form: str) -> Iterator[Question]:
+def _iterate_size_questions(answers: Answers, element: str, form: GainForm) -> Iterator[Question]:
     """Ask for effective radius and area, or for the diameters that they follow from."""
     stated = {key[2] for key in answers if key[:2] == ("elements", element)}
     for ring, part in (("", "radius_m"), ("piston_", "area_m2")):
         has_diameter = bool(stated & {f"{ring}outer_mm", f"{ring}inner_mm"})
-        if has_diameter or (form == "diameters" and part not in stated):
+        if has_diameter or (form is GainForm.DIAMETERS and part not in stated):
             yield from _iterate_ring_questions(answers, element, ring)
         else:
             yield _make_question(element, part)
@@ -287,14 +295,14 @@ def _iterate_ring_questions(answers: Answers, element: str, ring: str) -> Iterat
     yield _make_question(element, f"{ring}inner_mm", parse)
 
 
-def find_form(answers: Answers, element: str) -> str | None:
+def find_form(answers: Answers, element: str) -> GainForm | None:
     """Return how the gain of an element is stated; None if nothing is stated of it."""
     stated = get_value(answers, "elements", element, "form")
     parts = {key[2] for key in answers if key[:2] == ("elements", element)}
     if stated is not None:
-        return str(stated)
+        return GainForm(stated)
     if "gain_m3" in parts:
-        return "gain"
+        return GainForm.GAIN
     if any(part.endswith("_mm") for part in parts):
-        return "diameters"
-    return "area" if parts & GEOMETRY else None
+        return GainForm.DIAMETERS
+    return GainForm.AREA if parts & GEOMETRY else None

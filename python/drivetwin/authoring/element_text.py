@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from drivetwin._util.toml import format_key
 from drivetwin._util.visible_text import escape_line
 from drivetwin.authoring.answers import UNKNOWN, Answers, get_value, list_elements
-from drivetwin.authoring.element_questions import describe_product, find_form
+from drivetwin.authoring.element_questions import GainForm, describe_product, find_form
 from drivetwin.authoring.entries import format_entry
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 
-GEOMETRY = (
+_GAIN_PARTS = (
     ("surfaces", "N: friction surfaces, two for each plate with linings on both sides [-]"),
     ("derating", "D: share of the torque that grooves and uneven pressure leave [-]"),
     ("area_m2", "A: area on which the pressure acts [m²]"),
@@ -75,7 +75,7 @@ def _format_ratios(answers: Answers, name: str) -> Iterator[str]:
 def _format_gain(answers: Answers, name: str) -> Iterator[str]:
     """Write the gain as one number or by its parts; commented where it is unknown."""
     form = find_form(answers, name)
-    if form == "gain":
+    if form is GainForm.GAIN:
         gain = answers.get(("elements", name, "gain_m3"), UNKNOWN)
         meaning = "N·D·A·r: friction surfaces, de-rating, area, effective radius [m³]"
         yield from format_entry("gain_m3", gain, meaning)
@@ -83,5 +83,5 @@ def _format_gain(answers: Answers, name: str) -> Iterator[str]:
     if form is None:
         yield "# The gain N·D·A·r as one number [m³], or by its parts:"
         yield "# gain_m3 = ..."
-    for part, meaning in GEOMETRY:
+    for part, meaning in _GAIN_PARTS:
         yield from format_entry(part, answers.get(("elements", name, part), UNKNOWN), meaning)

@@ -49,7 +49,7 @@ SENSOR_ROLES = ("engine_torque", "output_torque", "input_speed", "output_speed",
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """What questions draw defaults from: a name for the card, a log, and estimates from it."""
+    """Sources of defaults: a name for the card, a log, and estimates from it."""
 
     name: str
     survey: LogSurvey | None = None

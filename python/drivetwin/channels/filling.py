@@ -109,7 +109,7 @@ _ROUNDED_BENDS = 2.5
 """Steps of rounding above which a second difference is no rounded straight line: it has up to two
 [count]."""
 _MANY_LINES = 0.05
-"""Straight parts over the samples from which a record is filled up."""
+"""Straight parts per sample from which a record counts as filled up: one in twenty rows."""
 _DEVIATION = 0.4
 """Distance of samples from their line, over the bends that rounding makes: one step."""
 
@@ -286,7 +286,7 @@ def _extend_filling(
 ) -> Filling | None:
     """Return the knots of the whole record; `found` are those of a window.
 
-    None where the rest of the record does not bear them out.
+    None where the rest of the record has no such knots.
     """
     if isinstance(found, Filling):
         return find_uneven_knots(time, values) or found
@@ -304,7 +304,7 @@ def find_uneven_knots(time: FloatArray, values: FloatArray) -> Filling | None:
     """Find knots at uneven instants: messages that arrived with jitter, filled up linearly.
 
     Between knots lie at least three samples on a straight line; lines meet at the knots. Kind
-    UNKNOWN where many lines are shorter.
+    UNKNOWN where many lines are shorter, of a record that is not rounded.
     """
     step = float(np.median(np.diff(time)))
     nothing = np.empty(0)

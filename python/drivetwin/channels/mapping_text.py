@@ -57,7 +57,7 @@ class Stub:
 
 @dataclass(frozen=True)
 class Draft:
-    """What a mapping leaves open: units by role, roles without a column, unit of the time.
+    """Open entries of a mapping: units by role, roles without a column, unit of the time.
 
     `time` is the gap of the time unit; without a readable time column `time_source` is open. With
     `accept` a unit that is the only proposal becomes an entry.

@@ -69,18 +69,18 @@ def build_result_section(found: Identification) -> Section:
 def build_findings_section(found: Identification) -> Section:
     """Findings by severity, errors first."""
     blocks = [
-        NotesBlock(heading, render(told), tone)
+        NotesBlock(heading, render(alike), tone)
         for severity, heading, tone in _SEVERITIES
-        if (told := [one for one in found.findings if one.severity is severity])
+        if (alike := [one for one in found.findings if one.severity is severity])
     ]
     intro = "Remarks on log, vehicle card and fit: cause, and what to do."
     return Section("findings", "Findings", intro, blocks)
 
 
 def _build_verdict_block(found: Identification) -> VerdictBlock:
-    told = explain_identification(found)
-    tone = STATUS_TONES[told.status]
-    return VerdictBlock(told.status.value, told.reason, told.action, tone)
+    verdict = explain_identification(found)
+    tone = STATUS_TONES[verdict.status]
+    return VerdictBlock(verdict.status.value, verdict.reason, verdict.action, tone)
 
 
 def _build_overview(validations: Sequence[Validation]) -> FigureBlock:
