@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from drivetwin.errors import RefusedError
+from drivetwin.estimation.result.method import Method
 from drivetwin.workbench.locks import Lock, LockKind
 from drivetwin.workbench.phases import Boundary, get_boundary_times
 from drivetwin.workbench.session import Session, Sessions
@@ -33,6 +34,7 @@ def saved(identified: Session) -> Iterator[Path]:
     yield identified.folder.root / name
     identified.move_boundaries(0, {})
     identified.set_lock("k_o", Lock(LockKind.FREE))
+    identified.choose_method(Method.INTEGRAL)
 
 
 def test_a_reopened_workspace_goes_on_where_it_was(
