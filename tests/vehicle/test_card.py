@@ -51,6 +51,24 @@ def test_values_are_si_and_defaults_stand(tmp_path: Path) -> None:
     assert card.channels == {}
 
 
+def test_measured_inertias_and_efficiencies_are_priors(tmp_path: Path) -> None:
+    text = changed(
+        "J_vehicle_kgm2 = [2500, 6500]",
+        "J_vehicle_kgm2 = { value = 4000, std = 100 }, J1_kgm2 = { value = 5, std = 0.2 }",
+    ).replace('name = "2",', 'name = "2", eta = { value = 0.97, std = 0.005 },', 1)
+    card = load(tmp_path, text)
+    assert card.J_vehicle_range == (3600.0, 4400.0)
+    assert card.known == {"J_vehicle": PriorValue(4000.0, 100.0)}
+    assert (card.J1, card.J_out) == (PriorValue(5.0, 0.2), None)
+    assert [gear.eta for gear in card.gears] == [PriorValue(0.97, 0.005), None]
+
+
+@pytest.mark.parametrize("entry", ["4000.0", "{ value = 4000.0 }", "{ value = 4e3, std = 0.0 }"])
+def test_an_inertia_of_the_vehicle_is_a_range_or_uncertain(tmp_path: Path, entry: str) -> None:
+    text = changed("J_vehicle_kgm2 = [2500, 6500]", f"J_vehicle_kgm2 = {entry}")
+    assert "inertia.J_vehicle_kgm2" in refusal(tmp_path, text)
+
+
 def test_brake_ratios_follow_from_the_gear(tmp_path: Path) -> None:
     card = load(tmp_path, CARD)
     i_c, i_out = card.get_clutch_ratios("B2")

@@ -52,19 +52,27 @@ def load_card(path: Path | str) -> VehicleCard:
         loss_law=file.loss_law,
         i_in=file.i_in,
         final_drive=file.final_drive,
-        gears=tuple(Gear(gear.name, gear.ratio, tuple(gear.elements)) for gear in file.gears),
+        gears=tuple(gear.to_spec() for gear in file.gears),
         elements={name: table.to_spec(name) for name, table in file.elements.items()},
         J_prime_range=(file.inertia.J_prime_kgm2[0], file.inertia.J_prime_kgm2[1]),
-        J_vehicle_range=(file.inertia.J_vehicle_kgm2[0], file.inertia.J_vehicle_kgm2[1]),
+        J_vehicle_range=file.inertia.vehicle_range,
         J_out=None if J_out is None else J_out.to_prior(),
         sensors=_convert_tolerances(file.sensors),
         channels={role: table.to_spec() for role, table in file.channels.iterate_roles()},
         source=str(path),
-        known={} if file.eta is None else {"eta": file.eta.to_prior()},
+        known=_collect_known(file),
+        J1=None if file.inertia.J1_kgm2 is None else file.inertia.J1_kgm2.to_prior(),
         effects={EffectId(name): table.to_prior() for name, table in file.effects.items()},
         converter=None if file.converter is None else file.converter.to_spec(),
         sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
     )
+
+
+def _collect_known(file: CardFile) -> dict[str, PriorValue]:
+    """Collect the known parameters by id."""
+    eta, vehicle = file.eta, file.inertia.vehicle_prior
+    known = {} if eta is None else {"eta": eta.to_prior()}
+    return known if vehicle is None else {**known, "J_vehicle": vehicle}
 
 
 def _convert_tolerances(sensors: SensorsTable) -> dict[str, SensorTolerance]:

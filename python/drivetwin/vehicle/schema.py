@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from drivetwin._util.toml import StrictModel
 from drivetwin.channels.mapping_file import ByRole, ChannelTable
@@ -13,7 +13,7 @@ from drivetwin.channels.units import BAR, RPM
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.effects import EffectPrior
-from drivetwin.vehicle.spec import ClutchGeometry, ElementSpec, PriorValue, SensorTolerance
+from drivetwin.vehicle.spec import ClutchGeometry, ElementSpec, Gear, PriorValue, SensorTolerance
 
 
 class PriorTable(StrictModel):
@@ -49,12 +49,43 @@ RangeEntry = Annotated[
 ]
 
 
+class MeasuredTable(StrictModel):
+    """A quantity known from a measurement or a data sheet, with its standard deviation."""
+
+    value: float = Field(gt=0)
+    std: float = Field(gt=0)
+
+    def to_prior(self) -> PriorValue:
+        """Return the value in SI."""
+        return PriorValue(self.value, self.std)
+
+    def to_range(self) -> tuple[float, float]:
+        """Return the design range: four standard deviations to either side, above zero."""
+        return max(self.value - 4.0 * self.std, 0.0), self.value + 4.0 * self.std
+
+
+def _get_inertia_form(entry: object) -> str:
+    return "measured" if isinstance(entry, dict | MeasuredTable) else "range"
+
+
+InertiaEntry = Annotated[
+    Annotated[RangeEntry, Tag("range")] | Annotated[MeasuredTable, Tag("measured")],
+    Discriminator(_get_inertia_form),
+]
+
+
 class GearTable(StrictModel):
     """`[[gears]]`: one gear, its ratio without the input gear, the shift elements that make it."""
 
     name: str = Field(min_length=1)
     ratio: float = Field(gt=0)
     elements: list[str] = Field(min_length=1)
+    eta: MeasuredTable | None = None
+
+    def to_spec(self) -> Gear:
+        """Return the gear."""
+        eta = None if self.eta is None else self.eta.to_prior()
+        return Gear(self.name, self.ratio, tuple(self.elements), eta)
 
 
 class ElementTable(StrictModel):
@@ -119,11 +150,24 @@ class ElementTable(StrictModel):
 
 
 class InertiaTable(StrictModel):
-    """`[inertia]`: plausible ranges and the known output inertia Jo', all in kg m^2."""
+    """`[inertia]`: plausible ranges and known inertias, all in kg m^2."""
 
     J_prime_kgm2: RangeEntry
-    J_vehicle_kgm2: RangeEntry
+    J_vehicle_kgm2: InertiaEntry
     J_out_kgm2: PriorEntry | None = None
+    J1_kgm2: MeasuredTable | None = None
+
+    @property
+    def vehicle_range(self) -> tuple[float, float]:
+        """Design range of J3 at the wheel [kg m^2]."""
+        entry = self.J_vehicle_kgm2
+        return entry.to_range() if isinstance(entry, MeasuredTable) else (entry[0], entry[1])
+
+    @property
+    def vehicle_prior(self) -> PriorValue | None:
+        """J3 at the wheel [kg m^2] where a value is stated, None for a range."""
+        entry = self.J_vehicle_kgm2
+        return entry.to_prior() if isinstance(entry, MeasuredTable) else None
 
 
 def _refuse_percent(tolerance: float) -> float:

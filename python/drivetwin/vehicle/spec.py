@@ -32,11 +32,13 @@ class SensorTolerance:
 
 @dataclass(frozen=True)
 class Gear:
-    """A gear of the box: `ratio` = ω_in/ω_out without the input gear i_in; elements holding it."""
+    """A gear of the box: `ratio` = ω_in/ω_out without the input gear i_in; elements holding it;
+    `eta` its efficiency, None if unknown."""
 
     name: str
     ratio: float
     elements: tuple[str, ...]
+    eta: PriorValue | None = None
 
 
 @dataclass(frozen=True)

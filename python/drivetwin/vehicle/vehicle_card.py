@@ -27,7 +27,8 @@ class VehicleCard:
 
     `gears` run from low to high. `final_drive` is i_f. `J_prime_range` [kg m^2] is the design
     range of J' at the engine, `J_vehicle_range` [kg m^2] that of J3 at the wheel; `J_out` [kg m^2]
-    is the inertia of the output side before the shaft (Jo' without drums), None if unknown.
+    is the inertia of the output side before the shaft (Jo' without drums), `J1` [kg m^2] that of
+    the engine with what rotates with the gearbox input, None if unknown.
     `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
     parameters.py), `effects` what is known of departures from the model. `converter` is the map of
     the torque converter, None where the card has none. `remembered` is the mapping of the log of a
@@ -45,6 +46,7 @@ class VehicleCard:
     J_prime_range: tuple[float, float]
     J_vehicle_range: tuple[float, float]
     J_out: PriorValue | None = None
+    J1: PriorValue | None = None
     sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
     source: str = ""

@@ -99,3 +99,20 @@ def test_two_fixed_gear_inertias_are_refused() -> None:
     known = {f"J_prime_{g}": PriorValue(17.0) for g in (shift.start_gear, shift.end_gear)}
     with pytest.raises(InputError, match="one inertia"):
         _posed(known)
+
+
+def test_a_prior_on_the_engine_inertia_is_one_on_its_share_of_je() -> None:
+    made = bench()
+    known = PriorValue(5.0, 0.1)
+    driveline = replace(made.driveline, known={}, J1=known)
+    guess = truth_of(made)
+    posed, start = build_problem(
+        [made.signals], [driveline], made.run.scenario.model.loss_law, guess
+    )
+    places = [start.names.index(name) for name in ("J_e", "eta")]
+    free = replace(made, driveline=replace(made.driveline, known={}))
+    added = posed.prior.precision - problem(free)[0].prior.precision
+    assert np.count_nonzero(added) == 4
+    eta = guess["eta"]
+    change = np.array([5.0 * eta + 0.1 * eta, eta]) - posed.prior.mean[places]
+    assert change @ added[np.ix_(places, places)] @ change == pytest.approx(1.0, rel=1e-6)

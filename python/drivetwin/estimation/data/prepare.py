@@ -297,6 +297,7 @@ def build_driveline(card: VehicleCard, shift: Shift) -> KnownDriveline:
             spec.drum_inertia,
             spec.peak,
         )
+    left, entered = (card.get_gear(name).eta for name in (shift.start_gear, shift.end_gear))
     return KnownDriveline(
         i_f=card.final_drive,
         offgoing=couplings[shift.offgoing],
@@ -304,8 +305,15 @@ def build_driveline(card: VehicleCard, shift: Shift) -> KnownDriveline:
         couplings=couplings,
         J_out=card.J_out,
         loss_law=card.loss_law,
-        known=card.known,
+        known=card.known if left is None else {"eta": left, **card.known},
+        J1=card.J1,
+        eta_change=None if left is None or entered is None else _subtract(entered, left),
     )
+
+
+def _subtract(one: PriorValue, other: PriorValue) -> PriorValue:
+    """Subtract an independent quantity."""
+    return PriorValue(one.value - other.value, float(np.hypot(one.std, other.std)))
 
 
 def collect_tolerances(

@@ -99,7 +99,9 @@ class ShiftElementKinematics:
 class KnownDriveline:
     """Known structure during one shift. `couplings` holds every shift element by name.
 
-    `known` is what is known beforehand, by parameter id, beside Jo′, P0 and drums.
+    `known` is what is known beforehand, by parameter id, beside Jo′, J1, P0 and drums.
+    `eta_change` is the known efficiency of the gear that is entered less that of the gear that is
+    left, None if unknown.
     """
 
     i_f: float
@@ -109,6 +111,8 @@ class KnownDriveline:
     J_out: PriorValue | None
     loss_law: LossLaw = "paper"
     known: Mapping[str, PriorValue] = field(default_factory=dict)
+    J1: PriorValue | None = None
+    eta_change: PriorValue | None = None
 
     @property
     def i_before(self) -> float:

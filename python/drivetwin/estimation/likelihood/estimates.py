@@ -106,7 +106,7 @@ def build_estimates(
         estimates[name] = add_systematic(estimates[name], doubt[name])
     estimates = apply_errors(estimates, (*limits, *disagreements))
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
-    cause = find_cause(corrected, priors)
+    cause = find_cause(corrected)
     return EstimateSet(
         estimates,
         build_friction_curves(fit, linear, corrected),

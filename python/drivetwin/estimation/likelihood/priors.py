@@ -9,6 +9,7 @@ not: a known J′ with a standard deviation is a prior on that sum, one without 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -121,7 +122,8 @@ def build_problem(
         k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
     }
     prior = Prior.from_independent(len(point.names), entries)
-    prior = add_gear_inertia_priors(prior, point, fixed, inertias)
+    sums = list_sum_priors(inertias, drivelines[0].J1, guess["eta"])
+    prior = add_sum_priors(prior, point, fixed, sums)
     return LikelihoodObjective(tuple(parts), prior, lower, upper), point
 
 
@@ -301,25 +303,48 @@ def build_tie(inertias: Sequence[tuple[float, PriorValue]]) -> Tie | None:
     return exact[0] if exact else None
 
 
-def add_gear_inertia_priors(
-    prior: Prior,
-    point: ParameterVector,
-    fixed: Mapping[str, float],
-    inertias: Sequence[tuple[float, PriorValue]],
+@dataclass(frozen=True)
+class SumPrior:
+    """A normal prior on the sum of unknowns times `factors`: `value` with `std`."""
+
+    factors: Mapping[str, float]
+    value: float
+    std: float
+
+
+def list_sum_priors(
+    inertias: Sequence[tuple[float, PriorValue]], J1: PriorValue | None, eta: float
+) -> list[SumPrior]:
+    """Return the priors on sums: J′ = Je + Jo′/i² of gears, and J1 = Je/η as Je - J1·η = 0.
+
+    `inertias` are overall ratios with J′ [kg m^2]; `eta` is the usual efficiency.
+    """
+    found = [
+        SumPrior({"J_e": 1.0, "J_out": ratio**-2}, known.value, known.std)
+        for ratio, known in inertias
+        if known.std > 0.0
+    ]
+    if J1 is not None:
+        found.append(SumPrior({"J_e": 1.0, "eta": -J1.value}, 0.0, eta * J1.std))
+    return found
+
+
+def add_sum_priors(
+    prior: Prior, point: ParameterVector, fixed: Mapping[str, float], sums: Sequence[SumPrior]
 ) -> Prior:
-    """Add the priors on J′ as priors on sums of Je and Jo′."""
-    soft = [(ratio, known) for ratio, known in inertias if known.std > 0.0]
-    if not soft or "J_e" not in point.names:
+    """Add priors on sums of unknowns; those that are fixed count with their values."""
+    if not sums or "J_e" not in point.names:
         return prior
-    place = [point.names.index(name) for name in ("J_e", "J_out") if name in point.names]
+    names = [n for n in dict.fromkeys(n for one in sums for n in one.factors) if n in point.names]
+    place = [point.names.index(name) for name in names]
     precision, mean = prior.precision.copy(), prior.mean.copy()
     inner = precision[np.ix_(place, place)]
     pull = inner @ mean[place]
-    for ratio, known in soft:
-        row: FloatArray = np.array([1.0, ratio**-2][: len(place)])
-        rest = 0.0 if len(place) == 2 else fixed["J_out"] / ratio**2
-        inner = inner + np.outer(row, row) / known.std**2
-        pull = pull + row * (known.value - rest) / known.std**2
+    for one in sums:
+        row = np.array([one.factors.get(name, 0.0) for name in names])
+        rest = sum(f * fixed[name] for name, f in one.factors.items() if name not in names)
+        inner = inner + np.outer(row, row) / one.std**2
+        pull = pull + row * (one.value - rest) / one.std**2
     precision[np.ix_(place, place)] = inner
     mean[place] = np.linalg.lstsq(inner, pull, rcond=None)[0]
     return Prior(mean, precision)

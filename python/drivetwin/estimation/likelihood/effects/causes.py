@@ -10,7 +10,6 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.effect import Effect
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
@@ -36,7 +35,7 @@ class CauseSettings:
 CAUSES = CauseSettings()
 
 
-def find_cause(correction: Correction, priors: EffectPriors) -> Cause | None:
+def find_cause(correction: Correction) -> Cause | None:
     """Find the cause with most evidence; None if none has enough.
 
     Stated sensor tolerances are no candidates: they are expected to act.
@@ -57,7 +56,7 @@ def find_cause(correction: Correction, priors: EffectPriors) -> Cause | None:
     rest = [one.nats for other, one in ranked[1:] if other not in similar]
     assert group.effect is not None, "tolerances of sensors are no candidates"
     effect = EFFECTS[group.effect]
-    size, std = _estimate_size(effect, priors.get_prior(effect.id).std, best)
+    size, std = _estimate_size(effect, correction.step.columns.stds[group], best)
     return Cause(
         group,
         best.nats,

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.effects.effect import Disturbance
 from drivetwin.estimation.likelihood.effects.operating_point import (
     OperatingPoint,
@@ -35,8 +36,14 @@ class EffectPriors:
     effects: Mapping[EffectId, EffectPrior] = field(default_factory=dict)
     sensors: Mapping[str, SensorTolerance] = field(default_factory=dict)
 
-    def get_prior(self, effect: EffectId) -> EffectPrior:
-        """Return the prior of an effect in its unit."""
+    def get_prior(self, effect: EffectId, driveline: KnownDriveline) -> EffectPrior:
+        """Return the prior of an effect in its unit in a shift.
+
+        Stated efficiencies of both gears are the default prior of their difference.
+        """
+        change = driveline.eta_change
+        if effect is EffectId.EFFICIENCY_BY_GEAR and change and effect not in self.effects:
+            return EffectPrior(change.std, change.value)
         return self.effects.get(effect, EffectPrior(EFFECTS[effect].std))
 
     def drop_effects(self) -> EffectPriors:
@@ -71,6 +78,8 @@ class EffectColumns:
     """Prior standard deviation (q,) of each column's amount, in stated ones."""
     inputs: tuple[Mapping[str, InputColumns], ...]
     """Changes of the inputs by the columns, by name, for each shift."""
+    stds: Mapping[Group, float] = field(default_factory=dict)
+    """Stated standard deviation of each effect in its unit."""
 
     def compute_inputs(self, amounts: FloatArray) -> list[dict[str, Signal]]:
         """Compute the changes of the inputs by name for `amounts` (q,), for each shift."""
@@ -174,6 +183,7 @@ def build_columns(
             }
             for one in shifts
         ),
+        stds={group: std for one in shifts for group, std in one.stds.items()},
     )
 
 
@@ -201,13 +211,15 @@ def number_groups(groups: Sequence[Group]) -> list[_Key]:
 
 @dataclass(frozen=True, eq=False)
 class _ShiftColumns:
-    """Columns of one shift by key: answers (n, q), changes of the inputs (N-1, q) by name."""
+    """Columns of one shift by key: answers (n, q), changes of the inputs (N-1, q) by name, and the
+    stated standard deviation by effect."""
 
     keys: tuple[_Key, ...]
     matrix: FloatArray
     known: FloatArray
     time: FloatArray
     inputs: Mapping[str, FloatArray]
+    stds: Mapping[Group, float]
 
     def align(self, matrix: FloatArray, keys: Sequence[_Key]) -> FloatArray:
         """Return the columns of a matrix (m, q) in the order of `keys`; zero for foreign ones."""
@@ -242,7 +254,12 @@ def _build_shift_columns(
             nothing = np.zeros((at.middle.size, len(disturbances)))
             inputs.setdefault(name, nothing)[:, k] = values
     keys = tuple(key for key, _ in named)
-    return _ShiftColumns(keys, matrix, known, at.middle, inputs)
+    stds = {
+        group: priors.get_prior(group.effect, at.part.structure.driveline).std
+        for group, _ in keys
+        if group.effect is not None
+    }
+    return _ShiftColumns(keys, matrix, known, at.middle, inputs, stds)
 
 
 def _get_size(sizes: Mapping[EffectId, float], group: Group) -> float:
@@ -263,7 +280,7 @@ def _build_random(
     at: OperatingPoint, priors: EffectPriors, sizes: Mapping[EffectId, float]
 ) -> Iterator[tuple[Group, Disturbance]]:
     for name, effect in EFFECTS.items():
-        prior = priors.get_prior(name)
+        prior = priors.get_prior(name, at.part.structure.driveline)
         if prior.std > 0.0:
             for one in effect.build(at, sizes.get(name, 1.0) * prior.std):
                 yield Group(name, one.subject), one
@@ -274,7 +291,7 @@ def _build_random(
 def _build_known(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Disturbance, float]]:
     """Yield the disturbances of effects with a stated value, of that size."""
     for name, effect in EFFECTS.items():
-        value = priors.get_prior(name).value
+        value = priors.get_prior(name, at.part.structure.driveline).value
         if value:
             for one in effect.build(at, abs(value)):
                 yield one, float(np.sign(value))
