@@ -71,6 +71,20 @@ def test_a_resonance_has_the_digits_of_its_interval(
     assert 0.0 < float(found[2]) < float(found[1])
 
 
+def test_the_page_shows_shift_quality_by_kind(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "shifts.html"
+    command = ["shifts", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    assert main([*command, "--html", str(page)]) == 0
+    assert f"wrote {page}" in "".join(capsys.readouterr().out.split("\n"))
+    text = page.read_text()
+    assert not re.findall(r'(?:src|href)="https?:', text)
+    # Request and commanded pressure are not recorded, so there is no response time.
+    assert text.count("<figure>") == 4
+    assert "power-on upshift" in text
+
+
 def test_a_log_without_a_shift_says_which_gear_is_held(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
 
 from drivetwin._util.display_units import format_uncertainty
 from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load_inputs
@@ -13,6 +16,7 @@ from drivetwin.cli.output import (
     JsonFlag,
     print_findings,
     print_json,
+    print_line,
     print_paragraph,
     print_table,
     show_step,
@@ -31,7 +35,18 @@ if TYPE_CHECKING:
 
 
 def shifts(
-    log: LogFile, vehicle: VehicleFile, channels: ChannelsFile = None, as_json: JsonFlag = False
+    log: LogFile,
+    vehicle: VehicleFile,
+    channels: ChannelsFile = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            "--html",
+            metavar="FILE.html",
+            help="Where a page goes that shows shift quality by kind of shift.",
+        ),
+    ] = None,
+    as_json: JsonFlag = False,
 ) -> None:
     """Find the shifts of a log, their phases and figures of shift quality.
 
@@ -48,6 +63,8 @@ def shifts(
         found = detect_shifts(recording, card)
     closings = detect_lock_ups(recording, card)
     seen = _estimate_from_speeds(recording, card, found.shifts)
+    if html is not None and found.shifts:
+        _write_page(html, found.shifts, log.name)
     if as_json:
         remarks = {"findings": dump_findings(recording.findings)}
         print_json(_to_document(found, closings, seen) | remarks)
@@ -59,6 +76,17 @@ def shifts(
         print_paragraph(f"no gear shift; gear held: {held or 'none'}")
     _print_details(found, closings, seen)
     print_findings(recording.findings)
+    if html is not None and found.shifts:
+        print_line(f"wrote {html}")
+
+
+def _write_page(path: Path, shifts: Sequence[Shift], log: str) -> None:
+    """Write a page with the shift quality of a drive."""
+    from drivetwin._util.atomic import write_text
+    from drivetwin.report.whole_drive import render_whole_drive
+
+    with show_step(f"writing {path.name}"):
+        write_text(path, render_whole_drive(shifts, log))
 
 
 class _SpeedResults(NamedTuple):
