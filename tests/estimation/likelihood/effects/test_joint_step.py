@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.effects.joint_step import (
+    SIZES,
     WeightedColumns,
     compute_evidence,
     scale_by_evidence,
@@ -77,11 +78,25 @@ def test_an_effect_that_acts_has_most_evidence() -> None:
     assert found[DRAG].nats > found[DRIFT].nats + 3.0
 
 
-def test_only_an_effect_with_evidence_becomes_larger_than_stated() -> None:
+def test_sizes_are_those_of_greatest_evidence() -> None:
     made = Dense(1, np.array([9.0, -9.0, 0.0, 0.0, 0.0]))
     sums = replace(made.sums, weighted=(made.Z,))
-    evidence = compute_evidence(sums, made.information, 1.0)
-    scale = scale_by_evidence(sums, made.information, 1.0, evidence).columns.scale
+    scale = scale_by_evidence(sums, made.information, 1.0).columns.scale
     assert scale[0] == scale[1] > 1.5
-    assert scale[2] == scale[3] <= 1.0
+    assert scale[2] == scale[3] < 1.0
     assert scale[4] == 1.0
+
+    def compute_posterior(sizes: FloatArray) -> float:
+        """Log density of y with the unknowns and amounts integrated out, and of the sizes."""
+        shape = (made.Z * sizes) @ (made.Z * sizes).T
+        covariance = np.eye(60) + made.J @ np.linalg.inv(made.prior) @ made.J.T + shape
+        logs = np.log(sizes[[0, 2]]) / SIZES.spread
+        nats = multivariate_normal(np.zeros(60), covariance).logpdf(made.y)
+        return float(nats) - 0.5 * float(logs @ logs)
+
+    best = compute_posterior(scale)
+    for group in (slice(0, 2), slice(2, 4)):
+        for factor in (0.2, 0.9, 0.99, 1.01, 1.1, 5.0):
+            other = scale.copy()
+            other[group] *= factor
+            assert compute_posterior(other) < best

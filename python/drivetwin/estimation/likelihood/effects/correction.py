@@ -100,7 +100,7 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     sums = weight_columns(fit.problem, fit.normal, columns)
     evidence = compute_evidence(sums, fit.normal.information, fit.chi2)
     sums = select_one_mode(sums, evidence)
-    sums = scale_by_evidence(sums, fit.normal.information, fit.chi2, evidence)
+    sums = scale_by_evidence(sums, fit.normal.information, fit.chi2)
     shown = {one for one, each in evidence.items() if each.nats > CORRECTION.evidence}
     base = _Expansion(fit.problem, fit.normal, fit.point, sums)
     step = base.take_step(shown)

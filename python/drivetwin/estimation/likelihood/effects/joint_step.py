@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
@@ -35,15 +36,14 @@ from drivetwin.vehicle.effects import EffectId
 class SizeSettings:
     """Settings of the prior sizes by evidence."""
 
-    smallest: float = 0.1
-    """Least size of an effect that the log does not show, as a share of the stated one."""
-    largest: float = 5.0
-    """Greatest size, as a factor of the stated one: beyond it the stated prior is refuted."""
-    evidence: float = 3.0
-    """Log evidence from which an effect may be larger than stated: odds of 20 against chance."""
-    rounds: int = 25
-    """Fixed-point iterations. Sizes of effects that the log does not show fall slowly, and their
-    iteration is cut short: with a fixed number the result is continuous in the log."""
+    spread: float = 3.0
+    """Standard deviation of the logarithm of an effect's size about the stated one: a vehicle may
+    have a twentieth of what is usual, or twenty times as much. It decides where the log does not
+    show the size; a smaller one keeps intervals wide for effects that the log excludes."""
+    farthest: float = 6.0
+    """Largest change of that logarithm: two standard deviations."""
+    tolerance: float = 1e-5
+    """Gradient of the log evidence by the logarithm of a size at which the search ends."""
 
 
 SIZES = SizeSettings()
@@ -154,40 +154,44 @@ def weight_columns(
 
 
 def scale_by_evidence(
-    sums: WeightedColumns,
-    information: FloatArray,
-    chi2: float,
-    evidence: Mapping[Group, GroupEvidence],
+    sums: WeightedColumns, information: FloatArray, chi2: float
 ) -> WeightedColumns:
-    """Scale the columns of each group to the prior size of greatest evidence, all groups together.
+    """Scale the columns of each group to the likeliest prior size, all groups together.
 
-    Fixed point of MacKay (Neural Computation 4, 1992): the prior variance of a group becomes the
-    mean square of its amounts, posterior variance included. Only a group with `evidence` becomes
-    larger than stated. Stated sensor tolerances stay.
+    The maximum of the log evidence with a normal prior on the logarithms u of the sizes. With the
+    posterior means a and variances v of the amounts in prior standard deviations, its slope by u
+    of a group is Σ(a² + v - 1) - u/spread² (MacKay, Neural Computation 4, 1992). Stated sensor
+    tolerances stay.
     """
-    if sums.pull.size == 0:
+    effects = [one for one in dict.fromkeys(sums.columns.groups) if one.effect is not None]
+    if not effects:
         return sums
     follows = invert_information(information) @ sums.cross
     power = max(chi2, 1.0)
     own = (sums.own - sums.cross.T @ follows) / power
     pull = (sums.pull + follows.T @ sums.gradient) / power
-    groups = [
-        (
-            sums.columns.find_columns(one),
-            SIZES.largest if evidence[one].nats > SIZES.evidence else 1.0,
-        )
-        for one in dict.fromkeys(sums.columns.groups)
-        if one.effect is not None
-    ]
-    scale = np.ones(pull.size)
-    for _ in range(SIZES.rounds):
-        spread = np.linalg.inv(np.eye(pull.size) + np.outer(scale, scale) * own)
+    members = np.array([[one == group for one in sums.columns.groups] for group in effects], float)
+
+    def evaluate(logs: FloatArray) -> tuple[float, FloatArray]:
+        """Return minus the log posterior of the sizes, and its gradient."""
+        scale = np.exp(logs @ members)
+        matrix = np.eye(scale.size) + np.outer(scale, scale) * own
+        spread = np.linalg.inv(matrix)
         amounts = spread @ (scale * pull)
-        square = amounts**2 + np.diag(spread)
-        for k, largest in groups:
-            size = scale[k] * np.sqrt(np.mean(square[k]))
-            scale[k] = np.clip(size, SIZES.smallest, largest)
-    return sums.rescale(scale)
+        nats = 0.5 * float((scale * pull) @ amounts) - 0.5 * float(np.linalg.slogdet(matrix)[1])
+        slope = members @ (amounts**2 + np.diag(spread) - 1.0)
+        prior = logs / SIZES.spread**2
+        return 0.5 * float(logs @ prior) - nats, prior - slope
+
+    found = minimize(
+        evaluate,
+        np.zeros(len(effects)),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[(-SIZES.farthest, SIZES.farthest)] * len(effects),
+        options={"gtol": SIZES.tolerance, "ftol": 0.0},
+    )
+    return sums.rescale(np.exp(found.x @ members))
 
 
 def compute_evidence(
