@@ -36,11 +36,11 @@ from drivetwin.vehicle.effects import EffectId
 class SizeSettings:
     """Settings of the prior sizes by evidence."""
 
-    spread: float = 3.0
-    """Standard deviation of the logarithm of an effect's size about the stated one: a vehicle may
-    have a twentieth of what is usual, or twenty times as much. It decides where the log does not
-    show the size; a smaller one keeps intervals wide for effects that the log excludes."""
-    farthest: float = 6.0
+    spread: float = 2.3
+    """Standard deviation of the logarithm of an effect's size about the stated one: a factor of
+    ten. A smaller one keeps intervals wide for effects that the log excludes, a larger one lets
+    hardly visible effects vanish."""
+    farthest: float = 4.6
     """Largest change of that logarithm: two standard deviations."""
     tolerance: float = 1e-5
     """Gradient of the log evidence by the logarithm of a size at which the search ends."""
