@@ -42,7 +42,7 @@ class SizeSettings:
     hardly visible effects vanish."""
     farthest: float = 4.6
     """Largest change of that logarithm: two standard deviations."""
-    tolerance: float = 1e-5
+    tolerance: float = 1e-6
     """Gradient of the log evidence by the logarithm of a size at which the search ends."""
 
 
