@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import (
     ROTATIONAL,
@@ -13,7 +15,7 @@ from drivetwin.export.modelica.component import (
     format_values,
 )
 from drivetwin.export.modelica.friction import build_bearing, build_clutch, build_one_way_clutch
-from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR
+from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR, SPRING_TABLE, TYRE
 from drivetwin.export.modelica.text import format_matrix
 from drivetwin.simulation.network import Element
 
@@ -80,6 +82,20 @@ def _build_planetary(element: Element, names: Names) -> Part:
 def _build_spring_damper(element: Element, names: Names) -> Part:
     modifiers = format_values(c=element["stiffness"], d=element["damping"])
     return _build_compliance(f"{_COMPONENTS}.SpringDamper", modifiers, element, names)
+
+
+def _build_spring_table(element: Element, names: Names) -> Part:
+    rows = format_matrix(list(zip(element["twist"], element["torque"], strict=True)))
+    modifiers = (("characteristic", rows), *format_values(d=element["damping"]))
+    part = _build_compliance(SPRING_TABLE, modifiers, element, names)
+    return replace(part, helpers=frozenset({SPRING_TABLE}))
+
+
+def _build_tyre(element: Element, names: Names) -> Part:
+    modifiers = format_values(
+        slip_stiffness=element["slip_stiffness"], w_least=element["least_speed"]
+    )
+    return replace(_build_compliance(TYRE, modifiers, element, names), helpers=frozenset({TYRE}))
 
 
 def _build_backlash(element: Element, names: Names) -> Part:
@@ -174,7 +190,9 @@ _TRANSLATIONS = {
     "one_way_clutch": build_one_way_clutch,
     "bearing": build_bearing,
     "spring_damper": _build_spring_damper,
+    "spring_table": _build_spring_table,
     "backlash": _build_backlash,
+    "tyre": _build_tyre,
     "torque_converter": _build_torque_converter,
     "road_load": _build_road_load,
     "torque": _build_torque,
