@@ -66,12 +66,12 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
     "unknown type": (
         [{"type": "flywheel", "name": "x"}],
         AT_REST,
-        "unknown variant `flywheel`, expected one of `inertia`, `gear`",
+        "unknown type 'flywheel'; known here: inertia, gear",
     ),
     "unknown field": (
         [inertia("a") | {"radius": 0.1}],
         AT_REST,
-        "unknown field `radius`, expected one of `name`, `node`, `inertia`",
+        "unknown field 'radius'; known here: node, inertia",
     ),
     "missing field": (
         [{"type": "inertia", "name": "J", "node": "a"}],
@@ -83,7 +83,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
         AT_REST,
         r"J a: inertia = -1 is impossible; .*; c: peak = 0\.5 is impossible; it must be >= 1",
     ),
-    "duplicate name": ([inertia("a"), inertia("a")], AT_REST, "J a: the name is used twice"),
+    "duplicate name": ([inertia("a"), inertia("a")], AT_REST, "J a: two elements have this name"),
     "both flanges on one node": (
         [inertia("a"), clutch("c", "a", "a")],
         AT_REST,
@@ -114,7 +114,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
         AT_REST,
         "the mechanism cannot move: the rigid couplings of g, h leave no independent speed",
     ),
-    "missing input": ([*PAIR[:2], torque("a")], AT_REST, 'input "torque" has no signal'),
+    "missing input": ([*PAIR[:2], torque("a")], AT_REST, "T a: its input 'torque' is not given"),
     "undetermined start": (PAIR, Start({"a": 0.0}), "the start leaves speeds undetermined: .* b"),
     "contradictory start": (
         [inertia("a"), gear("g", "a", "b", 2.0)],

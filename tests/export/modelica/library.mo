@@ -232,6 +232,14 @@ package Modelica
           flange.tau = -tau;
         end Torque;
 
+        model Torque2
+          extends Interfaces.PartialTwoFlanges;
+          Modelica.Blocks.Interfaces.RealInput tau;
+        equation
+          flange_a.tau = tau;
+          flange_b.tau = -tau;
+        end Torque2;
+
         model ConstantTorque
           Interfaces.Flange_b flange;
           parameter Real tau_constant;

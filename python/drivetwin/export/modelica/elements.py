@@ -9,12 +9,18 @@ from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import (
     ROTATIONAL,
     Component,
+    Flanges,
     Modifiers,
     Names,
     Part,
     format_values,
 )
-from drivetwin.export.modelica.friction import build_bearing, build_clutch, build_one_way_clutch
+from drivetwin.export.modelica.friction import (
+    GROUND,
+    build_bearing,
+    build_clutch,
+    build_one_way_clutch,
+)
 from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR, SPRING_TABLE, TYRE
 from drivetwin.export.modelica.text import format_matrix
 from drivetwin.simulation.network import Element
@@ -145,8 +151,13 @@ def _build_road_load(element: Element, names: Names) -> Part:
 
 def _build_torque(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
-    source = Component(f"{_SOURCES}.Torque", name, (), (("flange", element["node"]),))
-    return Part((source,), (f"{name}.tau = {names.inputs[element['input']]};",))
+    equation = (f"{name}.tau = {names.inputs[element['input']]};",)
+    reaction = element.get("reaction")
+    if reaction is None or reaction == GROUND:
+        flanges: Flanges = (("flange", element["node"]),)
+        return Part((Component(f"{_SOURCES}.Torque", name, (), flanges),), equation)
+    between = (("flange_b", element["node"]), ("flange_a", reaction))
+    return Part((Component(f"{_SOURCES}.Torque2", name, (), between),), equation)
 
 
 def _build_speed_source(element: Element, names: Names) -> Part:

@@ -110,7 +110,7 @@ def _list_constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...
 
 
 def _list_nodes(element: Element) -> list[str]:
-    fields = ("node", "a", "b", "sun", "ring", "carrier", "pump", "turbine")
+    fields = ("node", "a", "b", "sun", "ring", "carrier", "pump", "turbine", "reaction")
     return [element[field] for field in fields if field in element]
 
 
