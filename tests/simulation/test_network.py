@@ -347,3 +347,37 @@ def test_times_too_far_from_zero_are_refused() -> None:
     inputs = {"torque": Sine(1.0, 1.0)}
     with pytest.raises(InputError, match="too far for a simulation"):
         simulate([inertia("a"), torque("a")], inputs, Start({"a": 0.0}), SECOND + 1e9, [])
+
+
+def test_a_torque_between_two_nodes_acts_on_both() -> None:
+    source = torque("a") | {"reaction": "b"}
+    elements = [inertia("a", 2.0), inertia("b", 3.0), source]
+    outputs: list[Output] = [("speed", "a"), ("speed", "b"), ("torque", "T a.reaction")]
+    result = run(
+        elements, Start({"a": 1.0, "b": 4.0}), *outputs, torque=line((0.0, 6.0), (1.0, 6.0))
+    )
+    assert result.columns["speed", "a"] == pytest.approx(1.0 + 3.0 * SECOND)
+    assert result.columns["speed", "b"] == pytest.approx(4.0 - 2.0 * SECOND)
+    assert result.columns["torque", "T a.reaction"] == pytest.approx(-6.0)
+    assert result.audit is not None
+    assert result.audit.source == pytest.approx(result.audit.stored, rel=1e-12)
+
+
+def test_a_reaction_at_a_member_without_mass_twists_its_dampers() -> None:
+    """The reaction of 6 N m on a massless member goes through the damper to the ground."""
+    damper = {"type": "spring_damper", "name": "d", "a": "m", "b": "ground"}
+    elements = [
+        inertia("a", 2.0),
+        damper | {"stiffness": 0.0, "damping": 2.0},
+        torque("a") | {"reaction": "m"},
+    ]
+    result = run(elements, Start({"a": 0.0}), ("speed", "m"), torque=line((0.0, 6.0), (1.0, 6.0)))
+    assert result.columns["speed", "m"] == pytest.approx(-3.0)
+
+
+def test_a_quadratic_load_below_zero_drives() -> None:
+    """J ω' = k ω²: ω = ω0 / (1 - ω0 k t / J)."""
+    load = {"type": "road_load", "name": "fan", "node": "a", "constant": 0.0, "rolling": 0.0}
+    elements = [inertia("a", 2.0), load | {"aero": -0.1}]
+    result = run(elements, Start({"a": 5.0}), ("speed", "a"))
+    assert result.columns["speed", "a"] == pytest.approx(5.0 / (1.0 - 0.25 * SECOND), rel=1e-9)

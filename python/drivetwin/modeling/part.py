@@ -84,8 +84,8 @@ class Part:
         """Torque on `b` of a shaft or friction element, on the node of a source or load [N·m]."""
         if self.kind in SPRINGS:
             return ("shaft_torque", self.name)
-        if len(self.ports) == 1:
-            return next(iter(self.ports.values())).torque
+        if "node" in self.ports:
+            return self.ports["node"].torque
         if "b" in self.ports and self.kind != "gear":
             return self.ports["b"].torque
         ports = ", ".join(f"{name}.torque" for name in self.ports)

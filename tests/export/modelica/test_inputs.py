@@ -62,6 +62,16 @@ def test_a_sine_is_an_equation_beside_a_table_of_samples(tmp_path: Path) -> None
     assert "driveline.u_samples = inputs.y[1];" in text
 
 
+def test_a_torque_between_two_nodes_is_torque2(tmp_path: Path) -> None:
+    elements = [
+        _inertia("a", 0.5),
+        _inertia("b", 0.8),
+        build_element("torque", "T", node="a", reaction="b", input="wave"),
+    ]
+    text = _compare(elements, {"wave": Sine(20.0, 3.0)}, Start({"a": 1.0, "b": 2.0}), tmp_path)
+    assert "Sources.Torque2 T;" in text
+
+
 def test_a_converter_starts_with_its_pump_at_rest(tmp_path: Path) -> None:
     table = {
         "speed_ratio": [0.0, 0.85, 1.0, 1.3],
