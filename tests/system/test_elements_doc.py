@@ -50,7 +50,8 @@ def example(kind: str) -> dict[str, Any]:
 
 def run(element: Mapping[str, Any]) -> str:
     """Status of a short run in which every node of the element has an inertia and stands still."""
-    flanges = {"node", "a", "b", "sun", "ring", "carrier", "pump", "turbine"} & set(element)
+    flanges = {"node", "a", "b", "sun", "ring", "carrier", "pump", "turbine", "reaction"}
+    flanges &= set(element)
     nodes = sorted({element[flange] for flange in flanges} - {"ground"})
     masses = [
         {"type": "inertia", "name": f"mass of {node}", "node": node, "inertia": 1.0}

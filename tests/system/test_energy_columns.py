@@ -135,7 +135,7 @@ def test_a_whole_drive_closes_from_its_columns() -> None:
 def test_random_networks_close_from_their_columns() -> None:
     """Energies after the starting impulse: that is an event before the first sample."""
     closed = 0
-    for seed in range(60):
+    for seed in range(40):
         network = draw_network(seed)
         inputs = {name: Signal(*samples) for name, samples in network.inputs.items()}
         start = Start(network.speeds, locked=network.locked)
@@ -147,7 +147,7 @@ def test_random_networks_close_from_their_columns() -> None:
         if done.status == "completed":
             closed += 1
             _check(network.elements, done, f"seed {seed}")
-    assert closed > 40
+    assert closed > 25
 
 
 def test_accelerations_are_the_rates_of_speeds() -> None:
