@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.network import Element, NetworkRun, Start, build_element, simulate
 
 SECOND = np.linspace(0.0, 1.0, 1001)
@@ -32,7 +32,7 @@ def _build_clutch(name: str, a: str, b: str) -> Element:
 
 def run_samples(count: int) -> NetworkRun:
     """Run two inertias, clutch and shaft under `count` samples of a random torque at 1 kHz."""
-    grid = np.arange(count + 1) * 1e-3
+    grid: FloatArray = np.arange(count + 1, dtype=np.float64) * 1e-3
     elements = [
         *_build_inertias(2),
         _build_clutch("C", "n0", "n1"),
