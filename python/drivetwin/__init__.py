@@ -16,7 +16,8 @@ it is first asked for, so that `import drivetwin` costs nothing.
     drivetwin.save_result(path, result)                           result.json
     drivetwin.save_report(path, result, log)                      report.html
 
-`DualClutch` and `simulate` are the model without a log; all errors derive from `DrivetwinError`.
+`DualClutch` and `simulate` are the model without a log, `Model` builds any driveline; all errors
+derive from `DrivetwinError`.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from drivetwin.files.twin_conversion import load_twin, save_twin
     from drivetwin.logs.arrays import read_arrays
     from drivetwin.logs.read import read_log
+    from drivetwin.modeling.model import Model
     from drivetwin.pipeline import identify
     from drivetwin.report.html import save_report
     from drivetwin.shifts.detect import detect_shifts
@@ -48,6 +50,7 @@ register_presenter(lambda: import_module("drivetwin.report.notebook"))
 _HOME = {
     "DrivetwinError": ("errors", "DrivetwinError"),
     "DualClutch": ("simulation.dual_clutch", "DualClutch"),
+    "Model": ("modeling.model", "Model"),
     "Method": ("estimation.result.method", "Method"),
     "Twin": ("twin.twin", "Twin"),
     "build_twin": ("twin.build", "build_twin"),
@@ -71,6 +74,7 @@ __all__ = [
     "DrivetwinError",
     "DualClutch",
     "Method",
+    "Model",
     "Twin",
     "attach_validation",
     "build_twin",

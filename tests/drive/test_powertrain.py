@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from drivetwin.drive import Powertrain
@@ -31,13 +30,6 @@ def test_closed_pedal_holds_idle(truck: Powertrain) -> None:
     assert truck.engine.compute_steady_torque(0.0, idle) == pytest.approx(0.0)
     assert truck.engine.compute_steady_torque(0.0, 0.95 * idle) > 500.0
     assert truck.engine.compute_steady_torque(0.0, 1.05 * idle) < -50.0
-
-
-def test_lag_answers_a_ramp_as_first_order(truck: Powertrain) -> None:
-    time = np.arange(0.0, 1.0, 1e-3)
-    lag, slope = truck.engine.lag, 400.0
-    exact = slope * (time - lag * (1.0 - np.exp(-time / lag)))
-    assert np.abs(truck.engine.apply_lag(time, slope * time) - exact).max() < 1e-9
 
 
 def test_converter_takes_the_published_torque_scaled_by_speed_squared(truck: Powertrain) -> None:

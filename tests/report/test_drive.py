@@ -39,6 +39,23 @@ def test_traces_are_the_motion(motion: DriveRun) -> None:
     assert np.allclose(table[:, 1], motion.engine_speed[::10], rtol=1e-8)
 
 
+def test_energy_closes_from_the_written_columns(motion: DriveRun) -> None:
+    """Works of engine and road, heats, and gains of stored energy on every row."""
+    names, _, *rows = format_traces(motion).splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    columns = dict(zip(names.split(","), table.T, strict=True))
+    parts = {
+        name: values for name, values in columns.items() if name.startswith(("work.", "heat."))
+    }
+    parts |= {n: values - values[0] for n, values in columns.items() if n.startswith("energy.")}
+    largest = max(float(np.abs(values).max()) for values in parts.values())
+    assert np.abs(np.sum(list(parts.values()), axis=0)).max() < 1e-8 * largest
+    assert {"pedal", "brake_torque", "pump_torque", "turbine_torque"} <= set(columns)
+    taken = columns["pump_torque"] * columns["engine_speed"]
+    given = columns["turbine_torque"] * columns["input_speed"]
+    assert (taken - given).min() > -1e-6 * np.abs(taken).max()
+
+
 def test_figures_show_display_units_and_all_elements(motion: DriveRun) -> None:
     whole = plot_motion(motion)
     assert {"engine", "speed ratio", "lock-up", "direct"} <= {trace.name for trace in whole.data}

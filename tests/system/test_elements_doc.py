@@ -12,8 +12,10 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from drivetwin._native import simulate_network
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS
 from drivetwin.simulation.network import OutputKind, Start, simulate
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "elements.md").read_text(
@@ -48,7 +50,8 @@ def example(kind: str) -> dict[str, Any]:
 
 def run(element: Mapping[str, Any]) -> str:
     """Status of a short run in which every node of the element has an inertia and stands still."""
-    flanges = {"node", "a", "b", "sun", "ring", "carrier", "pump", "turbine"} & set(element)
+    flanges = {"node", "a", "b", "sun", "ring", "carrier", "pump", "turbine", "reaction"}
+    flanges &= set(element)
     nodes = sorted({element[flange] for flange in flanges} - {"ground"})
     masses = [
         {"type": "inertia", "name": f"mass of {node}", "node": node, "inertia": 1.0}
@@ -62,9 +65,28 @@ def run(element: Mapping[str, Any]) -> str:
 
 def accepted(element: Mapping[str, Any]) -> list[str]:
     """What the core lists where it refuses a field or type."""
-    with pytest.raises(InputError, match=r"expected one of|expected `") as caught:
-        run(element)
+    options = (1e-12, np.inf, None, True, False)
+    with pytest.raises(ValueError, match=r"expected one of|expected `") as caught:
+        simulate_network(json.dumps([element]), "[]", ([], []), ([], [], []), TIME, options)
     return re.findall(r"`(\w+)`", str(caught.value))[1:]
+
+
+def test_the_schema_is_that_of_the_page() -> None:
+    assert list(ELEMENT_FIELDS) == list(SECTIONS)
+    for kind, fields in ELEMENT_FIELDS.items():
+        defaults = documented(kind, "field")
+        assert sorted(fields) == sorted(set(defaults) - {"name"})
+        required = {key for key, one in fields.items() if one.required}
+        assert required == {key for key, text in defaults.items() if text == "required"}
+
+
+@pytest.mark.parametrize("kind", SECTIONS)
+def test_a_misspelt_field_is_refused_with_a_suggestion(kind: str) -> None:
+    element = example(kind)
+    key = list(element)[-1]
+    wrong = {name if name != key else f"{name}s": value for name, value in element.items()}
+    with pytest.raises(InputError, match=f"unknown field '{key}s'; did you mean '{key}'"):
+        run(wrong)
 
 
 def test_every_type_has_its_section() -> None:

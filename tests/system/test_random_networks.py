@@ -42,7 +42,8 @@ def run(network: RandomNetwork, *, audit: bool) -> NetworkRun | None:
     try:
         return simulate(network.elements, inputs, start, GRID, [*slips, *speeds], audit=audit)
     except InputError as error:
-        if "in the direction that it blocks" not in str(error):
+        refusals = ("in the direction that it blocks", "starts locked, but with")
+        if not any(text in str(error) for text in refusals):
             raise
         return None
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.network import NetworkRun, Start, simulate
 
@@ -162,3 +163,34 @@ def test_prescribed_speeds_and_locks_determine_a_start() -> None:
     assert done.audit is not None
     assert done.audit.impulse == 0.0
     assert done.events == ()
+
+
+def test_a_lock_that_a_prescribed_speed_contradicts_is_refused_with_both_names() -> None:
+    elements = [inertia("a"), clutch("C", "a", "ground"), driven("a")]
+    with pytest.raises(
+        InputError, match=r"C starts locked, but with prescribed speed D its slip is 5\.0000"
+    ):
+        start(elements, 5.0, locked=("C",))
+    assert start(elements, 0.0, locked=("C",)).status == "completed"
+
+
+def test_a_lock_beyond_a_gear_and_another_lock_is_contradicted_too() -> None:
+    elements = [
+        *(inertia(node) for node in ("a", "b", "c")),
+        {"type": "gear", "name": "G", "a": "a", "b": "b", "ratio": 2.0},
+        clutch("C", "b", "c"),
+        clutch("B", "c", "ground"),
+        driven("a"),
+    ]
+    with pytest.raises(
+        InputError, match=r"B starts locked.*prescribed speed D and locked C.* 2\.0000 rad"
+    ):
+        start(elements, 4.0, locked=("C", "B"))
+    assert start(elements, 4.0, locked=("C",)).status == "completed"
+
+
+def start(elements: list[dict[str, object]], speed: float, locked: tuple[str, ...]) -> NetworkRun:
+    """Half a second at a prescribed speed."""
+    ends = np.array([0.0, 1.0])
+    inputs = {"w": Signal(ends, np.full(2, speed)), "P": Signal(ends, np.full(2, 1e5))}
+    return simulate(elements, inputs, Start({}, locked=locked), GRID, [("speed", "a")])

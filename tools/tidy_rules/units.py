@@ -10,7 +10,18 @@ from collections.abc import Iterator
 from tools.tidy_rules.base import PACKAGE, Fault, Tree
 
 _WITH_UNITS = frozenset(
-    {"_util", "channels", "logs", "vehicle", "gearbox", "report", "export", "fleet", "workbench"}
+    {
+        "_util",
+        "channels",
+        "logs",
+        "vehicle",
+        "gearbox",
+        "report",
+        "export",
+        "fleet",
+        "workbench",
+        "modeling",
+    }
     | {"cli", "__main__"}
 )
 """Packages that read files and cards, or that show or export values."""

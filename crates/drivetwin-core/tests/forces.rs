@@ -236,6 +236,7 @@ fn a_sine_without_amplitude_is_differentiated_by_it() {
             name: "source".into(),
             node: "a".into(),
             input: "T".into(),
+            reaction: None,
             number: PhantomData,
         }),
     ];

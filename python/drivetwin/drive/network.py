@@ -16,6 +16,7 @@ from drivetwin.gearbox import Drive, Gearbox, build_network_elements, solve_gear
 from drivetwin.gearbox.spec import ElementKind
 from drivetwin.simulation.network import Element, Output, Start, build_element
 
+ENGINE, CONVERTER = "map", "converter"
 CRANK, AXLE, WHEEL = "crankshaft", "axle beyond the shaft", "wheel of the vehicle"
 SHAFT, ROAD = "shaft to the axle", "rolling resistance"
 LOCK_UP, BRAKE = "lock-up", "service brake"
@@ -50,14 +51,14 @@ def _build_engine(powertrain: Powertrain, drive: Drive) -> list[Element]:
     table = {"throttle": [0.0, 1.0], "speed": engine.speed, "torque": [engine.closed, engine.full]}
     return [
         build_element("inertia", "engine", node=CRANK, inertia=drive.engine_inertia),
-        build_element("engine_map", "map", node=CRANK, throttle=PEDAL, lag=engine.lag, map=table),
+        build_element("engine_map", ENGINE, node=CRANK, throttle=PEDAL, lag=engine.lag, map=table),
     ]
 
 
 def _build_converter(powertrain: Powertrain, turbine: str) -> list[Element]:
     table, clutch = asdict(powertrain.converter), powertrain.lock_up
     return [
-        build_element("torque_converter", "converter", pump=CRANK, turbine=turbine, map=table),
+        build_element("torque_converter", CONVERTER, pump=CRANK, turbine=turbine, map=table),
         build_element(
             "clutch",
             LOCK_UP,
@@ -119,12 +120,31 @@ def list_friction_elements(gearbox: Gearbox) -> tuple[str, ...]:
 
 
 def list_outputs(gearbox: Gearbox) -> Sequence[Output]:
-    """List the outputs of a drive: speeds, shaft torque, slip and torque of all shift elements."""
+    """List the outputs of a drive: speeds, torques, slips of all shift elements.
+
+    The torques are those of engine, converter, shaft, road, service brake and shift elements.
+    """
     nodes = (CRANK, gearbox.input, gearbox.output, WHEEL)
     elements = list_friction_elements(gearbox)
     return [
         *(("speed", node) for node in nodes),
         ("shaft_torque", SHAFT),
         *(("slip", name) for name in elements),
-        *(("friction_torque", name) for name in elements),
+        *(("friction_torque", name) for name in (*elements, BRAKE)),
+        *(("torque", f"{CONVERTER}.{port}") for port in ("pump", "turbine")),
+        *(("torque", f"{name}.node") for name in (ENGINE, ROAD)),
     ]
+
+
+def list_energy_outputs(elements: Sequence[Element]) -> list[Output]:
+    """List what closes the energy balance: works of engine and road, heats, stored energies."""
+    outputs: list[Output] = []
+    for element in elements:
+        kind, name = element["type"], str(element["name"])
+        if kind in ("engine_map", "road_load"):
+            outputs.append(("work", name))
+        elif kind != "inertia":
+            outputs.append(("heat", name))
+        if kind in ("inertia", "planetary", "clutch", "spring_damper"):
+            outputs.append(("energy", name))
+    return outputs

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
 from drivetwin.gearbox.spec import Capacity
 from drivetwin.simulation.converter_map import Converter
@@ -34,18 +33,6 @@ class Engine:
         low = np.interp(speed, self.speed, self.closed)
         high = np.interp(speed, self.speed, self.full)
         return np.asarray(low + pedal * (high - low), dtype=np.float64)
-
-    def apply_lag(self, time: FloatArray, steady: FloatArray) -> FloatArray:
-        """Torque (n,) [N m] behind `steady` (n,) at evenly spaced `time` (n,) [s], from 0.
-
-        The lag is solved exactly for a demand that is linear between the samples.
-        """
-        step = float(time[1] - time[0])
-        decay = np.exp(-step / self.lag)
-        mean = self.lag / step * (1.0 - decay)
-        b, a = [1.0 - mean, mean - decay], [1.0, -decay]
-        torque, _ = signal.lfilter(b, a, steady[1:], zi=[(mean - decay) * steady[0]])
-        return np.concatenate([[0.0], torque])
 
 
 @dataclass(frozen=True)

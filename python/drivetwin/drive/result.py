@@ -8,13 +8,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.drive.network import BRAKE, CRANK, PEDAL, SHAFT, WHEEL, list_friction_elements
+from drivetwin.drive.network import (
+    BRAKE,
+    CONVERTER,
+    CRANK,
+    ENGINE,
+    PEDAL,
+    ROAD,
+    SHAFT,
+    WHEEL,
+    list_friction_elements,
+)
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schedule import Schedule
 from drivetwin.gearbox import Gearbox
 from drivetwin.simulation.dual_clutch import EnergyAudit, Event, FloatArray
-from drivetwin.simulation.network import NetworkRun
+from drivetwin.simulation.network import NetworkRun, Output
 
+TRACE_STEP = 10
+"""Instants of a drive per row of its traces."""
 _OF_MASS = (0.75, 1.5)
 """Inertia of a vehicle over that of its mass: wheels and axles add to it, few numbers are exact."""
 
@@ -67,11 +79,14 @@ class Maneuver:
 class DriveRun:
     """A drive; arrays (n,) on `time` [s], SI.
 
-    `engine_torque` is that of the lagging map, `brake_torque` what the service brake can hold;
-    `estimate_speed_ratio` and `torque_ratio` are the converter's and `compute_turbine_torque` what
-    it gives to the gearbox; `slip`, `torque`, `pressure` go by element. `work` is the friction work
-    of each element over the whole drive [J]; `warnings` name elements that slip outside their
-    shifts, and different vehicle inertias of gearbox card and powertrain.
+    `engine_torque` is that of the lagging map, `brake_torque` that of the service brake,
+    `road_torque` that of the road on the wheel; `speed_ratio` and `torque_ratio` are the
+    converter's, `pump_torque` is what it takes from the engine and `turbine_torque` what it gives
+    to the gearbox; `slip`, `torque`, `pressure` go by element. `work` is the friction work of each
+    element over the whole drive [J]. `energy` has works of engine and road, heats and stored
+    energies of all other elements [J] on every `TRACE_STEP`th instant: `energy["heat", "shaft"]`.
+    `warnings` name elements that slip outside their shifts, and different vehicle inertias of
+    gearbox card and powertrain.
     """
 
     time: FloatArray
@@ -83,6 +98,8 @@ class DriveRun:
     shaft_torque: FloatArray
     pedal: FloatArray
     brake_torque: FloatArray
+    road_torque: FloatArray
+    pump_torque: FloatArray
     speed_ratio: FloatArray
     torque_ratio: FloatArray
     turbine_torque: FloatArray
@@ -91,6 +108,7 @@ class DriveRun:
     pressure: Mapping[str, FloatArray]
     maneuvers: tuple[Maneuver, ...]
     work: Mapping[str, float]
+    energy: Mapping[Output, FloatArray]
     events: tuple[Event, ...]
     audit: EnergyAudit
     warnings: tuple[str, ...]
@@ -102,15 +120,13 @@ def build_drive_run(
     schedule: Schedule,
     actions: Sequence[Action],
     motion: NetworkRun,
+    energy: Mapping[Output, FloatArray],
 ) -> DriveRun:
-    """Make a drive of its motion, which has been audited, and of what was decided."""
+    """Make a drive of its motion, which has been audited, its energies and what was decided."""
     time, columns, audit = motion.time, motion.columns, motion.audit
     if audit is None:
         raise ValueError("the motion has not been audited")
     crank, turbine = columns["speed", CRANK], columns["speed", gearbox.input]
-    engine, converter = powertrain.engine, powertrain.converter
-    pedal = schedule.evaluate(PEDAL, time)
-    torque_ratio = converter.compute_torque_ratio(crank, turbine)
     elements = list_friction_elements(gearbox)
     slip = {name: columns["slip", name] for name in elements}
     torque = {name: columns["friction_torque", name] for name in elements}
@@ -122,18 +138,21 @@ def build_drive_run(
         input_speed=turbine,
         output_speed=columns["speed", gearbox.output],
         wheel_speed=columns["speed", WHEEL],
-        engine_torque=engine.apply_lag(time, engine.compute_steady_torque(pedal, crank)),
+        engine_torque=columns["torque", f"{ENGINE}.node"],
         shaft_torque=shaft_torque,
-        pedal=pedal,
-        brake_torque=schedule.evaluate(BRAKE, time),
+        pedal=schedule.evaluate(PEDAL, time),
+        brake_torque=columns["friction_torque", BRAKE],
+        road_torque=columns["torque", f"{ROAD}.node"],
+        pump_torque=-columns["torque", f"{CONVERTER}.pump"],
         speed_ratio=turbine / crank,
-        torque_ratio=torque_ratio,
-        turbine_torque=converter.compute_turbine_torque(crank, turbine),
+        torque_ratio=powertrain.converter.compute_torque_ratio(crank, turbine),
+        turbine_torque=columns["torque", f"{CONVERTER}.turbine"],
         slip=slip,
         torque=torque,
         pressure={name: schedule.evaluate(name, time) for name in elements},
         maneuvers=tuple(_build_maneuver(each, motion, power) for each in actions),
         work={name: float(np.trapezoid(power[name], time)) for name in elements},
+        energy=energy,
         events=motion.events,
         audit=audit,
         warnings=(

@@ -23,6 +23,7 @@ from drivetwin.drive.network import (
     PEDAL,
     build_driveline_elements,
     build_standstill,
+    list_energy_outputs,
     list_outputs,
 )
 from drivetwin.drive.plan import (
@@ -35,7 +36,7 @@ from drivetwin.drive.plan import (
     list_forward_gears,
 )
 from drivetwin.drive.powertrain import Powertrain
-from drivetwin.drive.result import Action, DriveRun, build_drive_run
+from drivetwin.drive.result import TRACE_STEP, Action, DriveRun, build_drive_run
 from drivetwin.drive.schedule import Knots, Schedule
 from drivetwin.drive.shift import CLOSE, FILL, OPEN, RAMP, ShiftPlan, compute_pressure
 from drivetwin.errors import InputError, SimulationError
@@ -76,7 +77,8 @@ def run(gearbox: Gearbox, powertrain: Powertrain, plan: Plan) -> DriveRun:
         notify_progress(count / (len(plan) + 1))
         state = driver.run_leg(leg, state)
     motion = driver.simulate(state.schedule, _build_grid(0, round(state.time / STEP)), audit=True)
-    return build_drive_run(gearbox, powertrain, state.schedule, state.actions, motion)
+    energy = driver.simulate_energy(state.schedule, motion.time[::TRACE_STEP])
+    return build_drive_run(gearbox, powertrain, state.schedule, state.actions, motion, energy)
 
 
 def _build_grid(first: int, last: int) -> FloatArray:
@@ -126,6 +128,12 @@ class _Driver:
                 "look at the capacities on the gearbox card and at the main pressure",
             )
         return motion
+
+    def simulate_energy(self, schedule: Schedule, time: FloatArray) -> Mapping[Output, FloatArray]:
+        """Return works, heats and stored energies at `time` (n,) [s]."""
+        inputs = schedule.to_signals(float(time[-1]))
+        outputs = list_energy_outputs(self.elements)
+        return simulate(self.elements, inputs, self.start, time, outputs).columns
 
     def run_leg(self, leg: Leg, state: _State) -> _State:
         """One leg and its action."""

@@ -25,7 +25,7 @@ def make_frame(thing: object) -> Any:
 @make_frame.register
 def _(log: ShiftLog) -> Any:
     """One column per role in SI, over the stamps [s] of all channels; NaN between them."""
-    pandas = _import_pandas()
+    pandas = import_pandas()
     columns = {
         role: pandas.Series(one.values, index=one.time) for role, one in log.channels.items()
     }
@@ -45,7 +45,7 @@ def _(twin: Twin) -> Any:
 @make_frame.register
 def _(validation: Validation) -> Any:
     """Measured beside simulated signals in SI over the time [s] of the simulation."""
-    pandas = _import_pandas()
+    pandas = import_pandas()
     columns = {}
     for name, trace in validation.all_traces.items():
         columns[f"{name}_measured"] = pandas.Series(trace.measured, index=trace.time)
@@ -69,11 +69,12 @@ def _tabulate_estimates(estimates: Mapping[str, Estimate]) -> Any:
             "reason": one.reason,
         }
     numbers = dict.fromkeys(("value", "std_noise", "std_total", "low", "high"), "float64")
-    frame = _import_pandas().DataFrame.from_dict(rows, orient="index")
+    frame = import_pandas().DataFrame.from_dict(rows, orient="index")
     return frame.astype(numbers).rename_axis("parameter")
 
 
-def _import_pandas() -> Any:
+def import_pandas() -> Any:
+    """Return the module pandas. Raises MissingExtraError with the install command."""
     try:
         return import_module("pandas")
     except ImportError as fault:

@@ -8,7 +8,7 @@ from io import StringIO
 import numpy as np
 
 from drivetwin.channels.pressure_roles import make_pressure_role
-from drivetwin.drive.result import DriveRun
+from drivetwin.drive.result import TRACE_STEP, DriveRun
 from drivetwin.report.figures.drive import (
     build_maneuver_panels,
     build_motion_panels,
@@ -18,9 +18,6 @@ from drivetwin.report.figures.drive import (
 )
 from drivetwin.report.html import render_page
 from drivetwin.report.sections.blocks import Cell, FigureBlock, Section, TableBlock, make_cells
-
-_TRACE_STEP = 10
-"""Every so many samples go into the table: 100 Hz, enough for any plot."""
 
 
 def render_drive(run: DriveRun, title: str) -> str:
@@ -70,7 +67,7 @@ def _build_shift_table(run: DriveRun) -> TableBlock:
 
 
 def format_traces(run: DriveRun) -> str:
-    """CSV with a unit row: the motion at 100 Hz, SI."""
+    """CSV with a unit row: the motion at 100 Hz, SI, and the energies that close its balance."""
     columns = {
         ("time", "s"): run.time,
         ("engine_speed", "rad/s"): run.engine_speed,
@@ -78,8 +75,12 @@ def format_traces(run: DriveRun) -> str:
         ("output_speed", "rad/s"): run.output_speed,
         ("wheel_speed", "rad/s"): run.wheel_speed,
         ("engine_torque", "N*m"): run.engine_torque,
+        ("pedal", "1"): run.pedal,
+        ("pump_torque", "N*m"): run.pump_torque,
         ("turbine_torque", "N*m"): run.turbine_torque,
         ("shaft_torque", "N*m"): run.shaft_torque,
+        ("brake_torque", "N*m"): run.brake_torque,
+        ("road_torque", "N*m"): run.road_torque,
         ("speed_ratio", "1"): run.speed_ratio,
         ("torque_ratio", "1"): run.torque_ratio,
         **{(make_pressure_role(name), "Pa"): values for name, values in run.pressure.items()},
@@ -87,8 +88,12 @@ def format_traces(run: DriveRun) -> str:
         **{(f"torque.{name}", "N*m"): values for name, values in run.torque.items()},
     }
     text = StringIO()
-    text.write(",".join(name for name, _ in columns) + "\n")
-    text.write(",".join(unit for _, unit in columns) + "\n")
-    table = np.column_stack([values[::_TRACE_STEP] for values in columns.values()])
-    np.savetxt(text, table, fmt="%.9g", delimiter=",")
+    energies = {(f"{kind}.{name}", "J"): values for (kind, name), values in run.energy.items()}
+    heads = (*columns, *energies)
+    text.write(",".join(name for name, _ in heads) + "\n")
+    text.write(",".join(unit for _, unit in heads) + "\n")
+    motion = (values[::TRACE_STEP] for values in columns.values())
+    table = np.column_stack([*motion, *energies.values()])
+    formats = ["%.9g"] * len(columns) + ["%.12g"] * len(energies)
+    np.savetxt(text, table, fmt=formats, delimiter=",")
     return text.getvalue()

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from drivetwin._native import simulate_network as native_simulate_network
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
@@ -24,12 +25,32 @@ from drivetwin.simulation.dual_clutch import (
     run_time,
     to_core_samples,
 )
+from drivetwin.simulation.element_schema import (
+    find_element_faults,
+    list_inputs,
+    refuse_faults,
+)
+from drivetwin.simulation.network_output import Request, combine_columns, resolve_output
 from drivetwin.simulation.serialize import as_json, as_names
 
 Element = Mapping[str, Any]
-OutputKind = Literal["speed", "angle", "twist", "shaft_torque", "slip", "friction_torque"]
+OutputKind = Literal[
+    "speed",
+    "acceleration",
+    "angle",
+    "twist",
+    "shaft_torque",
+    "slip",
+    "friction_torque",
+    "torque",
+    "power",
+    "loss",
+    "work",
+    "heat",
+    "energy",
+]
 Output = tuple[OutputKind, str]
-"""Recorded quantity, and the node or element that it belongs to."""
+"""Recorded quantity, and the node or element that it belongs to; for a torque `element.port`."""
 
 
 def build_element(kind: str, name: str, **fields: object) -> Element:
@@ -58,7 +79,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class NetworkRun:
-    """Result: `columns[kind, name]` (n,) on `time`; NaN after a failure, see `status`."""
+    """Result: `columns[output]` (n,) on `time`; NaN after a failure, see `status`."""
 
     time: FloatArray
     columns: Mapping[Output, FloatArray]
@@ -85,21 +106,22 @@ def simulate(
     on the way returns its status.
     """
     accuracy = accuracy or Accuracy()
-    foreign = [name for name, one in inputs.items() if not isinstance(one, Signal | Sine)]
-    if foreign:
-        raise InputError(
-            f"inputs {', '.join(foreign)} are no signals", "give each a Signal or a Sine"
-        )
+    elements, outputs = list(elements), list(outputs)
+    refuse_faults(find_element_faults(elements))
+    requests = [resolve_output(output, elements) for output in outputs]
+    refuse_faults([one for one in requests if isinstance(one, str)])
+    refuse_faults(_find_input_faults(elements, inputs))
     sampled = {name: one for name, one in inputs.items() if isinstance(one, Signal)}
     sines = [
         (name, sine.offset, sine.amplitude, sine.frequency, sine.phase)
         for name, sine in inputs.items()
         if isinstance(sine, Sine)
     ]
+    recorded = [request for request in requests if isinstance(request, Request)]
     try:
         columns, events, status, energy = native_simulate_network(
-            as_json(list(elements)),
-            json.dumps([{kind: name} for kind, name in outputs]),
+            as_json(elements),
+            json.dumps([one for request in recorded for one in request.native]),
             (to_core_samples(sampled), sines),
             (list(start.speeds.items()), list(start.twists.items()), as_names(start.locked)),
             run_time(time),
@@ -109,8 +131,24 @@ def simulate(
         raise InputError(str(error), "correct the elements, their inputs or the start") from error
     return NetworkRun(
         time,
-        dict(zip(outputs, columns, strict=True)),
+        dict(zip(outputs, combine_columns(recorded, columns), strict=True)),
         tuple(Event(*event) for event in events),
         status,
         EnergyAudit(*energy) if energy is not None else None,
     )
+
+
+def _find_input_faults(
+    elements: Sequence[Element], inputs: Mapping[str, Signal | Sine]
+) -> list[str]:
+    """Faults of the inputs: those that are no signals, and those that are missing."""
+    foreign = [name for name, one in inputs.items() if not isinstance(one, Signal | Sine)]
+    faults = []
+    if foreign:
+        faults.append(f"inputs {', '.join(foreign)} are no signals: give each a Signal or a Sine")
+    for element in elements:
+        for name in list_inputs(element):
+            if name not in inputs:
+                hint = suggest_spelling(name, inputs)
+                faults.append(f"{element['name']}: its input {name!r} is not given{hint}")
+    return faults

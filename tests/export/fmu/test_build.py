@@ -364,18 +364,40 @@ def test_a_thousand_instances_at_once(built: Built, instance: Instance) -> None:
     fmu.component = first
 
 
+def _read_packed(path: Path, name: str) -> FloatArray:
+    with zipfile.ZipFile(path) as archive:
+        text = archive.read(f"extra/org.fmi-standard.fmi-ls-ref/{name}").decode()
+    return np.genfromtxt(text.splitlines(), delimiter=",", skip_header=1)
+
+
+def test_importers_that_set_values_only_meet_the_reference_inside(built: Built) -> None:
+    """FMPy holds inputs over a step; so does the result named `measured_shift`."""
+    stimulus = _read_packed(built.path, "measured_shift-in.csv")
+    result = _read_packed(built.path, "measured_shift-ref.csv")
+    names = ("time", "engine_torque", "B2.pressure", "B3.pressure")
+    signals = np.array(
+        [tuple(row) for row in stimulus.tolist()], dtype=[(name, float) for name in names]
+    )
+    told = fmpy.simulate_fmu(
+        str(built.path),
+        start_time=stimulus[0, 0],
+        stop_time=stimulus[-1, 0],
+        step_size=STEP,
+        output_interval=STEP,
+        use_event_mode=False,
+        input=signals,
+        output=["engine_speed", "output_torque"],
+        fmi_type="CoSimulation",
+    )
+    for column, expected in (("engine_speed", result[:, 1]), ("output_torque", result[:, 5])):
+        assert np.abs(told[column] - expected).max() < 1e-9 * np.abs(expected).max()
+
+
 def test_experiment_inside_repeats_from_the_archive_alone(built: Built, instance: Instance) -> None:
     """Stimulus and result that travel with the FMU agree with what it does."""
-    place = "extra/org.fmi-standard.fmi-ls-ref/measured_shift"
+    ends = ("-in", "_interpolated-ref" if instance.is_fmi2 else "-ref")
+    stimulus, result = (_read_packed(built.path, f"measured_shift{end}.csv") for end in ends)
     with zipfile.ZipFile(built.path) as archive:
-        stimulus, result = (
-            np.genfromtxt(
-                archive.read(f"{place}-{end}.csv").decode().splitlines(),
-                delimiter=",",
-                skip_header=1,
-            )
-            for end in ("in", "ref")
-        )
         manifest = archive.read("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml").decode()
         assert "resources/parameters.ssv" in archive.namelist()
     assert 'role="experiment/validation"' in manifest

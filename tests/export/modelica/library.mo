@@ -13,6 +13,7 @@ package Modelica
       type Inertia = Real(unit="kg.m2");
       type Pressure = Real(unit="Pa");
       type AngularVelocity = Real(unit="rad/s");
+      type RotationalDampingConstant = Real(unit="N.m.s/rad");
     end SI;
   end Units;
 
@@ -30,9 +31,32 @@ package Modelica
     end for;
   end interpolate;
 
+  function hold "Linear between the rows of a table, constant beyond"
+    input Real u;
+    input Real table[:, :];
+    input Integer column;
+    output Real y;
+  algorithm
+    y := interpolate(min(u, table[size(table, 1), 1]), table, column);
+  end hold;
+
+  function extend "Linear between the rows of a table and on along both end pieces"
+    input Real u;
+    input Real table[:, :];
+    input Integer column;
+    output Real y;
+  algorithm
+    y := interpolate(u, table, column) + (table[2, column] - table[1, column])
+      /(table[2, 1] - table[1, 1])*min(u - table[1, 1], 0);
+  end extend;
+
   package Blocks
     package Types
       type Extrapolation = enumeration(HoldLastPoint, LastTwoPoints, Periodic, NoExtrapolation);
+      type Smoothness = enumeration(
+          LinearSegments, ContinuousDerivative, ConstantSegments, MonotoneContinuousDerivative1,
+          MonotoneContinuousDerivative2, ModifiedContinuousDerivative);
+      type TimeEvents = enumeration(Always, AtDiscontinuities, NoTimeEvents);
       type Init = enumeration(NoInit, SteadyState, InitialState, InitialOutput);
     end Types;
 
@@ -45,6 +69,8 @@ package Modelica
       block CombiTimeTable
         parameter Integer columns[:];
         parameter Modelica.Blocks.Types.Extrapolation extrapolation;
+        parameter Modelica.Blocks.Types.Smoothness smoothness;
+        parameter Modelica.Blocks.Types.TimeEvents timeEvents;
         parameter Real table[:, :];
         Modelica.Blocks.Interfaces.RealOutput y[size(columns, 1)];
       equation
@@ -53,6 +79,21 @@ package Modelica
         end for;
       end CombiTimeTable;
     end Sources;
+
+    package Tables
+      block CombiTable1Ds
+        parameter Integer columns[:];
+        parameter Modelica.Blocks.Types.Extrapolation extrapolation;
+        parameter Real table[:, :];
+        Modelica.Blocks.Interfaces.RealInput u;
+        Modelica.Blocks.Interfaces.RealOutput y[size(columns, 1)];
+      equation
+        for k in 1:size(columns, 1) loop
+          y[k] = if extrapolation == Modelica.Blocks.Types.Extrapolation.HoldLastPoint
+            then hold(u, table, columns[k]) else extend(u, table, columns[k]);
+        end for;
+      end CombiTable1Ds;
+    end Tables;
   end Blocks;
 
   package Mechanics
@@ -190,6 +231,14 @@ package Modelica
         equation
           flange.tau = -tau;
         end Torque;
+
+        model Torque2
+          extends Interfaces.PartialTwoFlanges;
+          Modelica.Blocks.Interfaces.RealInput tau;
+        equation
+          flange_a.tau = tau;
+          flange_b.tau = -tau;
+        end Torque2;
 
         model ConstantTorque
           Interfaces.Flange_b flange;

@@ -99,6 +99,7 @@ impl<T: Number> DualClutch<T> {
                 name: const { Name::new_inline("engine") },
                 node: engine.clone(),
                 input: const { Name::new_inline(ENGINE_TORQUE) },
+                reaction: None,
                 number: PhantomData,
             }),
             Element::Gear(Gear {

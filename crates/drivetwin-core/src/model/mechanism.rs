@@ -55,6 +55,8 @@ pub struct Constraint<T> {
 /// Kinetic energy `½ inertia (row · ω)²`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertia<T> {
+    /// Element that states it.
+    pub element: Name,
     /// Speed that carries the inertia.
     pub row: Row<T>,
     /// kg·m².
@@ -213,13 +215,13 @@ pub enum ForceLaw<T> {
     },
 }
 
-/// A torque on one node, positive with its speed.
+/// A torque on one node or, with opposite sign, on another as well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Force<T> {
     /// Element that states it.
     pub element: Name,
-    /// Node it acts on.
-    pub node: usize,
+    /// Nodes it acts on; 1 where it is positive with the speed.
+    pub nodes: Row<T>,
     /// Its value.
     pub law: ForceLaw<T>,
     /// Time constant of a first-order lag between law and torque, s.
@@ -258,6 +260,13 @@ pub struct Mechanism<T> {
     pub forces: Vec<Force<T>>,
     /// Nodes whose speeds are inputs.
     pub prescribed: Vec<Prescribed>,
+}
+
+impl<T> SpringLaw<T> {
+    /// Return true for a piecewise linear compliance.
+    pub fn has_regions(&self) -> bool {
+        matches!(self, Self::Regions { .. })
+    }
 }
 
 impl<T: Number> TwistForm<T> {
@@ -308,6 +317,11 @@ impl<T: Number> Mechanism<T> {
     /// Index of an input, added on first use.
     pub fn input(&mut self, name: &Name) -> usize {
         index_of(&mut self.inputs, name)
+    }
+
+    /// Linear form with the speed of one node.
+    pub fn single(node: usize) -> Row<T> {
+        Row::from_elem((node, T::of(1.0)), 1)
     }
 
     /// Linear form over named nodes; entries at the ground drop out.

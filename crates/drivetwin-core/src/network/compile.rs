@@ -9,7 +9,6 @@ use super::nonlinear_torque::{NonlinearTorque, TorqueLaw};
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
 use crate::model::{Driveline, FrictionLaw, Name};
 use crate::number::Number;
-use smallvec::smallvec;
 
 /// Most friction elements and lossy gears together: the bits of a mode key.
 pub const MAX_ROWS: usize = 32;
@@ -53,6 +52,8 @@ pub struct LossyGear<T> {
 /// A torque that is a channel or a lagging state.
 #[derive(Clone, Debug)]
 pub struct AppliedTorque<T> {
+    /// Element that it belongs to.
+    pub element: Name,
     /// Position of its value in the basis.
     pub basis: usize,
     /// Nodes it acts on.
@@ -354,7 +355,8 @@ impl<T: Number> Network<T> {
                 self.channels
                     .push(NonlinearTorque { law: TorqueLaw::Regions(regions.clone()), arguments });
                 let nodes = spring.row.iter().map(|&(node, c)| (node, -c)).collect();
-                self.applied_torques.push(AppliedTorque { basis, nodes, account: None });
+                let element = spring.element.clone();
+                self.applied_torques.push(AppliedTorque { element, basis, nodes, account: None });
             }
         }
         for force in &self.mechanism.forces {
@@ -372,8 +374,9 @@ impl<T: Number> Network<T> {
             if let ForceLaw::Constant(_) = force.law {
                 continue;
             }
-            let nodes = smallvec![(force.node, T::of(1.0))];
-            self.applied_torques.push(AppliedTorque { basis, nodes, account: Some(force.account) });
+            let (nodes, element) = (force.nodes.clone(), force.element.clone());
+            let account = Some(force.account);
+            self.applied_torques.push(AppliedTorque { element, basis, nodes, account });
         }
     }
 
@@ -422,7 +425,9 @@ impl<T: Number> Network<T> {
         }
         for force in &self.mechanism.forces {
             if let ForceLaw::Constant(torque) = force.law {
-                f[(force.node, self.one())] += torque;
+                for &(node, way) in &force.nodes {
+                    f[(node, self.one())] += way * torque;
+                }
             }
         }
         for drive in &self.applied_torques {

@@ -73,7 +73,7 @@ impl<T: Number> Network<T> {
             && !m.frictions.iter().any(|f| touches(&f.row))
             && !m.constraints.iter().any(|c| c.loss.is_some() && touches(&c.row))
             && !m.prescribed.iter().any(|p| moves(p.node))
-            && m.forces.iter().all(|f| (given(&f.law) || !moves(f.node)) && !reads(&f.law))
+            && m.forces.iter().all(|f| (given(&f.law) || !touches(&f.nodes)) && !reads(&f.law))
     }
 }
 
@@ -123,7 +123,7 @@ impl<T: Number> Balance<'_, T> {
     fn add_torques(&self, i: usize, own: &Matrix<T>, damped: bool, sum: &mut [T]) -> Option<()> {
         let mut lag = self.network.first_lag();
         for force in &self.network.mechanism.forces {
-            let arm = own[(force.node, i)];
+            let arm = arm(own, &force.nodes, i);
             let position = match (&force.law, force.lag) {
                 (_, Some(_)) => lag,
                 (ForceLaw::Input(input), None) => self.network.first_input() + input,
@@ -157,7 +157,7 @@ impl<T: Number> Balance<'_, T> {
             }
             for force in &self.network.mechanism.forces {
                 if let ForceLaw::Constant(torque) = force.law {
-                    right[(row, springs)] += own[(force.node, i)] * torque;
+                    right[(row, springs)] += arm(own, &force.nodes, i) * torque;
                 }
             }
         }
@@ -172,4 +172,9 @@ impl<T: Number> Balance<'_, T> {
         }
         Some(twists)
     }
+}
+
+/// Speed of a row of nodes per speed of member `i`.
+fn arm<T: Number>(own: &Matrix<T>, row: &Row<T>, i: usize) -> T {
+    row.iter().fold(T::zero_(), |sum, &(node, c)| sum + c * own[(node, i)])
 }

@@ -21,6 +21,7 @@ mod massless;
 pub mod mobility;
 mod mode;
 pub mod nonlinear_torque;
+mod port_torque;
 pub mod reduction;
 pub mod smooth_law;
 mod spectral_radius;

@@ -61,6 +61,15 @@ impl ModeKey {
         key
     }
 
+    /// State of lossy gear `i`.
+    pub(super) fn gear(self, i: usize) -> GearState {
+        if self.locked >> i & 1 == 1 {
+            return GearState::Locked;
+        }
+        let sign = if self.reverse >> i & 1 == 1 { -1.0 } else { 1.0 };
+        GearState::Meshing { sign, power_reversed: self.power_reversed >> i & 1 == 1 }
+    }
+
     /// Rows that keep a speed at zero: friction elements, then gears.
     pub fn rows(self) -> Vec<RowId> {
         bits(self.stuck).map(RowId::Friction).chain(bits(self.locked).map(RowId::Gear)).collect()
@@ -83,6 +92,8 @@ pub struct Mode<T> {
     /// Their torques in that order (a held gear's is its loss torque), then the torques of
     /// prescribed speeds; rows × basis.
     pub stuck_torque: Matrix<T>,
+    /// See [`Mode::multipliers`].
+    multipliers: OnceLock<Matrix<T>>,
     /// See [`Mode::gear_torque`].
     gear_torque: OnceLock<Matrix<T>>,
     /// True if more rows stick than there are speeds to hold. The torque split then depends on the
@@ -127,6 +138,11 @@ impl<T: Number> Loss<T> {
             (LossLaw::Dissipative, false) => (self.eta, self.drag * sign),
             (LossLaw::Dissipative, true) => (self.eta_backward.recip(), self.drag_backward * sign),
         }
+    }
+
+    /// Drag torque of a rolling gear at its driving side, with the sign of motion.
+    pub(super) fn drag_torque(&self, sign: f64, power_reversed: bool) -> T {
+        self.factor(sign, power_reversed).1
     }
 
     /// Torque lost at the driving side of a rolling gear that `torque` enters.
@@ -194,6 +210,7 @@ impl<T: Number> Network<T> {
             rates: SparseRows::of(&derivative),
             spectral_radius: T::promote(spectral_radius_bound(&derivative)),
             derivative,
+            multipliers: OnceLock::new(),
             gear_torque: OnceLock::new(),
             stuck_torque: found.torque,
             stuck,
@@ -258,12 +275,15 @@ impl<T: Number> Network<T> {
 
     /// The constraints as their forces act on the nodes: the driven side of a rolling gear gets what its
     /// efficiency leaves.
-    fn force_rows(&self, key: ModeKey) -> Matrix<T> {
+    pub(super) fn force_rows(&self, key: ModeKey) -> Matrix<T> {
         constraint_matrix(&self.mechanism, |constraint| {
             let i = self.losses.iter().position(|loss| loss.constraint == constraint)?;
-            let held = key.locked >> i & 1 == 1;
-            let power_reversed = key.power_reversed >> i & 1 == 1;
-            (!held).then(|| self.losses[i].loss.factor(1.0, power_reversed).0)
+            match key.gear(i) {
+                GearState::Locked => None,
+                GearState::Meshing { power_reversed, .. } => {
+                    Some(self.losses[i].loss.factor(1.0, power_reversed).0)
+                }
+            }
         })
     }
 
@@ -271,11 +291,8 @@ impl<T: Number> Network<T> {
     fn with_drag(&self, key: ModeKey) -> Cow<'_, Matrix<T>> {
         let mut torques = Cow::Borrowed(&self.node_torques);
         for (i, gear) in self.losses.iter().enumerate() {
-            if key.locked >> i & 1 == 1 {
-                continue;
-            }
-            let sign = if key.reverse >> i & 1 == 1 { -1.0 } else { 1.0 };
-            let (_, drag) = gear.loss.factor(sign, key.power_reversed >> i & 1 == 1);
+            let GearState::Meshing { sign, power_reversed } = key.gear(i) else { continue };
+            let drag = gear.loss.drag_torque(sign, power_reversed);
             if is_zero(drag) {
                 continue;
             }
@@ -326,16 +343,23 @@ impl<T: Number> Network<T> {
         stuck.iter().map(weight).chain(prescribed).collect()
     }
 
-    /// Torque that enters each lossy gear at its driving side, computed from the residual of the node
-    /// balance, which has a solution.
+    /// Torque that enters each lossy gear at its driving side, see [`Self::multipliers`].
     pub(super) fn entering(&self, key: ModeKey, residual: &Matrix<T>) -> Matrix<T> {
+        self.multipliers(key, residual).select_rows(&self.lossy())
+    }
+
+    /// Constraints with a loss.
+    fn lossy(&self) -> Vec<usize> {
+        self.losses.iter().map(|loss| loss.constraint).collect()
+    }
+
+    /// Torque of each constraint on its first entry, computed from the residual of the node balance, which
+    /// has a solution.
+    fn multipliers(&self, key: ModeKey, residual: &Matrix<T>) -> Matrix<T> {
         let dependent = &self.coordinates.dependent;
         let balance = self.force_rows(key).select_columns(dependent).transposed();
         let residual = residual.select_rows(dependent);
-        let multipliers = solve(balance.clone(), residual.clone())
-            .unwrap_or_else(|_| least_norm(&balance, &residual));
-        let lossy: Vec<usize> = self.losses.iter().map(|loss| loss.constraint).collect();
-        multipliers.select_rows(&lossy)
+        solve(balance.clone(), residual.clone()).unwrap_or_else(|_| least_norm(&balance, &residual))
     }
 
     fn with_other_states(&self, acceleration: &Matrix<T>) -> Matrix<T> {
@@ -363,11 +387,10 @@ impl<T: Number> Mode<T> {
         Some(self.stuck_torque.row(position))
     }
 
-    /// Torque entering each lossy gear at its driving side, losses × basis: the multipliers of their
-    /// constraints from the balance of the dependent nodes, `D_depᵀ λ = (f - I ω')_dep`, and at rest
-    /// the loss torque on top. Computed when first asked for.
-    pub fn gear_torque(&self, network: &Network<T>) -> &Matrix<T> {
-        self.gear_torque.get_or_init(|| {
+    /// Multipliers of the constraints, constraints × basis, from the balance of the dependent nodes,
+    /// `D_depᵀ λ = (f - I ω')_dep`. Computed when first asked for.
+    pub(super) fn multipliers(&self, network: &Network<T>) -> &Matrix<T> {
+        self.multipliers.get_or_init(|| {
             let (_, nodes) = network.held_speeds(&self.stuck);
             let mut acceleration = Matrix::zeros(network.speeds(), network.basis());
             for i in 0..network.speeds() {
@@ -377,7 +400,15 @@ impl<T: Number> Mode<T> {
             let mut residual = network.with_drag(self.key).into_owned();
             subtract_held(&mut residual, &nodes, &self.stuck_torque);
             residual.subtract(&inertia.times(&acceleration));
-            let mut entering = network.entering(self.key, &residual);
+            network.multipliers(self.key, &residual)
+        })
+    }
+
+    /// Torque entering each lossy gear at its driving side, losses × basis: the multipliers of their
+    /// constraints, and at rest the loss torque on top. Computed when first asked for.
+    pub fn gear_torque(&self, network: &Network<T>) -> &Matrix<T> {
+        self.gear_torque.get_or_init(|| {
+            let mut entering = self.multipliers(network).select_rows(&network.lossy());
             for (position, &row) in self.stuck.iter().enumerate() {
                 if let RowId::Gear(i) = row {
                     let loss = self.stuck_torque.row(position);

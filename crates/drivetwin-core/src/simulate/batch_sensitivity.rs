@@ -3,12 +3,13 @@
 
 use super::batch::{Batch, Keep, Outcome, Sets, check_names, last_lock};
 use super::dual_clutch::DualClutchStart;
+use super::output::Output;
 use super::run::{Plan, RunOptions, SimulateError};
 use super::sensitivity::{
     LANES, Sampled, SensitivityError, apply_delays, check_corners, seed_variables,
 };
 use super::threads::share_out;
-use super::trajectory::{Output, Trajectory};
+use super::trajectory::Trajectory;
 use crate::model::dual_clutch::DualClutch;
 use crate::network::Network;
 use crate::number::Dual;

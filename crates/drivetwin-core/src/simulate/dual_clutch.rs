@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! A run of the dual-clutch driveline with its usual outputs.
 
+use super::output::Output;
 use super::run::{Plan, RunOptions, SimulateError};
 use super::start::{StartError, State, state_of};
-use super::trajectory::{Output, Trajectory};
+use super::trajectory::Trajectory;
 use crate::model::dual_clutch::{DualClutch, ENGINE, OUTPUT, SHAFT, WHEEL};
 use crate::network::Network;
 use crate::number::{Number, Real};

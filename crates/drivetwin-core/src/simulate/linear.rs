@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! The linear system of a driveline about an operating point in one friction mode.
 
+use super::output::Output;
 use super::run::SimulateError;
 use super::start::{StartError, find};
-use super::trajectory::Output;
 use crate::model::Name;
 use crate::model::mechanism::Normal;
 use crate::network::linalg::Matrix;
@@ -86,7 +86,9 @@ pub fn linearise(
                 row
             }
         };
-        let row = over(&output.find(network)?.row(network, torque));
+        let row = output.find(network)?.row(network, &mode, torque);
+        let row =
+            over(&row.ok_or_else(|| StartError::NotLinear { output: format!("{output:?}") })?);
         linear.c.row_mut(i).copy_from_slice(&row[..n]);
         linear.d.row_mut(i).copy_from_slice(&row[n..]);
     }

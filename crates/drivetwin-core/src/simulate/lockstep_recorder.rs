@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! Chosen outputs of several runs side by side.
 
-use super::trajectory::{Column, Entry, Target, output_terms, value};
+use super::output::Target;
+use super::trajectory::{Column, Entry, output_terms, value};
 use crate::network::Network;
 use crate::number::{FOUR, KernelFloat, Number, transpose};
 use crate::solver::{

@@ -4,9 +4,11 @@
 mod batch;
 mod batch_sensitivity;
 mod dual_clutch;
+mod element_power;
 mod energy_balance;
 mod linear;
 mod lockstep_recorder;
+mod output;
 mod output_buffer;
 mod run;
 mod sensitivity;
@@ -23,7 +25,8 @@ pub use dual_clutch::{
 };
 pub use energy_balance::EnergyAudit;
 pub use linear::{Linear, Slipping, linearise};
+pub use output::Output;
 pub use run::{Plan, RunOptions, SimulateError, run, run_network};
 pub use sensitivity::{Sampled, Sensitivities, SensitivityError, dual_clutch_sensitivities};
 pub use start::{Start, StartError, State};
-pub use trajectory::{Output, Trajectory};
+pub use trajectory::Trajectory;

@@ -2,11 +2,12 @@
 //! One run of a network over a time grid.
 
 use super::energy_balance::EnergyBalance;
+use super::output::{Output, Target};
 use super::start::{Start, StartError, State};
-use super::trajectory::{Output, Recorder, Target, Trajectory};
+use super::trajectory::{Recorder, Trajectory};
 use crate::model::Name;
 use crate::network::{CompileError, Mode, ModeKey, Network};
-use crate::number::Real;
+use crate::number::{Number, Real};
 use crate::solver::{
     InputError, Inputs, Integrator, MAX_SPECTRAL_STEP_SLIPPING, Settings, Signal, SolverCache,
     Status, supports_fixed_step,
@@ -78,8 +79,7 @@ impl<T: Real> Plan<T> {
         check_grid(grid)?;
         let find = |output: &Output| output.find(network);
         let targets = outputs.iter().map(find).collect::<Result<Vec<_>, _>>()?;
-        // Between samples, the motion is available from the expansion only.
-        let motion = |target: &Target| matches!(target, Target::Angle(_));
+        let motion = |target: &Target| target.needs_expansion(network);
         let sprint = settings.exponential_steps && !audit && !targets.iter().any(motion);
         let sampled =
             |(_, signal): &(_, _)| !T::DERIVATIVES || matches!(signal, Signal::Samples { .. });
@@ -96,7 +96,7 @@ impl<T: Real> Plan<T> {
 
     /// Refuse a network that lacks an element of an output: a road load without rolling resistance holds
     /// nothing.
-    pub(super) fn check<N>(&self, network: &Network<N>) -> Result<(), SimulateError> {
+    pub(super) fn check<N: Number>(&self, network: &Network<N>) -> Result<(), SimulateError> {
         Ok(self.outputs.iter().try_for_each(|output| output.find(network).map(drop))?)
     }
 
@@ -175,7 +175,10 @@ pub fn run<T: Real>(
     options: RunOptions,
 ) -> Result<Trajectory<T>, SimulateError> {
     let plan = Plan::new(network, signals, grid, outputs, options)?;
-    Ok(plan.run(network, &start.state(network)?))
+    let start = start.state(network)?;
+    let first = |&(_, input): &(_, usize)| plan.inputs.start_value(input);
+    start.check_locks(network, &network.prescribed.iter().map(first).collect::<Vec<_>>())?;
+    Ok(plan.run(network, &start))
 }
 
 /// [`run`] over plain numbers, compiled once for all callers.

@@ -51,6 +51,12 @@ pub enum StartError {
         /// Node or shaft.
         name: String,
     },
+    /// A power or energy among the outputs of a linear model.
+    #[error("{output} is no linear function of states and inputs")]
+    NotLinear {
+        /// The output.
+        output: String,
+    },
     /// Too few speeds.
     #[error(
         "the start leaves speeds undetermined: state the speed of {} as well, or lock an element \
@@ -66,6 +72,20 @@ pub enum StartError {
     Overrun {
         /// The one-way clutch.
         element: String,
+        /// Slip, rad/s.
+        slip: f64,
+    },
+    /// An element to start without slip between members whose speeds are prescribed.
+    #[error(
+        "{element} starts locked, but with {} its slip is {slip:.4} rad/s; take {element} out of the \
+         locked elements, or begin the prescribed speeds without that slip",
+        drivers.join(" and ")
+    )]
+    LockContradicted {
+        /// The locked element.
+        element: String,
+        /// Prescribed speeds and other locked elements that determine its slip.
+        drivers: Vec<String>,
         /// Slip, rad/s.
         slip: f64,
     },
@@ -93,6 +113,49 @@ impl<T: Number> Start<T> {
         let (speeds, twists) = (by_name(&self.speeds), by_name(&self.twists));
         state_of(network, &speeds, &twists, &self.locked)
     }
+}
+
+impl<T: Number> State<T> {
+    /// Refuse a locked element whose slip follows from prescribed speeds, `prescribed` [rad/s] in their order,
+    /// and is not zero.
+    pub fn check_locks(&self, network: &Network<T>, prescribed: &[T]) -> Result<(), StartError> {
+        let count = prescribed.len();
+        let speeds = network.prescribed.iter().map(|(speed, _)| &speed[..]);
+        let slips = self.locked.iter().map(|&j| &network.frictions[j].slip[..]);
+        let rows: Vec<&[T]> = speeds.chain(slips).collect();
+        let kept = independent_rows(&matrix(&rows, network.speeds()));
+        let largest = prescribed.iter().fold(0.0, |l: f64, w| l.max(w.re().leading().abs()));
+        for (i, &j) in (count..rows.len()).zip(&self.locked).filter(|(i, _)| !kept.contains(i)) {
+            let weights = combination(&kept.iter().map(|&k| rows[k]).collect::<Vec<_>>(), rows[i]);
+            let counts = |k: usize| weights[(k, 0)].re().decide(|weight| weight.abs() > 1e-9);
+            let slip = (0..kept.len())
+                .filter(|&k| kept[k] < count)
+                .fold(T::zero_(), |sum, k| sum + weights[(k, 0)] * prescribed[kept[k]]);
+            // The impulse of the start names what a blocking one-way clutch stands against.
+            let blocks = network.frictions[j].one_way && slip.re().decide(|slip| slip > 0.0);
+            if !blocks && slip.re().decide(|slip| slip.abs() > 1e-6 * (1.0 + largest)) {
+                let name = |k: usize| match kept[k].checked_sub(count) {
+                    None => format!(
+                        "prescribed speed {}",
+                        network.mechanism.prescribed[kept[k]].element
+                    ),
+                    Some(k) => format!("locked {}", network.frictions[self.locked[k]].element),
+                };
+                return Err(StartError::LockContradicted {
+                    element: network.frictions[j].element.to_string(),
+                    drivers: (0..kept.len()).filter(|&k| counts(k)).map(name).collect(),
+                    slip: slip.re().leading(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Weights of `rows` in `row`, which is a combination of them; rows × 1.
+fn combination<T: Number>(rows: &[&[T]], row: &[T]) -> Matrix<T> {
+    let target = matrix(&[row], row.len()).transposed();
+    least_norm(&matrix(rows, row.len()).transposed(), &target)
 }
 
 /// Values by the names of what has them.
@@ -222,9 +285,7 @@ fn missing<T: Number>(network: &Network<T>, rows: &[&[T]]) -> Vec<String> {
 /// Of the nodes with stated speeds that were kept, those that a row is a combination of.
 fn determining<T: Number>(stated: &[(&str, &[T], T)], keep: &[usize], row: &[T]) -> Vec<String> {
     let kept: Vec<_> = keep.iter().filter_map(|&i| stated.get(i)).collect();
-    let rows: Vec<&[T]> = kept.iter().map(|(_, row, _)| *row).collect();
-    let target = matrix(&[row], row.len()).transposed();
-    let weights = least_norm(&matrix(&rows, row.len()).transposed(), &target);
+    let weights = combination(&kept.iter().map(|(_, row, _)| *row).collect::<Vec<_>>(), row);
     let counts = |i: &usize| weights[(*i, 0)].re().decide(|weight| weight.abs() > 1e-9);
     (0..kept.len()).filter(counts).map(|i| format!("that of {:?}", kept[i].0)).collect()
 }

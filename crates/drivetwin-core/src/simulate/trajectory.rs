@@ -1,89 +1,40 @@
 // SPDX-License-Identifier: MIT
 //! Chosen outputs on a time grid.
 
+use super::element_power::{ElementPower, GAUSS, element_energy, evaluate_terms, terms};
 use super::energy_balance::EnergyAudit;
+use super::output::Target;
 use super::output_buffer::{OutputBlock, OutputBuffer, OutputMask};
-use super::start::{StartError, find};
-use crate::model::mechanism::SpringLaw;
+use crate::model::Name;
 use crate::network::linalg::is_zero;
 use crate::network::nonlinear_torque::form;
-use crate::network::{Network, RowId};
+use crate::network::{Mode, Network, RowId};
 use crate::number::{Number, Real};
 use crate::solver::{
     Event, FrictionState, HybridState, Integrator, Kernel, SampleRange, SampleSink, Samples,
     Status, Step, dispatch_simd,
 };
-use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// A quantity to record, by the name of its node or element.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Output {
-    /// Speed of a node, rad/s.
-    Speed(String),
-    /// Angle that a node has turned since the start, rad.
-    Angle(String),
-    /// Twist of a shaft, rad.
-    Twist(String),
-    /// Torque of a shaft on its driven end, N·m.
-    ShaftTorque(String),
-    /// Slip of a friction element, rad/s.
-    Slip(String),
-    /// Torque of a friction element on its driven side, N·m.
-    FrictionTorque(String),
-}
-
-/// An output by the index of its node or element.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Target {
-    /// Node.
-    Speed(usize),
-    /// Node.
-    Angle(usize),
-    /// Shaft.
-    Twist(usize),
-    /// Shaft.
-    ShaftTorque(usize),
-    /// Friction element.
-    Slip(usize),
-    /// Friction element.
-    FrictionTorque(usize),
-}
-
-impl Output {
-    pub(super) fn find<T>(&self, network: &Network<T>) -> Result<Target, StartError> {
-        let m = &network.mechanism;
-        let node = |name| find("node", name, m.nodes.iter());
-        let shaft = |name| find("shaft", name, m.springs.iter().map(|s| &s.element));
-        let friction =
-            |name| find("friction element", name, m.frictions.iter().map(|f| &f.element));
-        Ok(match self {
-            Self::Speed(name) => Target::Speed(node(name)?),
-            Self::Angle(name) => Target::Angle(node(name)?),
-            Self::Twist(name) => Target::Twist(shaft(name)?),
-            Self::ShaftTorque(name) => Target::ShaftTorque(shaft(name)?),
-            Self::Slip(name) => Target::Slip(friction(name)?),
-            Self::FrictionTorque(name) => Target::FrictionTorque(friction(name)?),
-        })
-    }
-}
-
 impl Target {
-    /// The target over the basis; `friction` gives the row of a friction torque. An angle counts as its
-    /// rate.
+    /// The target over the basis of a mode; `friction` gives the row of a friction torque. An angle counts
+    /// as its rate. `None` for a quantity that is no linear form.
     pub(super) fn row(
         self,
         network: &Network<f64>,
+        mode: &Mode<f64>,
         friction: impl Fn(usize) -> Vec<f64>,
-    ) -> Vec<f64> {
+    ) -> Option<Vec<f64>> {
         let mut row = vec![0.0; network.basis()];
         match Column::of(network, self) {
             Column::Linear(terms) => terms.iter().for_each(|&(position, c)| row[position] += c),
             Column::Friction(j) => row = friction(j),
             Column::Angle(rate, _) => row[..rate.len()].copy_from_slice(&rate),
+            Column::Torque(element, node) => row = mode.port_torque(network, &element, node),
+            Column::Acceleration(node) => row = mode.acceleration(network, &[(node, 1.0)]),
+            _ => return None,
         }
-        row
+        Some(row)
     }
 }
 
@@ -95,6 +46,18 @@ pub(super) enum Column<T> {
     Angle(Vec<T>, T),
     /// Torque of a friction element.
     Friction(usize),
+    /// Torque of an element on a node.
+    Torque(Name, usize),
+    /// Acceleration of a node that is no follower.
+    Acceleration(usize),
+    /// Rate of a linear form over states and inputs.
+    Rate(Vec<T>),
+    /// Power of an element.
+    Power(ElementPower<T>),
+    /// Integral of a power, and its value at the start of the present step.
+    Work(ElementPower<T>, T),
+    /// Energy that an element stores.
+    Energy(Name),
 }
 
 /// Result of a run. Columns in the order of the outputs asked for, each as long as `time`; NaN
@@ -142,27 +105,58 @@ impl<'g, T: Real> Recorder<'g, T> {
     /// Record the grid points before the end of the step; `last` includes the end.
     pub fn sample(&mut self, run: &Integrator<'_, T>, step: &Step<T>, last: bool) {
         let (start, end) = (step.start.re(), (step.start + step.length).re());
+        for column in &mut self.columns {
+            if let Column::Power(power) | Column::Work(power, _) = column {
+                power.enter_mode(&run.state);
+            }
+        }
         while let Some(&t) = self.grid.get(self.next) {
             if t > end || (t == end && !last) {
                 break;
             }
             let h = if t >= start { -step.start + t } else { T::zero_() };
             let state = &run.state;
+            let mut works = self.works(state, h).into_iter();
             state.expansion.basis_at(state.network, h, &mut self.basis);
             for (output, column) in self.columns.iter().enumerate() {
                 let value = match column {
                     Column::Angle(row, angle) => *angle + integral(state, row, h),
+                    Column::Work(_, work) => *work + works.next().unwrap_or(T::zero_()),
+                    Column::Rate(row) => rate(state, row, h),
                     other => value(other, state, &self.basis),
                 };
                 self.buffer.push(output, value);
             }
             self.next += 1;
         }
+        let mut works = self.works(&run.state, step.length).into_iter();
         for column in &mut self.columns {
-            if let Column::Angle(row, angle) = column {
-                *angle += integral(&run.state, row, step.length);
+            match column {
+                Column::Angle(row, angle) => *angle += integral(&run.state, row, step.length),
+                Column::Work(_, work) => *work += works.next().unwrap_or(T::zero_()),
+                _ => {}
             }
         }
+    }
+
+    /// Integrals of the powers of all works over the first `h` seconds of the present step, J.
+    fn works(&mut self, state: &HybridState<'_, T>, h: T) -> Vec<T> {
+        let works = self.columns.iter().filter_map(|column| match column {
+            Column::Work(power, _) => Some(power),
+            _ => None,
+        });
+        let works: Vec<_> = works.collect();
+        let mut sums = vec![T::zero_(); works.len()];
+        if works.is_empty() {
+            return sums;
+        }
+        for (node, weight) in GAUSS {
+            state.expansion.basis_at(state.network, h * node, &mut self.basis);
+            for (sum, power) in sums.iter_mut().zip(&works) {
+                *sum += power.at(state, &self.basis) * h * weight;
+            }
+        }
+        sums
     }
 
     /// Run to the end and record.
@@ -304,8 +298,18 @@ pub(super) fn output_terms<'c, T: Number>(
 ) -> Cow<'c, [(usize, T)]> {
     match column {
         Column::Linear(terms) => Cow::Borrowed(terms),
-        // Angles need the motion between samples: plans with them pass none.
-        Column::Angle(..) => Cow::Borrowed(&[]),
+        Column::Torque(element, node) => {
+            Cow::Owned(terms(&state.mode.port_torque(state.network, element, *node)))
+        }
+        Column::Acceleration(node) => {
+            Cow::Owned(terms(&state.mode.acceleration(state.network, &[(*node, T::of(1.0))])))
+        }
+        // These need the expansion: plans with them pass no samples.
+        Column::Angle(..)
+        | Column::Rate(_)
+        | Column::Power(_)
+        | Column::Work(..)
+        | Column::Energy(_) => Cow::Borrowed(&[]),
         Column::Friction(j) => Cow::Owned(match state.rows[*j] {
             FrictionState::Open => Vec::new(),
             FrictionState::Sticking => terms(holding_row(state, *j)),
@@ -320,35 +324,24 @@ impl<T: Number> Column<T> {
     /// Return the column of a target.
     pub fn of(network: &Network<T>, target: Target) -> Self {
         let speed = |node| network.over_basis(&[(node, T::of(1.0))]);
+        let name = |element: usize| network.elements()[element].clone();
+        let heat = |element| ElementPower::heat(name(element));
+        let power = |element| ElementPower::entering(network, name(element));
         match target {
             Target::Speed(node) => Self::Linear(terms(&speed(node))),
+            Target::Acceleration(node) if network.is_follower(node) => Self::Rate(speed(node)),
+            Target::Acceleration(node) => Self::Acceleration(node),
+            Target::Torque(element, node) => Self::Torque(name(element), node),
+            Target::Power(element) => Self::Power(power(element)),
+            Target::Loss(element) => Self::Power(heat(element)),
+            Target::Work(element) => Self::Work(power(element), T::zero_()),
+            Target::Heat(element) => Self::Work(heat(element), T::zero_()),
+            Target::Energy(element) => Self::Energy(name(element)),
             Target::Angle(node) => Self::Angle(speed(node), T::zero_()),
             Target::Twist(shaft) => Self::Linear(vec![(network.speeds() + shaft, T::of(1.0))]),
-            Target::ShaftTorque(shaft) => shaft_torque(network, shaft),
+            Target::ShaftTorque(shaft) => Self::Linear(terms(&network.spring_torque(shaft))),
             Target::Slip(element) => Self::Linear(terms(&network.frictions[element].slip)),
             Target::FrictionTorque(element) => Self::Friction(element),
-        }
-    }
-}
-
-/// Terms of a row that are not zero.
-fn terms<T: Number>(row: &[T]) -> Vec<(usize, T)> {
-    row.iter().copied().enumerate().filter(|&(_, c)| !is_zero(c)).collect()
-}
-
-fn shaft_torque<T: Number>(network: &Network<T>, i: usize) -> Column<T> {
-    match network.mechanism.springs[i].law {
-        SpringLaw::Linear { stiffness, damping } => {
-            let mut row: Vec<T> = network.twist_rates.row(i).iter().map(|&c| c * damping).collect();
-            row.resize(row.len().max(network.states()), T::zero_());
-            row[network.speeds() + i] += stiffness;
-            Column::Linear(terms(&row))
-        }
-        SpringLaw::Regions { .. } => {
-            let springs = &network.mechanism.springs[..i];
-            let backlashes =
-                springs.iter().filter(|s| matches!(s.law, SpringLaw::Regions { .. })).count();
-            Column::Linear(vec![(network.applied_torques[backlashes].basis, T::of(1.0))])
         }
     }
 }
@@ -356,10 +349,18 @@ fn shaft_torque<T: Number>(network: &Network<T>, i: usize) -> Column<T> {
 /// Value of a column from the basis at an instant; an angle is that at the start of the step.
 pub(super) fn value<T: Number>(column: &Column<T>, state: &HybridState<'_, T>, basis: &[T]) -> T {
     match column {
-        Column::Linear(terms) => {
-            terms.iter().fold(T::zero_(), |sum, &(position, c)| sum + c * basis[position])
+        Column::Linear(terms) => evaluate_terms(terms, basis),
+        Column::Angle(_, sum) | Column::Work(_, sum) => *sum,
+        Column::Torque(element, node) => {
+            form(&state.mode.port_torque(state.network, element, *node), basis)
         }
-        Column::Angle(_, angle) => *angle,
+        Column::Acceleration(node) => {
+            form(&state.mode.acceleration(state.network, &[(*node, T::of(1.0))]), basis)
+        }
+        Column::Power(power) => power.at(state, basis),
+        Column::Energy(element) => element_energy(state.network, element, basis),
+        // The expansion has it.
+        Column::Rate(_) => T::of(f64::NAN),
         Column::Friction(j) => match state.rows[*j] {
             FrictionState::Open => T::zero_(),
             FrictionState::Slipping { .. } | FrictionState::Saturated { .. } => {
@@ -373,6 +374,19 @@ pub(super) fn value<T: Number>(column: &Column<T>, state: &HybridState<'_, T>, b
 /// Torque of a stuck element over the basis.
 fn holding_row<'r, T: Number>(state: &'r HybridState<'_, T>, j: usize) -> &'r [T] {
     state.mode.holding_torque(RowId::Friction(j)).unwrap_or(&[])
+}
+
+/// Rate of a linear form over states and inputs, `h` seconds after the start of the present step.
+fn rate<T: Real>(state: &HybridState<'_, T>, row: &[T], h: T) -> T {
+    let given = state.expansion.inputs.iter();
+    let series = state.expansion.states.iter().chain(given);
+    row.iter().zip(series).filter(|(c, _)| !is_zero(**c)).fold(T::zero_(), |sum, (&c, series)| {
+        let mut value = T::zero_();
+        for k in (1..=state.expansion.order).rev() {
+            value = value * h + series[k] * k as f64;
+        }
+        sum + c * value
+    })
 }
 
 /// Angle turned within the first `h` seconds of the present step.

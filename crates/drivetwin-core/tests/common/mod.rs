@@ -25,7 +25,7 @@ pub fn inertia(node: &str, inertia: f64) -> Element<f64> {
 
 pub fn torque(node: &str, input: &str) -> Element<f64> {
     let (name, node, input) = (format!("source {input}").into(), node.into(), input.into());
-    Element::Torque(Torque { name, node, input, number: PhantomData })
+    Element::Torque(Torque { name, node, input, reaction: None, number: PhantomData })
 }
 
 pub fn gear(a: &str, b: &str, ratio: f64) -> Element<f64> {

@@ -66,8 +66,9 @@ def build_reference_files(
         related += [
             ("measured_shift.xml", "application/xml", "experiment/validation"),
             ("measured_shift-in.csv", "text/csv", "other"),
-            ("measured_shift-ref.csv", "text/csv", "result"),
         ]
+        results = (f"{_RESULTS[kind]}-ref.csv" for kind in _list_input_kinds(version))
+        related += [(name, "text/csv", "result") for name in results]
     manifest = _build_manifest(related, files)
     return {**files, f"{_FOLDER}/fmi-ls-manifest.xml": manifest}
 
@@ -84,32 +85,54 @@ def _format_parameters(subject: Subject) -> ParameterSet:
 def _build_experiment_files(
     subject: Subject, experiment: Experiment, version: FmiVersion
 ) -> dict[str, bytes]:
-    """Stimulus, reference result by the core, and the description of both.
-
-    FMI 2.0 takes inputs with their derivatives, FMI 3.0 holds them over a step.
-    """
-    kind = InputKind.LINEAR if version is FmiVersion.FMI2 else InputKind.HOLD
-    run = run_fixed_step(subject.model, subject.start, experiment.time, experiment.inputs, kind)
+    """Stimulus, reference results by the core, and the description of both."""
     variables = list_variables(subject)
     inputs = [one for one in variables if one.role is Role.INPUT]
     outputs = [one for one in variables if one.role is Role.OUTPUT][: len(_SPEEDS)]
-    results = np.column_stack([getattr(run, name) for name in _SPEEDS])
     root = ET.Element("Experiments", name=experiment.name)
-    times = {
+    files = {}
+    for kind in _list_input_kinds(version):
+        run = run_fixed_step(subject.model, subject.start, experiment.time, experiment.inputs, kind)
+        results = np.column_stack([getattr(run, name) for name in _SPEEDS])
+        name = _RESULTS[kind]
+        _add_experiment(root, experiment, kind)
+        files[f"{_FOLDER}/{name}-ref.csv"] = _format_csv(outputs, experiment.time, results)
+    return {
+        f"{_FOLDER}/measured_shift.xml": format_document(root).encode(),
+        f"{_FOLDER}/measured_shift-in.csv": _format_csv(inputs, experiment.time, experiment.inputs),
+        **files,
+    }
+
+
+_RESULTS = {InputKind.HOLD: "measured_shift", InputKind.LINEAR: "measured_shift_interpolated"}
+"""Name of the experiment with inputs held over a step, and interpolated by their derivatives."""
+
+
+def _list_input_kinds(version: FmiVersion) -> list[InputKind]:
+    """Kinds of inputs that an importer may set.
+
+    Held inputs are those of an importer that sets values only. FMI 2.0 has derivatives of inputs
+    beside; FMI 3.0 has not.
+    """
+    return list(_RESULTS) if version is FmiVersion.FMI2 else [InputKind.HOLD]
+
+
+def _add_experiment(root: ET.Element, experiment: Experiment, kind: InputKind) -> None:
+    meaning = {
+        InputKind.HOLD: "inputs held over a step",
+        InputKind.LINEAR: "inputs interpolated by fmi2SetRealInputDerivatives",
+    }
+    attributes = {
+        "name": _RESULTS[kind],
+        "description": f"{experiment.name}, {meaning[kind]}",
         "startTime": repr(float(experiment.time[0])),
         "stopTime": repr(float(experiment.time[-1])),
         "stepSize": repr(experiment.step),
     }
-    about = {"name": "measured_shift", "description": f"{experiment.name}, inputs {kind.value}"}
-    item = ET.SubElement(root, "Experiment", {**about, **times})
+    item = ET.SubElement(root, "Experiment", attributes)
     ET.SubElement(item, "Parameters", source=_PARAMETERS)
     ET.SubElement(item, "Stimuli", source="measured_shift-in.csv")
-    ET.SubElement(item, "References", source="measured_shift-ref.csv")
-    return {
-        f"{_FOLDER}/measured_shift.xml": format_document(root).encode(),
-        f"{_FOLDER}/measured_shift-in.csv": _format_csv(inputs, experiment.time, experiment.inputs),
-        f"{_FOLDER}/measured_shift-ref.csv": _format_csv(outputs, experiment.time, results),
-    }
+    ET.SubElement(item, "References", source=f"{_RESULTS[kind]}-ref.csv")
 
 
 _SPEEDS = ("engine_speed", "output_speed", "wheel_speed", "twist", "shaft_torque")

@@ -3,17 +3,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import (
     ROTATIONAL,
     Component,
+    Flanges,
     Modifiers,
     Names,
     Part,
     format_values,
 )
-from drivetwin.export.modelica.friction import build_bearing, build_clutch, build_one_way_clutch
-from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR
+from drivetwin.export.modelica.friction import (
+    GROUND,
+    build_bearing,
+    build_clutch,
+    build_one_way_clutch,
+)
+from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR, SPRING_TABLE, TYRE
 from drivetwin.export.modelica.text import format_matrix
 from drivetwin.simulation.network import Element
 
@@ -82,6 +90,20 @@ def _build_spring_damper(element: Element, names: Names) -> Part:
     return _build_compliance(f"{_COMPONENTS}.SpringDamper", modifiers, element, names)
 
 
+def _build_spring_table(element: Element, names: Names) -> Part:
+    rows = format_matrix(list(zip(element["twist"], element["torque"], strict=True)))
+    modifiers = (("characteristic", rows), *format_values(d=element["damping"]))
+    part = _build_compliance(SPRING_TABLE, modifiers, element, names)
+    return replace(part, helpers=frozenset({SPRING_TABLE}))
+
+
+def _build_tyre(element: Element, names: Names) -> Part:
+    modifiers = format_values(
+        slip_stiffness=element["slip_stiffness"], w_least=element["least_speed"]
+    )
+    return replace(_build_compliance(TYRE, modifiers, element, names), helpers=frozenset({TYRE}))
+
+
 def _build_backlash(element: Element, names: Names) -> Part:
     modifiers = format_values(c=element["stiffness"], d=element["damping"], b=element["gap"])
     return _build_compliance(f"{_COMPONENTS}.ElastoBacklash", modifiers, element, names)
@@ -129,8 +151,13 @@ def _build_road_load(element: Element, names: Names) -> Part:
 
 def _build_torque(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
-    source = Component(f"{_SOURCES}.Torque", name, (), (("flange", element["node"]),))
-    return Part((source,), (f"{name}.tau = {names.inputs[element['input']]};",))
+    equation = (f"{name}.tau = {names.inputs[element['input']]};",)
+    reaction = element.get("reaction")
+    if reaction is None or reaction == GROUND:
+        flanges: Flanges = (("flange", element["node"]),)
+        return Part((Component(f"{_SOURCES}.Torque", name, (), flanges),), equation)
+    between = (("flange_b", element["node"]), ("flange_a", reaction))
+    return Part((Component(f"{_SOURCES}.Torque2", name, (), between),), equation)
 
 
 def _build_speed_source(element: Element, names: Names) -> Part:
@@ -174,7 +201,9 @@ _TRANSLATIONS = {
     "one_way_clutch": build_one_way_clutch,
     "bearing": build_bearing,
     "spring_damper": _build_spring_damper,
+    "spring_table": _build_spring_table,
     "backlash": _build_backlash,
+    "tyre": _build_tyre,
     "torque_converter": _build_torque_converter,
     "road_load": _build_road_load,
     "torque": _build_torque,

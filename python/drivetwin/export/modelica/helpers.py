@@ -6,6 +6,8 @@ from __future__ import annotations
 SLIP_INERTIA = "SlipInertia"
 PAPER_GEAR = "ConstantEfficiencyGear"
 CONVERTER = "TorqueConverter"
+SPRING_TABLE = "SpringTable"
+TYRE = "TyreSlip"
 
 HELPERS = {
     SLIP_INERTIA: """\
@@ -30,6 +32,8 @@ HELPERS = {
   model TorqueConverter "Steady-state map over the speed ratio; flange_a is the pump"
     extends Modelica.Mechanics.Rotational.Interfaces.PartialTwoFlanges;
     parameter Real map[:, 3] "Speed ratio, capacity [N.m.s2/rad2], torque ratio";
+    constant Modelica.Units.SI.AngularVelocity w_small=1e-6
+      "Least pump speed that the turbine's is related to: the torque below it is nothing";
     Modelica.Units.SI.AngularVelocity w_pump;
     Modelica.Units.SI.AngularVelocity w_turbine;
     Modelica.Blocks.Tables.CombiTable1Ds table(
@@ -39,9 +43,38 @@ HELPERS = {
   equation
     w_pump = der(flange_a.phi);
     w_turbine = der(flange_b.phi);
-    table.u = w_turbine/w_pump;
+    table.u = w_turbine/noEvent(
+      if w_pump < 0 then min(w_pump, -w_small) else max(w_pump, w_small));
     flange_a.tau = table.y[1]*w_pump*abs(w_pump);
     flange_b.tau = -table.y[2]*flange_a.tau;
   end TorqueConverter;
+""",
+    SPRING_TABLE: """\
+  model SpringTable "Torque linear between points of twist, with a damper"
+    extends Modelica.Mechanics.Rotational.Interfaces.PartialCompliantWithRelativeStates;
+    parameter Real characteristic[:, 2] "Twist [rad], torque [N.m]; it goes on along its ends";
+    parameter Modelica.Units.SI.RotationalDampingConstant d "Damping";
+    Modelica.Blocks.Tables.CombiTable1Ds table(
+      table=characteristic,
+      columns={2},
+      extrapolation=Modelica.Blocks.Types.Extrapolation.LastTwoPoints);
+  equation
+    table.u = -phi_rel;
+    tau = d*w_rel - table.y[1];
+  end SpringTable;
+""",
+    TYRE: """\
+  model TyreSlip "Longitudinal force of a tyre over its slip; flange_b is the vehicle"
+    extends Modelica.Mechanics.Rotational.Interfaces.PartialTwoFlanges;
+    parameter Real slip_stiffness(unit="N.m") "Torque over slip";
+    parameter Modelica.Units.SI.AngularVelocity w_least "Least speed that the slip is related to";
+    Modelica.Units.SI.AngularVelocity w_vehicle;
+    Real slip "Speed of the rim above that of the vehicle, related to the latter";
+  equation
+    w_vehicle = der(flange_b.phi);
+    slip = (der(flange_a.phi) - w_vehicle)/noEvent(max(abs(w_vehicle), w_least));
+    flange_a.tau = slip_stiffness*slip;
+    flange_b.tau = -flange_a.tau;
+  end TyreSlip;
 """,
 }

@@ -8,22 +8,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
-import numpy as np
-
 from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import ROTATIONAL, Component, Names, Part
 from drivetwin.export.modelica.elements import build_part
 from drivetwin.export.modelica.friction import GROUND
 from drivetwin.export.modelica.helpers import HELPERS
-from drivetwin.export.modelica.start import build_initial_equations
-from drivetwin.export.modelica.text import (
-    format_matrix,
-    format_string,
-    make_identifier,
-    make_identifiers,
+from drivetwin.export.modelica.inputs import (
+    Inputs,
+    format_equations,
+    format_table,
+    select_sampled,
 )
+from drivetwin.export.modelica.start import build_initial_equations
+from drivetwin.export.modelica.text import format_string, make_identifier, make_identifiers
 from drivetwin.export.parameters.content import format_number
-from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.network import Element, Start
 
 MSL_VERSION = "4.0.0"
@@ -37,7 +35,7 @@ _TOLERANCE = 1e-8
 class Run:
     """Inputs by name and a start, from `time[0]` to `time[1]` [s]."""
 
-    inputs: Mapping[str, Signal]
+    inputs: Inputs
     start: Start
     time: tuple[float, float]
 
@@ -153,45 +151,14 @@ def _format_shift(
     lines = [
         "model Shift",
         "  Driveline driveline;",
-        "  Modelica.Blocks.Sources.CombiTimeTable inputs(",
-        f"    columns=2:{len(names.inputs) + 1},",
-        "    extrapolation=Modelica.Blocks.Types.Extrapolation.HoldLastPoint,",
-        f"    table={format_matrix(_build_table(names, run))});",
+        *format_table(select_sampled(names.inputs, run.inputs), run.time),
         "initial equation",
         *(f"  {line}" for line in start),
         "equation",
-        *(
-            f"  driveline.{plain} = inputs.y[{place}];"
-            for place, plain in enumerate(names.inputs.values(), 1)
-        ),
+        *(f"  {line}" for line in format_equations(names.inputs, run.inputs)),
         f"  annotation(experiment(StartTime={format_number(first)}, "
         f"StopTime={format_number(last)}, "
         f"Interval={format_number(_INTERVAL)}, Tolerance={format_number(_TOLERANCE)}));",
         "end Shift;\n",
     ]
     return "\n".join(f"  {line}" for line in lines)
-
-
-def _build_table(names: Names, run: Run) -> list[tuple[float, ...]]:
-    """Time and inputs at every sample of any input within the run, each linear in between.
-
-    Where an input jumps the time stands twice, as Modelica's table wants it.
-    """
-    first, last = run.time
-    signals = [run.inputs[name] for name in names.inputs]
-    moments = np.unique(np.concatenate([one.arrival for one in signals]))
-    jumps = np.concatenate([one.arrival[1:][np.diff(one.arrival) == 0.0] for one in signals])
-    inner = moments[(moments > first) & (moments < last)]
-    twice = inner[np.isin(inner, jumps)]
-    time: FloatArray = np.sort(np.concatenate([[first], inner, twice, [last]]))
-    ends = np.append(np.diff(time) == 0.0, True)  # rows that end what came before
-    columns = [
-        np.where(ends, _evaluate_left_limit(one, time), np.interp(time, one.arrival, one.values))
-        for one in signals
-    ]
-    return [tuple(float(value) for value in row) for row in zip(time, *columns, strict=True)]
-
-
-def _evaluate_left_limit(signal: Signal, time: FloatArray) -> FloatArray:
-    """Values at `time` (n,) [s]; at a jump the one before it."""
-    return np.interp(-time, -signal.arrival[::-1], signal.values[::-1])

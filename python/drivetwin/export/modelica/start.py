@@ -7,12 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from drivetwin.errors import InputError
 from drivetwin.export.modelica.friction import GROUND
 from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import FloatArray
 from drivetwin.simulation.network import Element, Start
 
-_COMPLIANT = ("spring_damper", "backlash")
+_COMPLIANT = ("spring_damper", "spring_table", "backlash")
 
 
 class _Independent:
@@ -51,6 +52,7 @@ def build_initial_equations(
         _build_row(pairs, index) for element in elements for pairs in _list_constraints(element)
     ]
     by_name = {str(element["name"]): element for element in elements}
+    _refuse_unknown(start, rests)
 
     speeds = _Independent(rigid, len(nodes))
     lines = [
@@ -79,7 +81,19 @@ def build_initial_equations(
     return lines
 
 
+def _refuse_unknown(start: Start, rests: Mapping[str, str]) -> None:
+    unknown = [name for name in start.locked if name not in rests]
+    if unknown:
+        raise InputError(
+            f"{', '.join(map(repr, unknown))} cannot start locked: no friction element",
+            f"lock friction elements only: {', '.join(rests) or 'there are none'}",
+        )
+
+
 def _get_slip_row(element: Element) -> tuple[tuple[str, float], ...]:
+    """Slip over the node speeds; that of a road load is the speed of its node."""
+    if element["type"] == "road_load":
+        return ((element["node"], 1.0),)
     return ((element["a"], 1.0), (element["b"], -1.0))
 
 
@@ -96,7 +110,7 @@ def _list_constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...
 
 
 def _list_nodes(element: Element) -> list[str]:
-    fields = ("node", "a", "b", "sun", "ring", "carrier", "pump", "turbine")
+    fields = ("node", "a", "b", "sun", "ring", "carrier", "pump", "turbine", "reaction")
     return [element[field] for field in fields if field in element]
 
 

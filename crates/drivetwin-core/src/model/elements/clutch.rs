@@ -48,7 +48,11 @@ impl<T: Number> Clutch<T> {
         let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, T::of(-1.0))]);
         let normal =
             Normal::Pressure { input: m.input(&self.pressure), gain: self.gain, p0: self.p0 };
-        m.inertias.push(Inertia { row: row.clone(), inertia: self.drum_inertia });
+        m.inertias.push(Inertia {
+            element: self.name.clone(),
+            row: row.clone(),
+            inertia: self.drum_inertia,
+        });
         m.frictions.push(Friction {
             element: self.name.clone(),
             row,

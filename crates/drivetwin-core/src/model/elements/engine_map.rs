@@ -38,6 +38,12 @@ impl<T: Number> EngineMap<T> {
         let node = m.node(&self.node);
         let law = ForceLaw::Map { input: m.input(&self.throttle), node, map: self.map.clone() };
         let (element, account) = (self.name.clone(), Account::Source);
-        m.forces.push(Force { element, node, law, lag: self.lag, account });
+        m.forces.push(Force {
+            element,
+            nodes: Mechanism::single(node),
+            law,
+            lag: self.lag,
+            account,
+        });
     }
 }

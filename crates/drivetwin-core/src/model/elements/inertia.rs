@@ -27,6 +27,7 @@ impl<T: Number> Inertia<T> {
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let row = m.row(&[(&self.node, T::of(1.0))]);
-        m.inertias.push(mechanism::Inertia { row, inertia: self.inertia });
+        let (element, inertia) = (self.name.clone(), self.inertia);
+        m.inertias.push(mechanism::Inertia { element, row, inertia });
     }
 }

@@ -47,7 +47,7 @@ impl<T: Number> Planetary<T> {
             // ω_planet = ω_carrier - (ω_sun - ω_carrier) N_sun / N_planet, N_planet = (N_ring - N_sun)/2
             let pinion = (self.z - 1.0).recip() * 2.0;
             let spin = m.row(&[(&self.carrier, pinion + 1.0), (&self.sun, -pinion)]);
-            m.inertias.push(Inertia { row: spin, inertia });
+            m.inertias.push(Inertia { element: self.name.clone(), row: spin, inertia });
         }
         m.constraints.push(Constraint { element: self.name.clone(), row, loss: None });
     }

@@ -20,7 +20,7 @@ pub struct RoadLoad<T> {
     pub constant: T,
     /// Rolling resistance, opposes the motion and holds the vehicle at rest, N·m. Must be >= 0.
     pub rolling: T,
-    /// ½ ρ c_d A r³, N·m·s²/rad². Must be >= 0.
+    /// ½ ρ c_d A r³, N·m·s²/rad²; one below zero drives.
     pub aero: T,
 }
 
@@ -29,14 +29,20 @@ impl<T: Number> RoadLoad<T> {
         require_moving(&self.name, &self.node)?;
         require(&self.name, "constant", self.constant.re(), |_| true, "finite")?;
         require(&self.name, "rolling", self.rolling.re(), |v| v >= 0.0, ">= 0 N m")?;
-        require(&self.name, "aero", self.aero.re(), |v| v >= 0.0, ">= 0 N m s^2/rad^2")
+        require(&self.name, "aero", self.aero.re(), |_| true, "finite")
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let node = m.node(&self.node);
         let mut force = |law| {
             let (element, account) = (self.name.clone(), Account::Load);
-            m.forces.push(Force { element, node, law, lag: None, account });
+            m.forces.push(Force {
+                element,
+                nodes: Mechanism::single(node),
+                law,
+                lag: None,
+                account,
+            });
         };
         force(ForceLaw::Constant(-self.constant));
         // Also where it is zero and something is differentiated by it.

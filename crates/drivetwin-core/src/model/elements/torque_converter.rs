@@ -40,7 +40,13 @@ impl<T: Number> TorqueConverter<T> {
             let map = self.map.clone();
             let law = ForceLaw::Converter { pump, turbine, map, at_turbine };
             let (element, account) = (self.name.clone(), Account::Converter);
-            m.forces.push(Force { element, node, law, lag: None, account });
+            m.forces.push(Force {
+                element,
+                nodes: Mechanism::single(node),
+                law,
+                lag: None,
+                account,
+            });
         }
     }
 }

@@ -38,7 +38,13 @@ impl<T: Number> Tyre<T> {
         for (node, stiffness) in [(wheel, -self.slip_stiffness), (road, self.slip_stiffness)] {
             let law = ForceLaw::Slip { wheel, road, stiffness, least_speed };
             let (element, account) = (self.name.clone(), Account::Converter);
-            m.forces.push(Force { element, node, law, lag: None, account });
+            m.forces.push(Force {
+                element,
+                nodes: Mechanism::single(node),
+                law,
+                lag: None,
+                account,
+            });
         }
     }
 }

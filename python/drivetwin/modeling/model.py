@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Models of drivelines, one line per element.
+
+model = Model("brake test")
+wheel = model.inertia("wheel", 1.5)
+brake = model.clutch("brake", wheel, model.ground, pressure=[(0, 0), (1, 50)])
+model.start({wheel: 100.0})
+run = model.simulate(2.0)
+run[brake.power], run.events.of(brake)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from drivetwin._util.spelling import suggest_spelling
+from drivetwin.export.modelica.model import Run, format_package
+from drivetwin.modeling.draw import draw_schematic
+from drivetwin.modeling.element_methods import ElementMethods, Place
+from drivetwin.modeling.inputs import make_input
+from drivetwin.modeling.part import Part
+from drivetwin.modeling.run import ModelRun
+from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
+from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
+from drivetwin.simulation.network import Output, Sine, Start, simulate
+
+_SAMPLING = 1e-3
+"""Interval of the samples of a run that states its end only, s."""
+
+
+class Model(ElementMethods):
+    """A driveline: elements, their inputs and a start.
+
+    An element method takes the places of its ports: a node, a port of another element, an element
+    with one port, or the name of a node. A port that is left out gets a node of its own.
+    """
+
+    def start(
+        self,
+        speeds: Mapping[Place, float] | None = None,
+        *,
+        twists: Mapping[Part | str, float] | None = None,
+        locked: Sequence[Part | str] = (),
+    ) -> None:
+        """Set the start: speeds of nodes [rad/s], twists of shafts [rad], elements without slip.
+
+        Gears, locked elements and prescribed speeds determine what is not stated.
+        """
+        self._speeds = dict(speeds or {})
+        self._twists = dict(twists or {})
+        self._locked = tuple(locked)
+
+    def simulate(
+        self,
+        time: float | FloatArray,
+        *,
+        record: Sequence[Output] | None = None,
+        audit: bool = False,
+        accuracy: Accuracy | None = None,
+    ) -> ModelRun:
+        """Simulate from time 0 to `time` [s], or on the instants `time` (n,) [s].
+
+        Parameters
+        ----------
+        time
+            End of the run, which is then sampled each millisecond, or instants.
+        record
+            Quantities to record; all that the model has if None. Without powers, works and
+            energies a run may pass samples by exact operators, which is faster.
+        audit
+            True for the energy balance by the solver.
+        accuracy
+            Settings of the integration.
+
+        Raises
+        ------
+        InputError
+            With all faults of the model.
+        """
+        grid = self._make_grid(time)
+        start = self._resolve_start()
+        outputs = self.list_outputs() if record is None else list(record)
+        inputs = self._make_inputs((float(grid[0]), float(grid[-1])))
+        elements = [part.element for part in self.parts]
+        run = simulate(elements, inputs, start, grid, outputs, audit=audit, accuracy=accuracy)
+        return ModelRun(run)
+
+    def list_outputs(self) -> list[Output]:
+        """List everything that a run records."""
+        nodes = [node for node in self.nodes if node is not self.ground]
+        of_nodes = [output for node in nodes for output in (node.speed, node.acceleration)]
+        return [*of_nodes, *(one for part in self.parts for one in part.list_outputs(self.ground))]
+
+    def draw(self) -> str:
+        """Return a schematic as SVG text: nodes as vertical lines, elements as boxes."""
+        return draw_schematic(self.name, self.parts, self.ground)
+
+    def to_modelica(self, time: float | None = None) -> str:
+        """Return a Modelica package; with the end `time` [s], inputs and start are in it too."""
+        refuse_faults(self._find_faults())
+        run = None
+        if time is not None:
+            span = (0.0, float(time))
+            run = Run(self._make_inputs(span), self._resolve_start(), span)
+        return format_package(self.name, [part.element for part in self.parts], run)
+
+    def _make_grid(self, time: float | FloatArray) -> FloatArray:
+        if np.ndim(time) > 0:
+            return np.asarray(time, dtype=np.float64)
+        end = float(time)
+        count = round(end / _SAMPLING) if np.isfinite(end) else 0
+        return np.linspace(0.0, end, max(count, 1) + 1)
+
+    def _make_inputs(self, span: tuple[float, float]) -> dict[str, Signal | Sine]:
+        return {name: make_input(name, value, span) for name, value in self.inputs.items()}
+
+    def _resolve_start(self) -> Start:
+        refuse_faults(self._find_faults())
+        speeds = {self._get_node(at).name: float(speed) for at, speed in self._speeds.items()}
+        twists = {_get_name(part): float(twist) for part, twist in self._twists.items()}
+        return Start(speeds, twists, tuple(_get_name(part) for part in self._locked))
+
+    def _find_faults(self) -> list[str]:
+        """All faults of elements and start, with suggestions for misspelt names."""
+        faults = [*self.faults, *find_element_faults([part.element for part in self.parts])]
+        nodes = [node.name for node in self.nodes]
+        for at in self._speeds:
+            if isinstance(at, str) and at not in nodes:
+                faults.append(f"start: no node {at!r}{suggest_spelling(at, nodes)}")
+        names = [part.name for part in self.parts]
+        for part in (*self._twists, *self._locked):
+            if _get_name(part) not in names:
+                hint = suggest_spelling(_get_name(part), names)
+                faults.append(f"start: no element {_get_name(part)!r}{hint}")
+        return faults
+
+
+def _get_name(part: Part | str) -> str:
+    return part if isinstance(part, str) else part.name
