@@ -119,9 +119,45 @@ def test_limits_out_of_reach_leave_no_files(
     assert not out.exists()
 
 
+def test_front_and_map_are_in_the_files(
+    twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[limits]\nshift_time_s = 1.2\n")
+    out = tmp_path / "out"
+    given = ["calibrate", str(twin), "--shift", "2-3", "--limits", str(limits), "-o", str(out)]
+    grid = "torque=1200:1400:2,speed=1600:1800:2"
+    assert main([*given, "--draws", "60", "--front", "--map", grid, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    content = read_calibration_file(out / "calibration.toml")
+    assert [one.model_dump(mode="json") for one in content.front] == found["front"]
+    assert [one.model_dump(mode="json") for one in content.map] == found["map"]
+    assert len(content.map) == 4
+    assert {one.engine_torque_Nm for one in content.map} == {1200.0, 1400.0}
+    assert content.point.engine_torque_Nm == 1400.0
+    (main_point,) = [
+        one
+        for one in content.map
+        if one.engine_torque_Nm == 1400.0 and one.engine_speed_rad_s > 180.0
+    ]
+    assert main_point.parameters == {n: one.value for n, one in content.parameters.items()}
+    times = [one.shift_time_s for one in content.front]
+    assert times == sorted(times)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Comfort, energy and time" in page
+    assert "Map over the operating points" in page
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (("--shift", "2-3", "--map", "torque=1:2,speed=3"), "no grid of operating points"),
+        (("--shift", "2-3", "--map", "torque=nan:2:3,speed=1:2:2"), "no grid of operating points"),
+        (("--shift", "2-3", "--map", "torque=1:2:1,speed=1:2:2"), "at least two that increase"),
+        (
+            ("--shift", "2-3", "--map", "torque=1:2:2,speed=1:2:2", "--engine-speed", "900"),
+            "leave out --engine-torque and --engine-speed",
+        ),
         (("--shift", "2"), "does not name two gears"),
         (("--shift", "2-7"), "knows no gear '7'"),
         (("--shift", "3-2"), "downshift with the power on"),

@@ -86,10 +86,15 @@ def calibrate(task: Task) -> Calibration:
     return Calibration(task, before, after, fresh, plant.count.runs)
 
 
-def make_quick_plant(task: Task) -> Plant:
-    """Build the plant that computes what the optimiser needs."""
-    wanted = (Metric.PEAK_JERK, *(one.metric for one in task.limits))
+def make_quick_plant(task: Task, *more: Metric) -> Plant:
+    """Build the plant that computes what the optimiser needs, and the metrics `more`."""
+    wanted = (Metric.PEAK_JERK, *(one.metric for one in task.limits), *more)
     return Plant(task.maneuver, task.settings.threads, tuple(dict.fromkeys(wanted)))
+
+
+def set_coarse_step(plant: Plant) -> Plant:
+    """Return the plant with the sampling step of the search, which takes half of the time."""
+    return replace(plant, maneuver=plant.maneuver.set_step(max(plant.maneuver.step, _COARSE)))
 
 
 def find_best(task: Task, plant: Plant) -> FloatArray:
@@ -125,10 +130,23 @@ def build_objective(task: Task, plant: Plant) -> Objective:
     return whole.tighten(settings.margin)
 
 
+def polish_from(task: Task, plant: Plant, start: FloatArray) -> Candidate:
+    """Polish coordinates (q,) that come from a neighbouring calibration."""
+    space, settings = Space(task.policy), task.settings
+    draws = draw_for(task, settings.neighbour_draws, Purpose.POLISH)
+
+    def run(coordinates: FloatArray) -> Outcome:
+        return plant.evaluate(space.build_profiles(coordinates), draws)
+
+    wider = replace(settings, margin=settings.neighbour_margin)
+    objective = build_objective(replace(task, settings=wider), plant)
+    return polish(run, start, objective, settings.neighbour_iterations)
+
+
 def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
     settings, space = task.settings, Space(task.policy)
     draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
-    coarse = replace(plant, maneuver=task.maneuver.set_step(max(task.maneuver.step, _COARSE)))
+    coarse = set_coarse_step(plant)
 
     def evaluate(coordinates: FloatArray) -> float:
         return objective.evaluate(coarse.evaluate(space.build_profiles(coordinates), draws))
