@@ -4,9 +4,9 @@
     python -m benchmarks.calibration_points [SEED]
 
 Prints CPU time and number of points of the front, and of a 3 x 3 map over 800 to 1400 N·m and 165
-to 205 rad/s; and for the centre of each cell the 95 % peak jerk of the interpolated values over that
-of a calibration of its own. Stated bounds: a front of at least 10 points within 20 s of CPU, the map
-within 40 s, between its points at most 30 % worse.
+to 205 rad/s; and for the centre of each cell the 95 % peak jerk of the interpolated values over
+that of a calibration of its own. Stated bounds: a front of at least 10 points within 20 s of CPU,
+the map within 40 s, between its points at most 30 % worse.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from tests.support.upshift.statement import BAR
 _SYSTEM = 10.0 * BAR
 _GRID = Grid((800.0, 1100.0, 1400.0), (165.0, 185.0, 205.0))
 _POINTS, _FRONT_CPU, _MAP_CPU, _WORSE = 10, 20.0, 40.0, 1.3
-"""Stated bounds: points and CPU time [s] of the front, CPU time of the map, ratio between points."""
+"""Stated bounds: points and CPU time [s] of the front, CPU time [s] of the map, ratio between."""
 
 
 def make_at(point: OperatingPoint, seed: int) -> Task:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.calibration.calibrate import polish_from
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.export.parameters.files import read_parameters
@@ -197,3 +198,41 @@ def test_an_interrupt_leaves_nothing(
     assert code == 130
     assert not out.exists()
     assert list(tmp_path.iterdir()) == []
+    assert not out.with_name("out.resume.json").exists()
+
+
+def test_an_interrupted_calibration_continues_to_the_same_result(
+    twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[limits]\nshift_time_s = 1.2\n")
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    given = ["calibrate", str(twin), "--shift", "2-3", "--limits", str(limits), "--front"]
+    assert main([*given, *SHORT, "-o", str(whole)]) == 0
+    kept = out.with_name("out.resume.json")
+    calls = iter(range(100))
+
+    def stop_later(*arguments: object) -> object:
+        if next(calls) == 3:
+            raise KeyboardInterrupt
+        return polish_from(*arguments)  # type: ignore[arg-type]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("drivetwin.calibration.front.polish_from", stop_later)
+        assert main([*given, *SHORT, "-o", str(out)]) == 130
+    assert not out.exists()
+    assert len(json.loads(kept.read_text(encoding="utf-8"))["stages"]) == 4
+    limits.write_text("[limits]\nshift_time_s = 1.1\n")
+    assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 2
+    assert "another limits file" in capsys.readouterr().err
+    limits.write_text("[limits]\nshift_time_s = 1.2\n")
+    assert main([*given, *SHORT, "-o", str(out), "--resume", "--seed", "2"]) == 2
+    assert "another seed" in capsys.readouterr().err
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("drivetwin.calibration.calibrate.find_best", None)  # the search is finished
+        assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 0
+    assert not kept.exists()
+    for name in ("calibration.toml", "certificate.json", "calibration.dcm"):
+        assert (out / name).read_bytes() == (whole / name).read_bytes()
+    assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 2
+    assert "no interrupted calibration" in capsys.readouterr().err

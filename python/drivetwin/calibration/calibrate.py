@@ -20,6 +20,7 @@ from drivetwin.calibration.profiles import Policy, Profiles, Space
 from drivetwin.calibration.scenarios import DrawModel, Purpose, Scenarios, draw_scenarios
 from drivetwin.calibration.search import Candidate, search_minima
 from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 from drivetwin.errors import InfeasibleError
 
 _COARSE = 2e-3
@@ -68,8 +69,8 @@ class Calibration:
     runs: int
 
 
-def calibrate(task: Task) -> Calibration:
-    """Search, polish and certify a calibration.
+def calibrate(task: Task, stages: Stages = NO_STAGES) -> Calibration:
+    """Search, polish and certify a calibration; `stages` may have its coordinates already.
 
     Raises InfeasibleError where the best calibration found exceeds a limit by more than 1 % on
     fresh draws, and MissingExtraError without the library of the search.
@@ -77,7 +78,9 @@ def calibrate(task: Task) -> Calibration:
     settings, space = task.settings, Space(task.policy)
     quick = make_quick_plant(task)
     with scale_progress(0.0, 0.9):
-        best = find_best(task, quick)
+        name = name_stage("calibration", task.maneuver.point)
+        size = (quick, len(space.free))
+        best = run_stage(stages, name, size, lambda: find_best(task, quick))
     plant = replace(quick, metrics=tuple(Metric))
     with scale_progress(0.9, 1.0, "certifying on fresh draws"):
         fresh = draw_for(task, settings.certificate_draws, Purpose.CERTIFICATE)

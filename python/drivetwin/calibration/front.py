@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Statistic
 from drivetwin.calibration.profiles import Space
 from drivetwin.calibration.scenarios import Purpose, Scenarios
+from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 
 _LIMITS = (0.96, 0.92, 0.88, 0.84, 0.80, 0.76)
 """Limits of what an arm moves, over that of the calibration."""
@@ -78,8 +80,8 @@ class Front:
     runs: int
 
 
-def trace_front(found: Calibration) -> Front:
-    """Trace the front from a calibration along both arms."""
+def trace_front(found: Calibration, stages: Stages = NO_STAGES) -> Front:
+    """Trace the front from a calibration along both arms; `stages` may have its first points."""
     task, plant = found.task, make_quick_plant(found.task, *_FIGURES)
     coarse = set_coarse_step(plant)
     fresh = draw_for(task, task.settings.neighbour_fresh_draws, Purpose.CERTIFICATE)
@@ -96,10 +98,19 @@ def trace_front(found: Calibration) -> Front:
         for limits in bounds:
             share = (len(points) - 1) / total
             with scale_progress(share, share + 1.0 / total, "tracing the front"):
-                at = polish_from(task.set_limits(limits), coarse, at).coordinates
+                at = run_stage(
+                    stages,
+                    f"{name_stage('front', task.maneuver.point)} {len(points)}",
+                    (plant, at.size),
+                    partial(_polish, task.set_limits(limits), coarse, at),
+                )
             points.append(_assess(task, plant, fresh, (arm, at)))
     kept = select_nondominated(points)
     return Front(tuple(sorted(kept, key=lambda one: one.time)), len(points), plant.count.runs)
+
+
+def _polish(task: Task, plant: Plant, start: FloatArray) -> FloatArray:
+    return np.asarray(polish_from(task, plant, start).coordinates)
 
 
 def select_nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -29,10 +30,12 @@ from drivetwin.calibration.calibrate import (
     polish_from,
     set_coarse_step,
 )
+from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.profiles import Space
 from drivetwin.calibration.scenarios import Purpose
+from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 from drivetwin.errors import InputError
 
 MakeTask = Callable[[OperatingPoint], Task]
@@ -116,15 +119,15 @@ class OperatingMap:
         return _interpolate(self.grid, self.points, point)
 
 
-def calibrate_map(make_task: MakeTask, grid: Grid) -> OperatingMap:
-    """Calibrate all points of a grid.
+def calibrate_map(make_task: MakeTask, grid: Grid, stages: Stages = NO_STAGES) -> OperatingMap:
+    """Calibrate all points of a grid; `stages` may have some of them.
 
     Raises InfeasibleError where the start cannot keep the limits, and InputError for an operating
     point that has no such policy. Other points may exceed a limit; their certificates say so.
     """
     tasks = {place: make_task(grid.get_point(place)) for place in grid.places}
     with scale_progress(0.0, 0.6):
-        main = calibrate(tasks[grid.start])
+        main = calibrate(tasks[grid.start], stages)
     space = Space(main.task.policy)
     coordinates = {grid.start: space.to_coordinates(main.after.values)}
     points, runs = {grid.start: MapPoint(main.task, main.after)}, main.runs
@@ -134,14 +137,22 @@ def calibrate_map(make_task: MakeTask, grid: Grid) -> OperatingMap:
         near = min(coordinates, key=lambda one: _measure_distance(one, place))
         share = 0.6 + 0.4 * number / len(rest)
         with scale_progress(share, share + 0.4 / len(rest), "calibrating the map"):
-            found = polish_from(task, set_coarse_step(plant), coordinates[near])
-        coordinates[place] = found.coordinates
-        points[place] = _assess(task, Space(task.policy).to_values(found.coordinates))
+            coordinates[place] = run_stage(
+                stages,
+                name_stage("map", grid.get_point(place)),
+                (plant, coordinates[near].size),
+                partial(_polish, task, plant, coordinates[near]),
+            )
+        points[place] = _assess(task, Space(task.policy).to_values(coordinates[place]))
         runs += plant.count.runs
     between = tuple(
         _assess(make_task(one), _interpolate(grid, points, one)) for one in grid.centres
     )
     return OperatingMap(grid, main, points, between, runs)
+
+
+def _polish(task: Task, plant: Plant, start: FloatArray) -> FloatArray:
+    return np.asarray(polish_from(task, set_coarse_step(plant), start).coordinates)
 
 
 def _measure_distance(one: Place, other: Place) -> int:

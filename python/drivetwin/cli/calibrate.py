@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,19 +24,22 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
-from drivetwin.errors import IdentificationError, InputError, Where
+from drivetwin.errors import DrivetwinError, IdentificationError, InputError, Where
 
 if TYPE_CHECKING:
     from drivetwin.calibration.calibrate import Calibration
     from drivetwin.calibration.front import Front
     from drivetwin.calibration.operating_map import Grid, OperatingMap
     from drivetwin.calibration.twin_task import Request
+    from drivetwin.files.stages_file import StagesFile
     from drivetwin.findings import Finding
     from drivetwin.twin.twin import Twin
 
     Results = tuple[Calibration, Front | None, OperatingMap | None]
 
 CALIBRATION, CERTIFICATE, REPORT = "calibration.toml", "certificate.json", "report.html"
+_RESUME = ".resume.json"
+"""Ending of the file beside the output folder that has the stages of an interrupted calibration."""
 
 
 def calibrate(
@@ -90,6 +94,10 @@ def calibrate(
             "from, to, points).",
         ),
     ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Continue an interrupted calibration from DIR.resume.json."),
+    ] = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Find shift profiles that keep peak jerk small over the spread of made units.
@@ -97,11 +105,9 @@ def calibrate(
     Minimises the tail mean of peak jerk under limits, and certifies the result on fresh draws.
     DIR gets calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx.
     """
-    from drivetwin.calibration.calibrate import calibrate as run_calibration
-    from drivetwin.calibration.front import trace_front
     from drivetwin.calibration.identified_range import check_identified_range
     from drivetwin.calibration.settings import CalibrationSettings
-    from drivetwin.calibration.twin_task import Request, build_task
+    from drivetwin.calibration.twin_task import Request
     from drivetwin.cli.export import parse_gears
     from drivetwin.files.limits_file import Requirements, load_limits
 
@@ -121,31 +127,80 @@ def calibrate(
         seed=seed,
         settings=CalibrationSettings(certificate_draws=draws).scale_effort(effort),
     )
-    mapped = None
-    with show_step(f"calibrating {shift} of {model.name}"):
-        if grid is None:
-            found = run_calibration(build_task(model, request))
-        else:
-            mapped = _calibrate_grid(model, request, grid)
-            found = mapped.main
-    traced = None
-    if front:
-        with show_step("tracing the front"):
-            traced = trace_front(found)
-    around = traced, mapped
+    named = {
+        "shift": shift,
+        "engine torque": repr(engine_torque),
+        "engine speed": repr(engine_speed),
+        "system pressure": repr(system_pressure),
+        "wheel radius": repr(wheel_radius),
+        "policy": policy.value,
+        "effort": repr(effort),
+        "number of draws": str(draws),
+        "seed": str(seed),
+    }
+    stages = _open_stages(output, {"twin": twin, "limits": limits, "start": start}, named, resume)
+    results = _calibrate(model, request, (grid, front), stages)
+    found = results[0]
     findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
     with show_step(f"writing {output}"):
-        _write_results(output, (found, *around), findings, (model, request, twin))
+        _write_results(output, results, findings, (model, request, twin))
+    stages.remove()
     if as_json:
-        print_json(_to_document((found, *around), findings, output))
+        print_json(_to_document(results, findings, output))
         return
     _print_results(found)
-    _print_around(*around)
+    _print_around(*results[1:])
     print_findings(findings)
     print_line(f"wrote {output / REPORT}")
 
 
-def _calibrate_grid(twin: Twin, request: Request, text: str) -> OperatingMap:
+def _open_stages(
+    output: Path, files: Mapping[str, Path | None], named: Mapping[str, str], resume: bool
+) -> StagesFile:
+    """Open the store of finished stages beside the output folder."""
+    from drivetwin._util.version import get_program_version
+    from drivetwin.files.calibration_file import hash_file
+    from drivetwin.files.stages_file import StagesFile, resume_stages
+
+    contents = {
+        f"{name} file": "" if path is None else hash_file(path) for name, path in files.items()
+    }
+    inputs = {**contents, **named, "program version": get_program_version()}
+    whole = output.resolve()
+    path = whole.parent / f"{whole.name}{_RESUME}"
+    return resume_stages(path, inputs) if resume else StagesFile(path, inputs)
+
+
+def _calibrate(
+    twin: Twin, request: Request, wanted: tuple[str | None, bool], stages: StagesFile
+) -> Results:
+    """Calibrate, with the map and the front if wanted.
+
+    An error removes the finished stages: they would lead to it again. An interrupt leaves them.
+    """
+    from drivetwin.calibration.calibrate import calibrate as run_calibration
+    from drivetwin.calibration.front import trace_front
+    from drivetwin.calibration.twin_task import build_task
+
+    grid, front = wanted
+    try:
+        with show_step(f"calibrating {'-'.join(request.gears)} of {twin.name}"):
+            mapped = None if grid is None else _calibrate_grid(twin, request, grid, stages)
+            found = (
+                run_calibration(build_task(twin, request), stages)
+                if mapped is None
+                else mapped.main
+            )
+        if not front:
+            return found, None, mapped
+        with show_step("tracing the front"):
+            return found, trace_front(found, stages), mapped
+    except DrivetwinError:
+        stages.remove()
+        raise
+
+
+def _calibrate_grid(twin: Twin, request: Request, text: str, stages: StagesFile) -> OperatingMap:
     from drivetwin.calibration.calibrate import Task
     from drivetwin.calibration.maneuver import OperatingPoint
     from drivetwin.calibration.operating_map import calibrate_map
@@ -161,7 +216,7 @@ def _calibrate_grid(twin: Twin, request: Request, text: str) -> OperatingMap:
         torque, speed = point.engine_torque, point.engine_speed
         return build_task(twin, replace(request, engine_torque=torque, engine_speed=speed))
 
-    return calibrate_map(make_task, parse_grid(text))
+    return calibrate_map(make_task, parse_grid(text), stages)
 
 
 def parse_grid(text: str) -> Grid:
