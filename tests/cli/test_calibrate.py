@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -142,6 +143,13 @@ def test_front_and_map_are_in_the_files(
         if one.engine_torque_Nm == 1400.0 and one.engine_speed_rad_s > 180.0
     ]
     assert main_point.parameters == {n: one.value for n, one in content.parameters.items()}
+    for suffix in ("csv", "dcm", "cdfx"):
+        curves = {one.name: one for one in read_parameters(out / f"calibration.{suffix}").curves}
+        assert len(curves) == 3 + 2 * len(content.parameters)
+        (kiss,) = (one for name, one in curves.items() if "kiss_pressure.1200" in name)
+        assert kiss.axis.points == pytest.approx((1600 * math.pi / 30, 1800 * math.pi / 30))
+        expected = [one.parameters["kiss_pressure"] for one in content.map[:2]]
+        assert kiss.values == tuple(expected)
     times = [one.shift_time_s for one in content.front]
     assert times == sorted(times)
     page = (out / "report.html").read_text(encoding="utf-8")

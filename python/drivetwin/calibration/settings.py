@@ -38,7 +38,7 @@ class CalibrationSettings:
     """Largest number of linear programs of the polish."""
     tail_iterations: int = 8
     """Largest number of linear programs of the last polish."""
-    neighbour_draws: int = 48
+    neighbour_draws: int = 40
     """Scenarios by which a point of the front or of a map is polished."""
     neighbour_iterations: int = 4
     """Largest number of linear programs for a point of the front or of a map."""

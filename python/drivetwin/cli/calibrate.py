@@ -313,7 +313,7 @@ def _write_results(
         request.spread,
     )
     name = f"{twin.name} {label}"
-    content = collect_calibration(found, name)
+    content = collect_calibration(found, name, mapped)
     with write_atomically(output) as folder:
         write_calibration_file(
             folder / CALIBRATION, build_calibration_file(found, provenance, front, mapped)
