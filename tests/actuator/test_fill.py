@@ -62,3 +62,17 @@ def test_a_fill_that_does_not_end_stays_at_the_spring() -> None:
     assert acting.values[:3] / BAR == pytest.approx([0.0, 1.0, 1.0])
     full = 1.0 + (10.0 - np.sqrt(2.0)) / 1.0 + 1.0
     assert acting.time[-1] == pytest.approx(full)
+
+
+@given(st.integers(1, 40), st.floats(0.05, 0.4), st.floats(1.2, 9.0))
+def test_a_clutch_is_full_at_the_same_time_however_often_the_command_is_repeated(
+    parts: int, fill_time: float, level: float
+) -> None:
+    # The last part ends where the clutch becomes full, as far as time resolves it.
+    stroke = Stroke(1.0 * BAR, fill_time)
+    full = 100.0 + fill_time / np.sqrt(level - 1.0)
+    times = [0.0, *np.linspace(100.0, full, parts + 1).tolist()]
+    levels = [0.0] + [level + 1e-9 * k for k in range(parts + 1)]
+    acting = stroke.limit_pressure(hold(*zip(times, levels, strict=True)))
+    late = acting.evaluate(np.array([full + 1e-6, full + 10.0]))
+    assert late / BAR == pytest.approx([level, level])

@@ -60,6 +60,8 @@ class Stroke:
         for begin, end, value in zip(valve.time.tolist(), ends, valve.values.tolist(), strict=True):
             rate = self.compute_rate(value)
             full = begin + (1.0 - filled) / rate if rate > 0.0 else inf
+            if full <= begin:  # the rest of the volume is below the resolution of time
+                filled = 1.0
             times.append(begin)
             values.append(min(value, self.kiss_pressure) if filled < 1.0 else value)
             if rate > 0.0 and begin < full < end:
