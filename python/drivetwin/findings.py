@@ -114,6 +114,8 @@ class Code(StrEnum):
     SIMULATION_ENDED_EARLY = auto()
     SIMULATION_DIVERGES = auto()
     OUTSIDE_IDENTIFIED_RANGE = auto()
+    ACTUATOR_NOT_IDENTIFIED = auto()
+    ACTUATOR_UNDETERMINED = auto()
     NOT_VALIDATED = auto()
     NOT_PREDICTED = auto()
     FRICTION_LAW_SUBSTITUTED = auto()

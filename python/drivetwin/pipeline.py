@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.data.actuators import identify_actuators
 from drivetwin.estimation.data.compare_logs import require_compatible
 from drivetwin.estimation.data.prepare import DetectedShifts, prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
@@ -42,7 +43,8 @@ def identify(
     IdentificationError
         If the data cannot carry the method.
     """
-    return identify_prepared(_prepare_checked(log, card, shifts), method)
+    found = identify_prepared(_prepare_checked(log, card, shifts), method)
+    return attach_actuators(found, [log], card)
 
 
 def identify_jointly(
@@ -59,7 +61,15 @@ def identify_jointly(
         pairs = zip(logs, shifts, strict=True)
         prepared = [_prepare_checked(log, card, found) for log, found in pairs]
     with scale_progress(0.05, 1.0):
-        return identify_joint(prepared)
+        return attach_actuators(identify_joint(prepared), logs, card)
+
+
+def attach_actuators(
+    found: Identification, logs: Sequence[ShiftLog], card: VehicleCard
+) -> Identification:
+    """Attach the actuators of the elements whose command and pressure the logs contain."""
+    actuators, findings = identify_actuators(logs, card)
+    return replace(found, actuators=actuators, findings=(*found.findings, *findings))
 
 
 def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> PreparedLog:

@@ -36,6 +36,9 @@ QUICK = CalibrationSettings(
     polish_draws=6,
     tail_draws=8,
     certificate_draws=60,
+    neighbour_draws=6,
+    neighbour_iterations=1,
+    neighbour_fresh_draws=20,
     polish_iterations=2,
     tail_iterations=1,
 )

@@ -92,6 +92,7 @@ def test_plain_names() -> None:
         ("shift_in_process", "TransShiftInProcess|Schaltung aktiv"),
         ("lockup_engaged", "TransTorqueConverterLockupEngaged|WK_zu"),
         ("pressure_command.K1", "p_K1_soll|pK1Cmd|p_soll_K1|K1 Druck Vorgabe|Soll_Druck_K1"),
+        ("pressure_command.K1", "PrsClu1Cmd|Soll_Druck_Kupplung_1|p_soll_Kupplung1"),
         ("pressure.K1", "p_K1|pK1_ist|p_ist_K1|Druck K1|Druck_Kupplung_1|PrsClu1|K1-Druck"),
     ],
 )

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from drivetwin.calibration.calibrate import polish_from
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.export.parameters.files import read_parameters
@@ -119,9 +121,52 @@ def test_limits_out_of_reach_leave_no_files(
     assert not out.exists()
 
 
+def test_front_and_map_are_in_the_files(
+    twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[limits]\nshift_time_s = 1.2\n")
+    out = tmp_path / "out"
+    given = ["calibrate", str(twin), "--shift", "2-3", "--limits", str(limits), "-o", str(out)]
+    grid = "torque=1200:1400:2,speed=1600:1800:2"
+    assert main([*given, "--draws", "60", "--front", "--map", grid, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    content = read_calibration_file(out / "calibration.toml")
+    assert [one.model_dump(mode="json") for one in content.front] == found["front"]
+    assert [one.model_dump(mode="json") for one in content.map] == found["map"]
+    assert len(content.map) == 4
+    assert {one.engine_torque_Nm for one in content.map} == {1200.0, 1400.0}
+    assert content.point.engine_torque_Nm == 1400.0
+    (main_point,) = [
+        one
+        for one in content.map
+        if one.engine_torque_Nm == 1400.0 and one.engine_speed_rad_s > 180.0
+    ]
+    assert main_point.parameters == {n: one.value for n, one in content.parameters.items()}
+    for suffix in ("csv", "dcm", "cdfx"):
+        curves = {one.name: one for one in read_parameters(out / f"calibration.{suffix}").curves}
+        assert len(curves) == 3 + 2 * len(content.parameters)
+        (kiss,) = (one for name, one in curves.items() if "kiss_pressure.1200" in name)
+        assert kiss.axis.points == pytest.approx((1600 * math.pi / 30, 1800 * math.pi / 30))
+        expected = [one.parameters["kiss_pressure"] for one in content.map[:2]]
+        assert kiss.values == tuple(expected)
+    times = [one.shift_time_s for one in content.front]
+    assert times == sorted(times)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Comfort, energy and time" in page
+    assert "Map over the operating points" in page
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (("--shift", "2-3", "--map", "torque=1:2,speed=3"), "no grid of operating points"),
+        (("--shift", "2-3", "--map", "torque=nan:2:3,speed=1:2:2"), "no grid of operating points"),
+        (("--shift", "2-3", "--map", "torque=1:2:1,speed=1:2:2"), "at least two that increase"),
+        (
+            ("--shift", "2-3", "--map", "torque=1:2:2,speed=1:2:2", "--engine-speed", "900"),
+            "leave out --engine-torque and --engine-speed",
+        ),
         (("--shift", "2"), "does not name two gears"),
         (("--shift", "2-7"), "knows no gear '7'"),
         (("--shift", "3-2"), "downshift with the power on"),
@@ -161,3 +206,41 @@ def test_an_interrupt_leaves_nothing(
     assert code == 130
     assert not out.exists()
     assert list(tmp_path.iterdir()) == []
+    assert not out.with_name("out.resume.json").exists()
+
+
+def test_an_interrupted_calibration_continues_to_the_same_result(
+    twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[limits]\nshift_time_s = 1.2\n")
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    given = ["calibrate", str(twin), "--shift", "2-3", "--limits", str(limits), "--front"]
+    assert main([*given, *SHORT, "-o", str(whole)]) == 0
+    kept = out.with_name("out.resume.json")
+    calls = iter(range(100))
+
+    def stop_later(*arguments: object) -> object:
+        if next(calls) == 3:
+            raise KeyboardInterrupt
+        return polish_from(*arguments)  # type: ignore[arg-type]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("drivetwin.calibration.front.polish_from", stop_later)
+        assert main([*given, *SHORT, "-o", str(out)]) == 130
+    assert not out.exists()
+    assert len(json.loads(kept.read_text(encoding="utf-8"))["stages"]) == 4
+    limits.write_text("[limits]\nshift_time_s = 1.1\n")
+    assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 2
+    assert "another limits file" in capsys.readouterr().err
+    limits.write_text("[limits]\nshift_time_s = 1.2\n")
+    assert main([*given, *SHORT, "-o", str(out), "--resume", "--seed", "2"]) == 2
+    assert "another seed" in capsys.readouterr().err
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("drivetwin.calibration.calibrate.find_best", None)  # the search is finished
+        assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 0
+    assert not kept.exists()
+    for name in ("calibration.toml", "certificate.json", "calibration.dcm"):
+        assert (out / name).read_bytes() == (whole / name).read_bytes()
+    assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 2
+    assert "no interrupted calibration" in capsys.readouterr().err

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.dyno.actuators import Actuator, Fill, Program, Vibration
+from drivetwin.actuator.model import ActuatorModel
+from drivetwin.dyno.actuators import Actuator, ControlledActuator, Fill, Program, Vibration
 from drivetwin.errors import InputError
 
 TIME = np.arange(2001) / 1000.0
@@ -70,3 +71,19 @@ def test_a_clutch_that_is_full_follows_its_command() -> None:
         Actuator(command, 0.01, 0.02, fill=each).compute_pressure(TIME) for each in (fill, None)
     )
     assert np.array_equal(with_fill, without)
+
+
+def test_a_controller_holds_its_command_for_a_task() -> None:
+    ramp = Program(((0.5, 0.0), (1.5, 1e6)))
+    controlled = ControlledActuator(ramp, ActuatorModel(0.02, 0.01, 0.01), task=0.01)
+    command = controlled.compute_command(2.0)
+    assert command.evaluate(np.array([0.7049, 0.705, 0.7101])).tolist() == [2e5, 2e5, 2.1e5]
+    pressure = controlled.compute_pressure(TIME)
+    late = 0.02 + 0.5 * 0.01 + 2.0 * 0.01  # dead time, mean hold, both stages of the lag
+    assert np.interp(1.0, TIME, pressure) == pytest.approx(1e6 * (0.5 - late), rel=0.01)
+
+
+@pytest.mark.parametrize("task", [0.0, -0.01])
+def test_a_task_without_time_is_refused(task: float) -> None:
+    with pytest.raises(InputError, match="controller task"):
+        ControlledActuator(Program(((0.0, 1.0),)), ActuatorModel(0.02, 0.01, 0.01), task)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from drivetwin.dyno.actuators import Actuator
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
@@ -47,6 +48,7 @@ def test_the_on_coming_element_fills_before_it_carries(bench: DynoRun) -> None:
     """The pressure stays below P0 while the piston moves, although the valve is at boost."""
     scenario = bench.scenario
     actuator = scenario.actuators[scenario.oncoming]
+    assert isinstance(actuator, Actuator)
     assert actuator.fill is not None
     time = np.arange(round(1000 * scenario.duration)) / 1000.0
     pressure, asked = actuator.compute_pressure(time), actuator.command.evaluate(time)

@@ -7,11 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import tomlkit
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from drivetwin.actuator.identify import IdentifiedActuator
+from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
 from drivetwin.channels.read_options import BusOptions, ReadOptions
 from drivetwin.errors import ResultFileError
@@ -55,13 +58,60 @@ def test_a_wrong_entry_is_told_by_its_key(tmp_path: Path, key: str, value: Any, 
     [
         ("parameters", "k_o", "k_oo", "unknown parameter id 'k_oo'"),
         ("friction", "B3", "B7", "no element 'B7'"),
+        ("actuators", "B3", "B7", "no element 'B7'"),
     ],
 )
 def test_a_misspelt_name_is_told(tmp_path: Path, table: str, old: str, new: str, says: str) -> None:
     path = tmp_path / "twin.toml"
-    save_twin(path, build_twin(identification(), card()))
+    save_twin(path, replace(build_twin(identification(), card()), actuators={"B3": ACTUATOR}))
     document: Any = tomlkit.parse(path.read_text(encoding="utf-8"))
     document[table][new] = document[table].pop(old)
+    path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    with pytest.raises(ResultFileError, match=says):
+        load_twin(path)
+
+
+COVARIANCE = np.diag([1e-6, 1e-6, 2e-6, 1e-4, np.inf, np.inf, 1e4])
+COVARIANCE[0, 1] = COVARIANCE[1, 0] = 5e-7
+ACTUATOR = IdentifiedActuator(
+    ActuatorModel(0.02, 0.03, 0.04, 0.9, 8e4, 0.1, 1e4), COVARIANCE, 7e3, 1200
+)
+
+
+def test_an_actuator_reads_back_with_its_covariance(tmp_path: Path) -> None:
+    path = tmp_path / "twin.toml"
+    design = IdentifiedActuator.from_design(ActuatorModel(0.01, 0.02, 0.03))
+    twin = replace(build_twin(identification(), card()), actuators={"B3": ACTUATOR, "B2": design})
+    save_twin(path, twin)
+    read = load_twin(path).actuators
+    assert set(read) == {"B2", "B3"}
+    for name, one in twin.actuators.items():
+        assert read[name].model == one.model
+        assert np.array_equal(read[name].covariance, one.covariance)
+        assert (read[name].rms, read[name].samples) == (one.rms, one.samples)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("parameters.dead_time.value", -0.1, "dead_time must be from 0 to 0.5"),
+        ("parameters.dead_time.unit", "ms", "read in 's'"),
+        ("parameters.lag", {"value": 1.0, "unit": "s"}, "parameters must be"),
+        ("covariance.ids", ["x"] * 5, "no parameter x"),
+        ("covariance.matrix", [[1.0]], "must be 5 by 5"),
+    ],
+)
+def test_a_wrong_entry_of_an_actuator_is_told(
+    tmp_path: Path, key: str, value: Any, says: str
+) -> None:
+    path = tmp_path / "twin.toml"
+    save_twin(path, replace(build_twin(identification(), card()), actuators={"B3": ACTUATOR}))
+    document: Any = tomlkit.parse(path.read_text(encoding="utf-8"))
+    table = document["actuators"]["B3"]
+    *parents, last = key.split(".")
+    for part in parents:
+        table = table[part]
+    table[last] = value
     path.write_text(tomlkit.dumps(document), encoding="utf-8")
     with pytest.raises(ResultFileError, match=says):
         load_twin(path)

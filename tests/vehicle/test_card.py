@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.errors import CardError
 from drivetwin.vehicle.card import PriorValue, SensorTolerance, VehicleCard, load_card
@@ -84,6 +85,17 @@ def test_the_input_gear_multiplies_the_ratio_but_not_the_brake(tmp_path: Path) -
     assert card.get_clutch_ratios("B2")[0] == pytest.approx(0.8)
 
 
+def test_hydraulics_of_an_element(tmp_path: Path) -> None:
+    stated = (
+        "dead_time_s = 0.02, rising_lag_s = 0.03, falling_lag_s = 0.04, kiss_pressure_bar = 0.9"
+    )
+    text = changed("P0_bar = 0.8", f"P0_bar = 0.8, actuator = {{ {stated}, hysteresis_bar = 0.2 }}")
+    card = load(tmp_path, text)
+    expected = ActuatorModel(0.02, 0.03, 0.04, kiss_pressure=9e4, hysteresis=2e4)
+    assert card.elements["B2"].actuator == expected
+    assert card.elements["B3"].actuator is None
+
+
 def test_gain_from_geometry(tmp_path: Path) -> None:
     geometry = "surfaces = 14, derating = 0.9, area_m2 = 0.020, radius_m = 0.150"
     card = load(tmp_path, changed("gain_m3 = 0.03", geometry))
@@ -118,6 +130,18 @@ def test_sensors_and_channels_go_by_role_in_si(tmp_path: Path) -> None:
         ("gain_m3 = 0.03", "surfaces = 3", "elements.B2", "either as gain_m3 or as all of"),
         ("gain_m3 = 0.03", "gain_m3 = 1, i_c = 1", "elements.B2", "i_c and i_out belong together"),
         ("P0_bar = 0.8", "P0_bar = 0.8, peak = 0.9", "elements.B2.peak", "or equal to 1"),
+        (
+            "P0_bar = 0.8",
+            "P0_bar = 0.8, actuator = { dead_time_s = 0.02, rising_lag_s = 0.01 }",
+            "elements.B2.actuator.falling_lag_s",
+            "is required",
+        ),
+        (
+            "P0_bar = 0.8",
+            "P0_bar = 0.8, actuator = { dead_time_s = 20, rising_lag_s = 1, falling_lag_s = 1 }",
+            "elements.B2.actuator.dead_time_s",
+            "less than or equal to 0.5",
+        ),
         ("P0_bar = 0.8", "P0_bar = { std = 0.1 }", "elements.B2.P0_bar.value", "is required"),
         ('"brake"', '"clutch"', "elements.B2", "a rotating clutch needs i_c and i_out"),
         ('"brake"', '"belt"', "elements.B2.kind", "should be 'brake' or 'clutch'"),

@@ -20,6 +20,7 @@ from drivetwin.calibration.profiles import Policy, Profiles, Space
 from drivetwin.calibration.scenarios import DrawModel, Purpose, Scenarios, draw_scenarios
 from drivetwin.calibration.search import Candidate, search_minima
 from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 from drivetwin.errors import InfeasibleError
 
 _COARSE = 2e-3
@@ -68,8 +69,8 @@ class Calibration:
     runs: int
 
 
-def calibrate(task: Task) -> Calibration:
-    """Search, polish and certify a calibration.
+def calibrate(task: Task, stages: Stages = NO_STAGES) -> Calibration:
+    """Search, polish and certify a calibration; `stages` may have its coordinates already.
 
     Raises InfeasibleError where the best calibration found exceeds a limit by more than 1 % on
     fresh draws, and MissingExtraError without the library of the search.
@@ -77,7 +78,9 @@ def calibrate(task: Task) -> Calibration:
     settings, space = task.settings, Space(task.policy)
     quick = make_quick_plant(task)
     with scale_progress(0.0, 0.9):
-        best = find_best(task, quick)
+        name = name_stage("calibration", task.maneuver.point)
+        size = (quick, len(space.free))
+        best = run_stage(stages, name, size, lambda: find_best(task, quick))
     plant = replace(quick, metrics=tuple(Metric))
     with scale_progress(0.9, 1.0, "certifying on fresh draws"):
         fresh = draw_for(task, settings.certificate_draws, Purpose.CERTIFICATE)
@@ -86,10 +89,15 @@ def calibrate(task: Task) -> Calibration:
     return Calibration(task, before, after, fresh, plant.count.runs)
 
 
-def make_quick_plant(task: Task) -> Plant:
-    """Build the plant that computes what the optimiser needs."""
-    wanted = (Metric.PEAK_JERK, *(one.metric for one in task.limits))
+def make_quick_plant(task: Task, *more: Metric) -> Plant:
+    """Build the plant that computes what the optimiser needs, and the metrics `more`."""
+    wanted = (Metric.PEAK_JERK, *(one.metric for one in task.limits), *more)
     return Plant(task.maneuver, task.settings.threads, tuple(dict.fromkeys(wanted)))
+
+
+def set_coarse_step(plant: Plant) -> Plant:
+    """Return the plant with the sampling step of the search, which takes half of the time."""
+    return replace(plant, maneuver=plant.maneuver.set_step(max(plant.maneuver.step, _COARSE)))
 
 
 def find_best(task: Task, plant: Plant) -> FloatArray:
@@ -125,10 +133,23 @@ def build_objective(task: Task, plant: Plant) -> Objective:
     return whole.tighten(settings.margin)
 
 
+def polish_from(task: Task, plant: Plant, start: FloatArray) -> Candidate:
+    """Polish coordinates (q,) that come from a neighbouring calibration."""
+    space, settings = Space(task.policy), task.settings
+    draws = draw_for(task, settings.neighbour_draws, Purpose.POLISH)
+
+    def run(coordinates: FloatArray) -> Outcome:
+        return plant.evaluate(space.build_profiles(coordinates), draws)
+
+    wider = replace(settings, margin=settings.neighbour_margin)
+    objective = build_objective(replace(task, settings=wider), plant)
+    return polish(run, start, objective, settings.neighbour_iterations)
+
+
 def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
     settings, space = task.settings, Space(task.policy)
     draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
-    coarse = replace(plant, maneuver=task.maneuver.set_step(max(task.maneuver.step, _COARSE)))
+    coarse = set_coarse_step(plant)
 
     def evaluate(coordinates: FloatArray) -> float:
         return objective.evaluate(coarse.evaluate(space.build_profiles(coordinates), draws))

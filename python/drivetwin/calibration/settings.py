@@ -38,6 +38,14 @@ class CalibrationSettings:
     """Largest number of linear programs of the polish."""
     tail_iterations: int = 8
     """Largest number of linear programs of the last polish."""
+    neighbour_draws: int = 40
+    """Scenarios by which a point of the front or of a map is polished."""
+    neighbour_iterations: int = 4
+    """Largest number of linear programs for a point of the front or of a map."""
+    neighbour_margin: float = 0.015
+    """Relative distance from a limit that it keeps; it sees fewer draws than the calibration."""
+    neighbour_fresh_draws: int = 400
+    """Fresh scenarios by which a point of the front or of a map is assessed."""
     penalty: float = 10.0
     """Weight of a relative excess over a limit, in tail means of the start."""
     margin: float = 0.005

@@ -33,7 +33,10 @@ def infer_candidates(
             make_pressure_role(element): _list_pressure_forms(element, kind, table)
             for element, kind in elements.items()
         },
-        **{make_command_role(one): _list_command_forms(one, table) for one in elements},
+        **{
+            make_command_role(element): _list_command_forms(element, kind, table)
+            for element, kind in elements.items()
+        },
     }
     wholes = [normalise_name(column.name) for column in columns]
     parts = [normalise_name(re.split(r"[./]", column.name)[-1]) for column in columns]
@@ -113,11 +116,15 @@ def _list_pressure_forms(element: str, kind: str, table: NameTable) -> list[str]
     return forms
 
 
-def _list_command_forms(element: str, table: NameTable) -> list[str]:
-    """List the expressions of a commanded pressure: pressure and full name with a word for it."""
+def _list_command_forms(element: str, kind: str, table: NameTable) -> list[str]:
+    """List the expressions of a commanded pressure: full name, then kind and number, with a word
+    for it."""
     label = re.escape(normalise_name(element))
+    digits = re.sub(r"\D", "", label)
     pressure, command = table.make_alternatives("pressure"), table.make_alternatives("command")
-    named = f"({pressure})({label})|({label})({pressure})"
-    if not label:
-        return []
-    return [f"({named})({command})|({command})({named})|({pressure})({command})({label})"]
+    numbered = [f"({table.make_alternatives(kind)})0*{digits}"] if digits else []
+    forms = []
+    for one in ([label] if label else []) + numbered:
+        named = f"({pressure})({one})|({one})({pressure})"
+        forms.append(f"({named})({command})|({command})({named})|({pressure})({command})({one})")
+    return forms

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,15 +24,22 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
-from drivetwin.errors import IdentificationError, InputError, Where
+from drivetwin.errors import DrivetwinError, IdentificationError, InputError, Where
 
 if TYPE_CHECKING:
     from drivetwin.calibration.calibrate import Calibration
+    from drivetwin.calibration.front import Front
+    from drivetwin.calibration.operating_map import Grid, OperatingMap
     from drivetwin.calibration.twin_task import Request
+    from drivetwin.files.stages_file import StagesFile
     from drivetwin.findings import Finding
     from drivetwin.twin.twin import Twin
 
+    Results = tuple[Calibration, Front | None, OperatingMap | None]
+
 CALIBRATION, CERTIFICATE, REPORT = "calibration.toml", "certificate.json", "report.html"
+_RESUME = ".resume.json"
+"""Ending of the file beside the output folder that has the stages of an interrupted calibration."""
 
 
 def calibrate(
@@ -72,6 +82,22 @@ def calibrate(
         int, typer.Option("--draws", min=59, help="Fresh draws of the certificate.")
     ] = 2000,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of draws and search.")] = 1,
+    front: Annotated[
+        bool, typer.Option("--front", help="Add the front of comfort, friction energy and time.")
+    ] = False,
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            "--map",
+            metavar="GRID",
+            help="Calibrate operating points, as torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; "
+            "from, to, points).",
+        ),
+    ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Continue an interrupted calibration from DIR.resume.json."),
+    ] = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Find shift profiles that keep peak jerk small over the spread of made units.
@@ -79,10 +105,9 @@ def calibrate(
     Minimises the tail mean of peak jerk under limits, and certifies the result on fresh draws.
     DIR gets calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx.
     """
-    from drivetwin.calibration.calibrate import calibrate as run_calibration
     from drivetwin.calibration.identified_range import check_identified_range
     from drivetwin.calibration.settings import CalibrationSettings
-    from drivetwin.calibration.twin_task import Request, build_task
+    from drivetwin.calibration.twin_task import Request
     from drivetwin.cli.export import parse_gears
     from drivetwin.files.limits_file import Requirements, load_limits
 
@@ -102,17 +127,125 @@ def calibrate(
         seed=seed,
         settings=CalibrationSettings(certificate_draws=draws).scale_effort(effort),
     )
-    with show_step(f"calibrating {shift} of {model.name}"):
-        found = run_calibration(build_task(model, request))
+    named = {
+        "shift": shift,
+        "engine torque": repr(engine_torque),
+        "engine speed": repr(engine_speed),
+        "system pressure": repr(system_pressure),
+        "wheel radius": repr(wheel_radius),
+        "policy": policy.value,
+        "effort": repr(effort),
+        "number of draws": str(draws),
+        "seed": str(seed),
+    }
+    stages = _open_stages(output, {"twin": twin, "limits": limits, "start": start}, named, resume)
+    results = _calibrate(model, request, (grid, front), stages)
+    found = results[0]
     findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
     with show_step(f"writing {output}"):
-        _write_results(output, found, findings, (model, request, twin))
+        _write_results(output, results, findings, (model, request, twin))
+    stages.remove()
     if as_json:
-        print_json(_to_document(found, findings, output))
+        print_json(_to_document(results, findings, output))
         return
     _print_results(found)
+    _print_around(*results[1:])
     print_findings(findings)
     print_line(f"wrote {output / REPORT}")
+
+
+def _open_stages(
+    output: Path, files: Mapping[str, Path | None], named: Mapping[str, str], resume: bool
+) -> StagesFile:
+    """Open the store of finished stages beside the output folder."""
+    from drivetwin._util.version import get_program_version
+    from drivetwin.files.calibration_file import hash_file
+    from drivetwin.files.stages_file import StagesFile, resume_stages
+
+    contents = {
+        f"{name} file": "" if path is None else hash_file(path) for name, path in files.items()
+    }
+    inputs = {**contents, **named, "program version": get_program_version()}
+    whole = output.resolve()
+    path = whole.parent / f"{whole.name}{_RESUME}"
+    return resume_stages(path, inputs) if resume else StagesFile(path, inputs)
+
+
+def _calibrate(
+    twin: Twin, request: Request, wanted: tuple[str | None, bool], stages: StagesFile
+) -> Results:
+    """Calibrate, with the map and the front if wanted.
+
+    An error removes the finished stages: they would lead to it again. An interrupt leaves them.
+    """
+    from drivetwin.calibration.calibrate import calibrate as run_calibration
+    from drivetwin.calibration.front import trace_front
+    from drivetwin.calibration.twin_task import build_task
+
+    grid, front = wanted
+    try:
+        with show_step(f"calibrating {'-'.join(request.gears)} of {twin.name}"):
+            mapped = None if grid is None else _calibrate_grid(twin, request, grid, stages)
+            found = (
+                run_calibration(build_task(twin, request), stages)
+                if mapped is None
+                else mapped.main
+            )
+        if not front:
+            return found, None, mapped
+        with show_step("tracing the front"):
+            return found, trace_front(found, stages), mapped
+    except DrivetwinError:
+        stages.remove()
+        raise
+
+
+def _calibrate_grid(twin: Twin, request: Request, text: str, stages: StagesFile) -> OperatingMap:
+    from drivetwin.calibration.calibrate import Task
+    from drivetwin.calibration.maneuver import OperatingPoint
+    from drivetwin.calibration.operating_map import calibrate_map
+    from drivetwin.calibration.twin_task import build_task
+
+    if request.engine_torque is not None or request.engine_speed is not None:
+        raise InputError(
+            "both an operating point and --map are given",
+            "leave out --engine-torque and --engine-speed",
+        )
+
+    def make_task(point: OperatingPoint) -> Task:
+        torque, speed = point.engine_torque, point.engine_speed
+        return build_task(twin, replace(request, engine_torque=torque, engine_speed=speed))
+
+    return calibrate_map(make_task, parse_grid(text), stages)
+
+
+def parse_grid(text: str) -> Grid:
+    """Parse a grid such as `torque=800:1400:3,speed=1600:2000:3` (N·m, rpm; from, to, points).
+
+    Raises InputError for another form.
+    """
+    from drivetwin.calibration.operating_map import Grid
+
+    form = re.compile(r"torque=([^:,]+):([^:,]+):(\d{1,2}),speed=([^:,]+):([^:,]+):(\d{1,2})")
+    found = form.fullmatch(text.replace(" ", ""))
+    try:
+        numbers = [] if found is None else [float(one) for one in found.groups()]
+    except ValueError:
+        numbers = []
+    if not numbers or not all(map(math.isfinite, numbers)):
+        raise InputError(
+            f"{text!r} is no grid of operating points",
+            "write --map torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; from, to, points)",
+        )
+    rpm = math.pi / 30.0
+    torques = _divide(numbers[0], numbers[1], int(numbers[2]))
+    speeds = _divide(numbers[3] * rpm, numbers[4] * rpm, int(numbers[5]))
+    return Grid(torques, speeds)
+
+
+def _divide(first: float, last: float, count: int) -> tuple[float, ...]:
+    steps = max(count - 1, 1)
+    return tuple(first + (last - first) * k / steps for k in range(count))
 
 
 def _load_valid_twin(source: Path) -> Twin:
@@ -151,7 +284,7 @@ def _load_start(path: Path | None, policy: PolicyKind) -> dict[str, float]:
 
 def _write_results(
     output: Path,
-    found: Calibration,
+    results: Results,
     findings: tuple[Finding, ...],
     origin: tuple[Twin, Request, Path],
 ) -> None:
@@ -169,7 +302,7 @@ def _write_results(
     )
     from drivetwin.report.calibration import render_calibration
 
-    twin, request, source = origin
+    (found, front, mapped), (twin, request, source) = results, origin
     label = "-".join(request.gears)
     provenance = Provenance(
         get_program_version(),
@@ -180,14 +313,16 @@ def _write_results(
         request.spread,
     )
     name = f"{twin.name} {label}"
-    content = collect_calibration(found, name)
+    content = collect_calibration(found, name, mapped)
     with write_atomically(output) as folder:
-        write_calibration_file(folder / CALIBRATION, build_calibration_file(found, provenance))
+        write_calibration_file(
+            folder / CALIBRATION, build_calibration_file(found, provenance, front, mapped)
+        )
         certificate = build_certificate_document(found)
         write_text(folder / CERTIFICATE, json.dumps(certificate, indent=2, allow_nan=False) + "\n")
         for kind in (ParameterFormat.CSV, ParameterFormat.DCM, ParameterFormat.CDFX):
             write_parameters(content, folder / f"calibration.{kind.value}", kind)
-        page = render_calibration(found, f"Calibration of {name}", findings)
+        page = render_calibration(found, f"Calibration of {name}", findings, front, mapped)
         write_text(folder / REPORT, page)
 
 
@@ -218,14 +353,34 @@ def _print_results(found: Calibration) -> None:
     print_line(f"no lock-up in {after.unlocked}, slip after lock-up in {after.relocked} draws")
 
 
-def _to_document(found: Calibration, findings: tuple[Finding, ...], output: Path) -> dict[str, Any]:
+def _print_around(front: Front | None, mapped: OperatingMap | None) -> None:
+    if front is not None:
+        print_line(
+            f"front: {len(front.points)} of {front.tried} calibrations, shift time "
+            f"{front.points[0].time:.3f} to {front.points[-1].time:.3f} s"
+        )
+    if mapped is not None:
+        jerks = [one.jerk for one in mapped.points.values()]
+        between = [one.jerk for one in mapped.between]
+        print_line(
+            f"map: {len(jerks)} points, peak jerk (95 %) {min(jerks):.3g} to {max(jerks):.3g} "
+            f"m/s³, between them up to {max(between):.3g} m/s³"
+        )
+
+
+def _to_document(results: Results, findings: tuple[Finding, ...], output: Path) -> dict[str, Any]:
     from drivetwin.files.calibration_file import build_certificate_document
+    from drivetwin.files.calibration_points import build_front_records, build_map_records
     from drivetwin.files.records import dump_findings
 
-    parameters = zip(found.task.policy.parameters, found.after.values.tolist(), strict=True)
+    found, front, mapped = results
+    listed = found.task.policy.parameters
+    parameters = zip(listed, found.after.values.tolist(), strict=True)
     return {
         "folder": str(output),
         "parameters": {one.name: value for one, value in parameters},
         "certificate": build_certificate_document(found),
+        "front": [one.model_dump(mode="json") for one in build_front_records(front, listed)],
+        "map": [one.model_dump(mode="json") for one in build_map_records(mapped)],
         "findings": dump_findings(findings),
     }

@@ -72,6 +72,13 @@ def simulate(
             help="Values in place of the twin's: an exported parameter file that was edited.",
         ),
     ] = None,
+    from_command: Annotated[
+        bool,
+        typer.Option(
+            "--from-command",
+            help="Take pressures from the commands in the log, through the twin's actuators.",
+        ),
+    ] = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Simulate the shifts of a log with an identified model and compare.
@@ -85,12 +92,16 @@ def simulate(
     from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
     from drivetwin.files.twin_conversion import load_twin
     from drivetwin.shifts.detect import require_shifts
+    from drivetwin.validation.command_pressures import replace_pressures
     from drivetwin.validation.simulate_log import simulate_shift
 
     model = (
         load_twin(twin) if parameters is None else _apply_parameters(load_twin(twin), parameters)
     )
     recording, card = read_twin_log(model, log, vehicle, channels)
+    if from_command:
+        recording, replaced = replace_pressures(model, recording)
+        print_line(f"pressures of {', '.join(replaced)} from their commands", stderr=True)
     with show_step(f"simulating {log.name}"):
         shifts = require_shifts(recording, card)
         runs = [simulate_shift(model, recording, shift) for shift in shifts.shifts]

@@ -24,7 +24,8 @@ ScenarioOption = Annotated[
         "gearbox with drums that have inertia; gearbox_chain: the same from 2nd to 4th gear; "
         "power_on_down, power_off_up, power_off_down: the other kinds of shift; input_gear: behind "
         "an input gear of 1.2; dual_clutch, manual: a car with such a gearbox; "
-        "open_converter: behind an open torque converter."
+        "open_converter: behind an open torque converter; hydraulics: with the commands of the "
+        "controller."
     ),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the sensor noise.")]

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Hydraulic actuators: clutch pressure as a response to the pressure command of the TCU."""
+"""Hydraulic actuators: clutch pressure as a response to the pressure command of the TCU.
+
+`Actuator` is linear between the corners of its command. `ControlledActuator` takes the command of a
+controller task and answers by the model that is identified from logs.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
+from drivetwin.actuator.held_signal import HeldSignal
+from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import InputError, Where
 
 FloatArray = NDArray[np.float64]
@@ -131,3 +137,35 @@ class Actuator:
         if self.vibration is not None:
             pressure = pressure + self.vibration.evaluate(time)
         return np.asarray(pressure, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class ControlledActuator:
+    """Actuator behind a controller that holds its command [Pa] for `task` [s].
+
+    `resolution` [Pa] is that of the command. Raises InputError for a task that is not above 0.
+    """
+
+    command: Program
+    model: ActuatorModel
+    task: float = 0.01
+    resolution: float = 1e3
+
+    def __post_init__(self) -> None:
+        if not self.task > 0.0:
+            raise InputError(
+                f"a controller task of {self.task:g} s",
+                "give a time above 0",
+                Where(key="actuator"),
+            )
+
+    def compute_command(self, duration: float) -> HeldSignal:
+        """Return the command of all tasks up to `duration` [s]."""
+        count = int(np.ceil(duration / self.task)) + 1
+        time = self.task * np.arange(count, dtype=np.float64)
+        values = self.resolution * np.round(self.command.evaluate(time) / self.resolution)
+        return HeldSignal(time, np.asarray(values, dtype=np.float64))
+
+    def compute_pressure(self, time: FloatArray) -> FloatArray:
+        """Pressure at `time` (n,) [s], in Pa; at rest before the first command."""
+        return self.model.compute_pressure(self.compute_command(float(time[-1])), time)

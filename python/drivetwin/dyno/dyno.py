@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel
+from drivetwin.dyno.actuators import ControlledActuator
 from drivetwin.dyno.departed_run import is_departed, simulate_departed
 from drivetwin.dyno.effects import Effects, check_effects
 from drivetwin.dyno.nominal import NominalRun
@@ -111,10 +112,11 @@ def _compute_sampling_instants(sensor: Sensor, stamps: FloatArray) -> FloatArray
 
 @dataclass(frozen=True, eq=False)
 class _Inputs:
-    """Engine torque [N m] and pressures [Pa] of a scenario, as they are logged."""
+    """Engine torque [N m], pressures and their commands [Pa] of a scenario, as they are logged."""
 
     engine_torque: Signal
     pressures: Mapping[str, Signal]
+    commands: Mapping[str, Signal]
 
     def list_by_role(self, scenario: Scenario) -> dict[str, Signal]:
         """The inputs by the role of their channel."""
@@ -124,7 +126,8 @@ class _Inputs:
             both = Signal(self.engine_torque.time, np.asarray(total, dtype=np.float64))
             pressures = dict.fromkeys(pressures, both)
         roles = {make_pressure_role(name): pressure for name, pressure in pressures.items()}
-        return {"engine_torque": self.engine_torque, **roles}
+        commands = {make_command_role(name): each for name, each in self.commands.items()}
+        return {"engine_torque": self.engine_torque, **roles, **commands}
 
 
 def _build_inputs(scenario: Scenario) -> _Inputs:
@@ -133,7 +136,13 @@ def _build_inputs(scenario: Scenario) -> _Inputs:
         name: Signal(grid, actuator.compute_pressure(grid))
         for name, actuator in scenario.actuators.items()
     }
-    return _Inputs(Signal(grid, scenario.compute_torque(grid)), pressures)
+    commands = {
+        name: actuator.compute_command(scenario.duration)
+        for name, actuator in scenario.actuators.items()
+        if isinstance(actuator, ControlledActuator)
+    }
+    held = {name: Signal(each.time, each.values) for name, each in commands.items()}
+    return _Inputs(Signal(grid, scenario.compute_torque(grid)), pressures, held)
 
 
 def _simulate(

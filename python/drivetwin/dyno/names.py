@@ -21,3 +21,4 @@ class ScenarioName(StrEnum):
     DUAL_CLUTCH = "dual_clutch"
     MANUAL = "manual"
     OPEN_CONVERTER = "open_converter"
+    HYDRAULICS = "hydraulics"

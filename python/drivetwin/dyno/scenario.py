@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.dyno.actuators import Actuator, Program
+from drivetwin.dyno.actuators import Actuator, ControlledActuator, Program
 from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.plant import Plant
 from drivetwin.dyno.sensors import Sensor
@@ -79,7 +79,7 @@ class Scenario:
     duration: float
     engine_speed: float
     engine_torque: Program
-    actuators: Mapping[str, Actuator]
+    actuators: Mapping[str, Actuator | ControlledActuator]
     sensors: tuple[Sensor, ...]
     J_prime_range: tuple[float, float]
     J_vehicle_range: tuple[float, float]

@@ -11,6 +11,8 @@ dropped. Keys are the fields of `Scenario` and of the classes that it holds, and
 - `driveline.output_load`: constant load at the gearbox output [N m].
 - `gearbox`: built-in card of a whole gearbox in place of brakes and clutches. `drum_inertia` is
   that of each member in `drums`; `inertias` replaces those of other members.
+- `hydraulics`: actuator model of each element, in place of `actuator`, behind a controller task of
+  10 ms; `command_columns` of the sensors are its commands.
 - `sensors`: noise is one standard deviation; speeds have the order of the log's columns.
 """
 
@@ -24,9 +26,16 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin._util.toml import read_toml
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.actuator.model import ActuatorModel
+from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Quantity
-from drivetwin.dyno.actuators import Actuator, Fill, Program, Vibration
+from drivetwin.dyno.actuators import (
+    Actuator,
+    ControlledActuator,
+    Fill,
+    Program,
+    Vibration,
+)
 from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.plant import Plant, Surroundings, build_form, build_plant
@@ -40,6 +49,8 @@ from drivetwin.vehicle.converter import ConverterTable
 Table = Mapping[str, Any]
 
 _FOLDER = Path(__file__).parent / "scenarios"
+COMMAND_RATE = 100.0
+"""Rate [Hz] of the commands in a log, that of the controller's task."""
 _STEP_TIME = 0.06
 """Time [s] in which the engine torque goes to its next level."""
 _SPEED_COLUMNS = {
@@ -185,7 +196,17 @@ def _build_steps(first: float, dwell: float, levels: list[float]) -> list[tuple[
     return knots
 
 
-def _build_actuators(table: Table, elements: Sequence[str]) -> dict[str, Actuator]:
+def _build_actuators(
+    table: Table, elements: Sequence[str]
+) -> dict[str, Actuator | ControlledActuator]:
+    if "hydraulics" in table:
+        return {
+            name: ControlledActuator(
+                Program(_build_knots(table["pressures"][name])), ActuatorModel(**stated)
+            )
+            for name, stated in table["hydraulics"].items()
+            if name in elements
+        }
     times = dict(table["actuator"])
     fill = Fill(**times.pop("fill")) if "fill" in times else None
     stated = [dict(each) for each in table.get("vibrations", ())]
@@ -207,6 +228,11 @@ def _build_sensors(table: Table, elements: Sequence[str]) -> tuple[Sensor, ...]:
         *(
             Sensor(make_pressure_role(name), pressure, column, "bar", 1000.0, noise, 10.0)
             for name, column in table["pressure_columns"].items()
+            if name in elements
+        ),
+        *(
+            Sensor(make_command_role(name), pressure, column, "bar", COMMAND_RATE, 0.0)
+            for name, column in table.get("command_columns", {}).items()
             if name in elements
         ),
         Sensor("output_torque", torque, "TrqOut", "Nm", 1000.0, table["output_torque_noise"], 0.01),

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from math import inf, pi, sqrt
 from typing import Any
 
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.dyno.actuators import ControlledActuator
 from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.parameters import get_parameter_spec
@@ -48,6 +51,8 @@ class Truth:
     friction: dict[str, Stribeck | FrictionTable]
     shifts: tuple[Instants, ...]
     effects: Effects
+    actuators: Mapping[str, ActuatorModel] = field(default_factory=dict)
+    """Hydraulics by element, of a scenario that has commands."""
 
     @property
     def torque_start(self) -> float | None:
@@ -75,6 +80,13 @@ class Truth:
             "friction": {name: asdict(law) for name, law in self.friction.items()},
             "shifts": [asdict(each) for each in self.shifts],
             "effects": {name.value: size for name, size in self.effects.items()},
+            "actuators": {
+                name: {
+                    key: {"value": getattr(model, key), "unit": spec.unit}
+                    for key, spec in QUANTITIES.items()
+                }
+                for name, model in self.actuators.items()
+            },
         }
 
 
@@ -119,7 +131,13 @@ def compute_truth(scenario: Scenario, trajectory: Trajectory, effects: Effects) 
         "te_delay": delays["engine_torque"],
     }
     friction = {element.name: element.friction for element in model.elements}
-    return Truth(parameters, friction, _collect_shifts(scenario, trajectory), effects)
+    actuators = {
+        name: one.model
+        for name, one in scenario.actuators.items()
+        if isinstance(one, ControlledActuator)
+    }
+    shifts = _collect_shifts(scenario, trajectory)
+    return Truth(parameters, friction, shifts, effects, actuators)
 
 
 def _collect_shifts(scenario: Scenario, trajectory: Trajectory) -> tuple[Instants, ...]:

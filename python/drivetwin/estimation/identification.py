@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from drivetwin._util.rich_display import DisplayMixin
+from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.result.estimate import (
@@ -53,6 +55,8 @@ class Identification(DisplayMixin):
     status: ModelStatus = ModelStatus.NOT_VALIDATED
     mapping: RememberedMapping = field(default_factory=RememberedMapping)
     """Channel mapping by which the log was read, of several the first."""
+    actuators: Mapping[str, IdentifiedActuator] = field(default_factory=dict)
+    """Hydraulics by element, of those whose command is in the log."""
 
     def __repr__(self) -> str:
         known = sum(one.verdict is Verdict.IDENTIFIED for one in self.estimates.values())

@@ -9,15 +9,23 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
-from pydantic import FiniteFloat
+from pydantic import Field, FiniteFloat
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.toml import parse_toml
 from drivetwin.calibration.calibrate import Calibration
+from drivetwin.calibration.front import Front
 from drivetwin.calibration.metrics import METRICS
+from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.calibration.policy_kind import PolicyKind
 from drivetwin.calibration.spread import Spread
+from drivetwin.files.calibration_points import (
+    FrontRecord,
+    MapRecord,
+    build_front_records,
+    build_map_records,
+)
 from drivetwin.files.limits_file import SpreadRecord, build_limit_keys
 from drivetwin.files.read import read_record
 from drivetwin.files.records import Record, SchemaName
@@ -63,6 +71,8 @@ class CalibrationFile(Record):
     limits: dict[str, FiniteFloat]
     spread: SpreadRecord
     settings: dict[str, Any]
+    front: list[FrontRecord] = Field(default_factory=list)
+    map: list[MapRecord] = Field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -82,8 +92,13 @@ def hash_file(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def build_calibration_file(found: Calibration, origin: Provenance) -> CalibrationFile:
-    """Return the records of a calibration."""
+def build_calibration_file(
+    found: Calibration,
+    origin: Provenance,
+    front: Front | None = None,
+    mapped: OperatingMap | None = None,
+) -> CalibrationFile:
+    """Return the records of a calibration, with those of its front and of its map."""
     task = found.task
     keys = {value: name for name, value in build_limit_keys().items()}
     values = zip(task.policy.parameters, found.after.values.tolist(), strict=True)
@@ -119,6 +134,8 @@ def build_calibration_file(found: Calibration, origin: Provenance) -> Calibratio
                 "contact_pressure_Pa": origin.spread.contact_pressure,
             },
             "settings": asdict(task.settings),
+            "front": build_front_records(front, task.policy.parameters),
+            "map": build_map_records(mapped),
         }
     )
 

@@ -122,6 +122,20 @@ class FrictionRecord(Record):
         )
 
 
+class CovarianceRecord(Record):
+    """Covariance of the parameters `ids` (total), row by row, in products of their SI units."""
+
+    ids: list[str]
+    matrix: list[list[FiniteFloat]]
+
+    @model_validator(mode="after")
+    def _check_square(self) -> Self:
+        size = len(self.ids)
+        if len(self.matrix) != size or any(len(row) != size for row in self.matrix):
+            raise ValueError(f"matrix must be {size} by {size}, as ids")
+        return self
+
+
 def _convert_rows(matrix: FloatArray | None) -> list[list[float]] | None:
     """Nested lists of a finite matrix; None where it is unknown."""
     if matrix is None or not np.isfinite(matrix).all():

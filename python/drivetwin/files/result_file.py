@@ -15,6 +15,7 @@ from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.files.actuator_records import ActuatorRecord
 from drivetwin.files.multi_log_records import HeldOutRecord, SeveralRecord
 from drivetwin.files.read import read_record
 from drivetwin.files.records import (
@@ -91,6 +92,7 @@ class ResultFile(Record):
     parameters: dict[str, ParameterRecord]
     friction: dict[str, FrictionRecord]
     load: LoadRecord | None = None
+    actuators: dict[str, ActuatorRecord] = Field(default_factory=dict)
     shifts: list[ShiftRecord]
     rejected: list[RejectedRecord]
     fit: dict[str, dict[str, FitRecord]]
@@ -130,7 +132,7 @@ class ResultFile(Record):
 
 _SAME_NAME = (
     *("method", "loss_law", "status", "friction", "load", "shifts", "rejected", "fit", "validity"),
-    *("inputs", "findings", "assumptions"),
+    *("inputs", "findings", "assumptions", "actuators"),
 )
 """Fields that an identification has under the same name."""
 

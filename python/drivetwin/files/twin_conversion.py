@@ -16,7 +16,7 @@ from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 
 _TWIN_FIELDS = (
     *("version", "name", "method", "loss_law", "parameters", "friction", "validity", "inputs"),
-    *("settings", "assumptions"),
+    *("settings", "assumptions", "actuators"),
 )
 _GEARBOX_FIELDS = (
     *("i_in", "final_drive", "gears", "J_prime_range", "J_vehicle_range", "converter"),
@@ -104,6 +104,7 @@ def restore_twin(content: TwinFile) -> Twin:
             "parameters": {name: one.to_estimate(name) for name, one in content.parameters.items()},
             "friction": {name: one.to_curve() for name, one in content.friction.items()},
             "assumptions": tuple(content.assumptions),
+            "actuators": {name: one.to_actuator() for name, one in content.actuators.items()},
             "load_law": None if content.load is None else content.load.to_law(),
             "covariance_ids": () if covariance is None else tuple(covariance.ids),
             "covariance": None if covariance is None else np.asarray(covariance.matrix),

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import tomlkit
-from pydantic import Field, FiniteFloat, field_validator, model_validator
+from pydantic import Field, FiniteFloat, field_validator
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.spelling import suggest_spelling
@@ -18,8 +18,10 @@ from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.errors import InputError, ResultFileError
 from drivetwin.estimation.result.method import Method
+from drivetwin.files.actuator_records import ActuatorRecord
 from drivetwin.files.read import read_record
 from drivetwin.files.records import (
+    CovarianceRecord,
     FrictionRecord,
     Interval,
     LoadRecord,
@@ -134,20 +136,6 @@ class TwinParameterRecord(ParameterRecord):
     value: OptionalFloat = None
 
 
-class CovarianceRecord(Record):
-    """Covariance of the parameters `ids` (total), row by row, in products of their SI units."""
-
-    ids: list[str]
-    matrix: list[list[FiniteFloat]]
-
-    @model_validator(mode="after")
-    def _check_square(self) -> Self:
-        size = len(self.ids)
-        if len(self.matrix) != size or any(len(row) != size for row in self.matrix):
-            raise ValueError(f"matrix must be {size} by {size}, as ids")
-        return self
-
-
 class TwinFile(Record):
     """The whole of `twin.toml`."""
 
@@ -162,6 +150,7 @@ class TwinFile(Record):
     friction: dict[str, FrictionRecord]
     load: LoadRecord | None = None
     covariance: CovarianceRecord | None = None
+    actuators: dict[str, ActuatorRecord] = Field(default_factory=dict)
     validity: dict[str, Interval]
     inputs: dict[str, str]
     settings: dict[str, Any]
@@ -209,7 +198,8 @@ _ABOVE_ZERO = ("eta", "k_o")
 
 def find_twin_faults(content: TwinFile) -> list[Fault]:
     """Return all faults of a file whose tables have the right form each."""
-    return [*_check_gears(content), *_check_parameters(content), *_check_friction(content)]
+    checks = (_check_gears, _check_parameters, _check_friction, _check_actuators)
+    return [fault for check in checks for fault in check(content)]
 
 
 def _check_gears(content: TwinFile) -> Iterator[Fault]:
@@ -258,3 +248,12 @@ def _check_friction(content: TwinFile) -> Iterator[Fault]:
         if curve.stribeck is not None and curve.stribeck.v_s <= 0.0:
             text = f"{curve.stribeck.v_s:g} is impossible; it must be above zero"
             yield Fault(f"{key}.stribeck.v_s", text)
+
+
+def _check_actuators(content: TwinFile) -> Iterator[Fault]:
+    """Actuators belong to elements of the file."""
+    elements = content.transmission.elements
+    for name in content.actuators:
+        if name not in elements:
+            text = f"no element {name!r}{suggest_spelling(name, elements)}"
+            yield Fault(f"actuators.{name}", text)

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitCheck, LimitState
+from drivetwin.calibration.front import Front
 from drivetwin.calibration.metrics import METRICS, Metric
+from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.findings import Finding
 from drivetwin.report.figures.calibration import (
     build_profile_panels,
@@ -28,6 +30,7 @@ from drivetwin.report.sections.blocks import (
     Tone,
     make_cells,
 )
+from drivetwin.report.sections.calibration_points import build_front_section, build_map_section
 
 _TONES = {
     LimitState.CERTIFIED: Tone.GOOD,
@@ -36,15 +39,24 @@ _TONES = {
 }
 
 
-def render_calibration(found: Calibration, title: str, findings: Sequence[Finding]) -> str:
-    """HTML text of the page; equal calibrations give equal text."""
+def render_calibration(
+    found: Calibration,
+    title: str,
+    findings: Sequence[Finding],
+    front: Front | None = None,
+    mapped: OperatingMap | None = None,
+) -> str:
+    """HTML text of the page, with front and map; equal calibrations give equal text."""
     draws = found.after.certificate.draws
     point = found.task.maneuver.point
     subtitle = (
         f"engine torque {point.engine_torque:.0f} Nm, engine speed "
         f"{point.engine_speed * 9.549297:.0f} rpm at the request · {draws} fresh draws"
     )
-    return render_page(title, subtitle, _build_sections(found, findings))
+    around = [build_front_section(front), build_map_section(mapped)]
+    sections = _build_sections(found, findings)
+    sections[1:1] = [one for one in around if one.blocks]
+    return render_page(title, subtitle, sections)
 
 
 def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Section]:

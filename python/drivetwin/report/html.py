@@ -18,6 +18,7 @@ from drivetwin._util.visible_text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.report.embedded_data import Store, encode_content
+from drivetwin.report.sections.actuators import build_actuator_section
 from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.report.sections.identifiability import build_limits_section
 from drivetwin.report.sections.likelihood import build_likelihood_sections
@@ -62,6 +63,7 @@ def build_report_sections(found: Identification, log: ShiftLog) -> list[Section]
         build_shift_section(found, log),
         *(one for one in stages if not one.collapsed),
         build_friction_section(found),
+        build_actuator_section(found),
         *build_likelihood_sections(found),
         build_limits_section(found),
         build_provenance_section(found),

@@ -9,6 +9,7 @@ import numpy as np
 
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
+from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.channel_spec import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
@@ -56,7 +57,18 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
         mapping=_remember_mapping(found, card),
         load_law=load,
         converter=card.converter,
+        actuators=_collect_actuators(found, card),
     )
+
+
+def _collect_actuators(found: Identification, card: VehicleCard) -> dict[str, IdentifiedActuator]:
+    """Actuators by element: as identified, else as the card states them."""
+    stated = {
+        name: IdentifiedActuator.from_design(one.actuator)
+        for name, one in card.elements.items()
+        if one.actuator is not None
+    }
+    return {**stated, **found.actuators}
 
 
 def _remember_mapping(found: Identification, card: VehicleCard) -> RememberedMapping:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.rich_display import DisplayMixin
+from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.errors import InputError, MissingParameterError, Where
 from drivetwin.estimation.result.estimate import (
@@ -80,7 +81,8 @@ class Twin(DisplayMixin):
     pressure, torque and speed that the log covered; `inputs` file name -> SHA-256. The design
     ranges [kg m^2] are those of the vehicle card; `mapping` is the channel mapping of the log.
     `load_law` is the growth of the load torque with speed; None where it is constant. `converter`
-    is the card's map of the torque converter, None where it has none.
+    is the card's map of the torque converter, None where it has none. `actuators` are those of the
+    elements, from commands in the log or from the card.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Twin(DisplayMixin):
     mapping: RememberedMapping = field(default_factory=RememberedMapping)
     load_law: LoadLaw | None = None
     converter: Converter | None = None
+    actuators: Mapping[str, IdentifiedActuator] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         gears = ", ".join(self.gears)

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from drivetwin._util.toml import StrictModel
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.channels.mapping_file import ByRole, ChannelTable
 from drivetwin.channels.units import BAR, RPM
 from drivetwin.simulation.dual_clutch import LossLaw
@@ -88,6 +89,36 @@ class GearTable(StrictModel):
         return Gear(self.name, self.ratio, tuple(self.elements), eta)
 
 
+def _bound(name: str, unit: float = 1.0) -> Any:
+    """Field limits of a parameter of the actuator, in a file unit of this size."""
+    one = QUANTITIES[name]
+    return Field(ge=one.lower / unit, le=one.upper / unit)
+
+
+class ActuatorTable(StrictModel):
+    """`[elements.<name>.actuator]`: hydraulics between command and clutch pressure."""
+
+    dead_time_s: Annotated[float, _bound("dead_time")]
+    rising_lag_s: Annotated[float, _bound("rising_lag")]
+    falling_lag_s: Annotated[float, _bound("falling_lag")]
+    damping: Annotated[float, _bound("damping")] = 1.0
+    kiss_pressure_bar: Annotated[float, _bound("kiss_pressure", BAR)] = 0.0
+    fill_time_s: Annotated[float, _bound("fill_time")] = 0.0
+    hysteresis_bar: Annotated[float, _bound("hysteresis", BAR)] = 0.0
+
+    def to_model(self) -> ActuatorModel:
+        """Return the actuator in SI."""
+        return ActuatorModel(
+            dead_time=self.dead_time_s,
+            rising_lag=self.rising_lag_s,
+            falling_lag=self.falling_lag_s,
+            damping=self.damping,
+            kiss_pressure=self.kiss_pressure_bar * BAR,
+            fill_time=self.fill_time_s,
+            hysteresis=self.hysteresis_bar * BAR,
+        )
+
+
 class ElementTable(StrictModel):
     """`[elements.<name>]`: a brake or clutch; its gain as one number or from its geometry."""
 
@@ -102,6 +133,7 @@ class ElementTable(StrictModel):
     drum_inertia_kgm2: PriorEntry = PriorTable(value=0.0)
     i_c: float | None = None
     i_out: float | None = None
+    actuator: ActuatorTable | None = None
 
     @model_validator(mode="after")
     def _check_complete(self) -> ElementTable:
@@ -146,6 +178,7 @@ class ElementTable(StrictModel):
             i_c=self.i_c,
             i_out=self.i_out,
             geometry=self.geometry,
+            actuator=None if self.actuator is None else self.actuator.to_model(),
         )
 
 

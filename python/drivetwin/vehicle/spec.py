@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from drivetwin.actuator.model import ActuatorModel
+
 ElementKind = Literal["brake", "clutch"]
 
 
@@ -64,7 +66,7 @@ class ElementSpec:
     capacity = μ·gain·(P - P0), static capacity `peak` times that at zero slip (THEORY section 1).
     `P0` [Pa] ends the fill; `drum_inertia` [kg m^2] runs with the slip (THEORY section 2).
     `i_c`, `i_out` are the ratios of eq. 15 where the card states them, `geometry` is what the gain
-    is computed from where the card states it.
+    is computed from where the card states it, `actuator` its hydraulics where the card states them.
     """
 
     name: str
@@ -76,6 +78,7 @@ class ElementSpec:
     i_c: float | None = None
     i_out: float | None = None
     geometry: ClutchGeometry | None = None
+    actuator: ActuatorModel | None = None
 
 
 def compute_brake_ratios(ratio: float) -> tuple[float, float]:

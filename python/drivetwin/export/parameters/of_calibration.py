@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from drivetwin.calibration.calibrate import Calibration
+from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.simulation.dual_clutch import Signal
 
@@ -15,8 +18,13 @@ _CURVES = {
 """Units and meanings of the profiles."""
 
 
-def collect_calibration(found: Calibration, name: str) -> ParameterSet:
-    """Collect the policy's parameters, and the profiles over the time from the request [s]."""
+def collect_calibration(
+    found: Calibration, name: str, mapped: OperatingMap | None = None
+) -> ParameterSet:
+    """Collect the policy's parameters, and the profiles over the time from the request [s].
+
+    Of a map each parameter is a curve over the engine speed for each engine torque.
+    """
     task = found.task
     values = zip(task.policy.parameters, found.after.values.tolist(), strict=True)
     request = task.maneuver.request
@@ -26,7 +34,8 @@ def collect_calibration(found: Calibration, name: str) -> ParameterSet:
         curves=tuple(
             _build_curve(f"profile.{label}", signal, request, _CURVES[label])
             for label, signal in found.after.profiles.signals.items()
-        ),
+        )
+        + (() if mapped is None else tuple(_iterate_map_curves(mapped))),
         notes=(
             f"engine torque {task.maneuver.point.engine_torque:.6g} N*m, engine speed "
             f"{task.maneuver.point.engine_speed:.6g} rad/s at the request",
@@ -34,6 +43,17 @@ def collect_calibration(found: Calibration, name: str) -> ParameterSet:
             "actuator are not in the twin",
         ),
     )
+
+
+def _iterate_map_curves(mapped: OperatingMap) -> Iterator[Curve]:
+    grid = mapped.grid
+    axis = Axis("engine_speed", grid.speeds, "rad/s")
+    for k, one in enumerate(mapped.main.task.policy.parameters):
+        for i, torque in enumerate(grid.torques):
+            points = (mapped.points[i, j] for j in range(len(grid.speeds)))
+            values = tuple(float(each.found.values[k]) for each in points)
+            label = f"map.{one.name}.{torque:.0f}_Nm".replace("-", "minus_")
+            yield Curve(label, axis, values, one.unit, f"{one.text}, at {torque:.6g} N*m")
 
 
 def _build_curve(name: str, signal: Signal, request: float, labels: tuple[str, str]) -> Curve:

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Identification of made actuators from commands and measured pressures of the dynamometer.
+
+    python -m benchmarks.actuator [COUNT]
+
+Each log has a clutch that is filled twice at standstill and once in a shift, by a controller with
+a task of 10 ms; pressure at 1 kHz with 0.07 bar of noise, rounded to 10 Pa. Prints how many dead
+times lie within 5 ms and kiss pressures within 2 %, the coverage of the 95 % intervals by
+parameter, and the CPU time per log. Wanted: at least 9 of 10 each, coverage at least 90 %.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.actuator.identify import IdentifiedActuator, PressureRecord, identify_actuator
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.channels.units import BAR
+from drivetwin.dyno.actuators import ControlledActuator, Program
+from drivetwin.estimation.result.estimate import Z95
+
+_DURATION, _RATE, _NOISE, _RESOLUTION = 5.0, 1000.0, 7e3, 10.0
+_DEAD_TIME, _KISS = 0.005, 0.02
+"""Stated bounds of the errors: of the dead time [s], of the kiss pressure relative."""
+_SHARE = 0.9
+_RANGES = {
+    "dead_time": (0.01, 0.08),
+    "rising_lag": (0.010, 0.045),
+    "falling_lag": (0.010, 0.060),
+    "damping": (0.6, 1.3),
+    "kiss_pressure": (0.7e5, 2.0e5),
+    "fill_time": (0.08, 0.20),
+    "hysteresis": (0.0, 3e4),
+}
+"""Ranges of the made actuators, SI."""
+
+
+def make_actuator(random: np.random.Generator) -> ControlledActuator:
+    """Draw an actuator; its commands lie about its kiss pressure, as after a first tuning."""
+    model = ActuatorModel(**{name: float(random.uniform(*ends)) for name, ends in _RANGES.items()})
+    kiss = model.kiss_pressure * float(random.uniform(0.93, 1.07))
+    fast, slow = kiss + 2.8 * BAR, kiss + 1.0 * BAR
+    knots = (
+        *((0.30, 0.0), (0.31, fast), (0.37, fast), (0.38, kiss), (0.60, 0.0)),
+        *((0.90, 0.0), (0.91, slow), (1.03, slow), (1.04, 0.0)),
+        *((1.80, 0.0), (1.81, fast), (1.88, fast), (1.89, kiss), (2.15, kiss)),
+        *((2.31, 5.4 * BAR), (3.15, 5.2 * BAR), (3.23, 14 * BAR), (4.2, 14 * BAR)),
+        *((4.24, 4.2 * BAR), (4.4, 0.0)),
+    )
+    return ControlledActuator(Program(knots), model)
+
+
+def record(actuator: ControlledActuator, random: np.random.Generator) -> PressureRecord:
+    """Return command and measured pressure."""
+    stamps = np.arange(int(_DURATION * _RATE) + 1) / _RATE
+    exact = actuator.compute_pressure(stamps)
+    noisy = exact + _NOISE * random.standard_normal(exact.size)
+    pressure = _RESOLUTION * np.round(noisy / _RESOLUTION)
+    return PressureRecord(actuator.compute_command(_DURATION), stamps, pressure)
+
+
+def list_errors(found: IdentifiedActuator, truth: ActuatorModel) -> tuple[FloatArray, FloatArray]:
+    """Return the errors (7,) and whether the 95 % intervals hold them, 1 or 0 (7,)."""
+    errors = found.model.values - truth.values
+    return errors, (np.abs(errors) <= Z95 * found.std).astype(np.float64)
+
+
+def main() -> int:
+    """Run the study; 1 where a bound is missed."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 60
+    begin, errors, held, kisses = time.process_time(), [], [], []
+    for number in range(count):
+        random = np.random.default_rng([40, number])
+        actuator = make_actuator(random)
+        found = identify_actuator([record(actuator, random)])
+        error, covered = list_errors(found, actuator.model)
+        errors.append(error)
+        held.append(covered)
+        kisses.append(actuator.model.kiss_pressure)
+    cpu = (time.process_time() - begin) / count
+    table, names = np.array(errors), list(QUANTITIES)
+    late = int((np.abs(table[:, names.index("dead_time")]) <= _DEAD_TIME).sum())
+    kiss = np.abs(table[:, names.index("kiss_pressure")]) / np.array(kisses)
+    near = int((kiss <= _KISS).sum())
+    coverage = np.mean(held, axis=0)
+    sys.stdout.write(
+        f"dead time within 5 ms: {late} of {count}\nkiss pressure within 2 %: {near} of {count}\n"
+    )
+    for name, share in zip(names, coverage, strict=True):
+        sys.stdout.write(f"coverage of {QUANTITIES[name].label}: {100.0 * share:.0f} %\n")
+    sys.stdout.write(
+        f"coverage in all: {100.0 * coverage.mean():.1f} %\nCPU time per log: {cpu:.1f} s\n"
+    )
+    return 0 if min(late, near) >= _SHARE * count and coverage.mean() >= _SHARE else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""Actuator model: hysteresis, dead time, fill of the clutch, second-order lag."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.actuator.fill import Stroke, apply_hysteresis
+from drivetwin.actuator.held_signal import HeldSignal
+from drivetwin.actuator.lag import Lag, solve_lag
+from drivetwin.errors import InputError, Where
+
+
+@dataclass(frozen=True)
+class ActuatorQuantity:
+    """Name for people, symbol, SI unit, meaning and bounds of a parameter of the actuator."""
+
+    label: str
+    symbol: str
+    unit: str
+    meaning: str
+    lower: float
+    upper: float
+
+
+QUANTITIES: Mapping[str, ActuatorQuantity] = {
+    "dead_time": ActuatorQuantity(
+        "dead time", "T_d", "s", "command to the first movement of the pressure", 0.0, 0.5
+    ),
+    "rising_lag": ActuatorQuantity(
+        "rising lag", "T_r", "s", "time constant while the pressure rises", 1e-3, 1.0
+    ),
+    "falling_lag": ActuatorQuantity(
+        "falling lag", "T_f", "s", "time constant while the pressure falls", 1e-3, 1.0
+    ),
+    "damping": ActuatorQuantity("damping", "ζ", "1", "damping ratio of the lag", 0.2, 3.0),
+    "kiss_pressure": ActuatorQuantity(
+        "kiss pressure", "P_k", "Pa", "pressure while the clutch is filled", 0.0, 1e6
+    ),
+    "fill_time": ActuatorQuantity(
+        "fill time", "T_k", "s", "time of the filling at 1 bar above the kiss pressure", 0.0, 2.0
+    ),
+    "hysteresis": ActuatorQuantity(
+        "hysteresis", "H", "Pa", "pressure of a falling command over that of a rising one", 0.0, 2e6
+    ),
+}
+"""Parameters of the model, in the order of covariances and tables."""
+
+
+@dataclass(frozen=True)
+class ActuatorModel:
+    """Commanded pressure to clutch pressure; see `QUANTITIES` for the fields (SI).
+
+    The command passes the play of the valve, the dead time, the fill of the clutch and the lag, in
+    this order. Raises InputError for a value outside its bounds.
+    """
+
+    dead_time: float
+    rising_lag: float
+    falling_lag: float
+    damping: float = 1.0
+    kiss_pressure: float = 0.0
+    fill_time: float = 0.0
+    hysteresis: float = 0.0
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            value, spec = getattr(self, one.name), QUANTITIES[one.name]
+            if not spec.lower <= value <= spec.upper:
+                raise InputError(
+                    f"the {spec.label} of an actuator is {value:g} {spec.unit}",
+                    f"give a value from {spec.lower:g} to {spec.upper:g} {spec.unit}",
+                    Where(key=one.name),
+                )
+
+    @classmethod
+    def from_values(cls, values: FloatArray) -> ActuatorModel:
+        """Return the model of values (7,) in the order of `QUANTITIES`."""
+        return cls(*values.tolist())
+
+    @property
+    def values(self) -> FloatArray:
+        """Values (7,) in the order of `QUANTITIES`."""
+        return np.array([getattr(self, name) for name in QUANTITIES], dtype=np.float64)
+
+    def compute_pressure(
+        self, command: HeldSignal, at: FloatArray, initial: float | None = None
+    ) -> FloatArray:
+        """Clutch pressure [Pa] at the times `at` (m,) [s] by a command [Pa].
+
+        At rest before the command begins: at `initial` [Pa] as far as the hysteresis allows it, or
+        without it at the first command. Sampled at the controller's task, the command is exact.
+        """
+        changes = command.drop_repeated()
+        first = float(changes.values[0])
+        valve = apply_hysteresis(changes, self.hysteresis, first if initial is None else initial)
+        stroke = Stroke(self.kiss_pressure, self.fill_time)
+        acting = stroke.limit_pressure(HeldSignal(valve.time + self.dead_time, valve.values))
+        lag = Lag(self.rising_lag, self.falling_lag, self.damping)
+        return solve_lag(acting, float(acting.values[0]), lag).evaluate(at)
