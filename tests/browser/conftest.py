@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
+from tests.browser.bench import Bench, serve
 from tests.browser.watch import Watch
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -51,3 +52,16 @@ def pictures() -> Path:
     """Folder for screenshots."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     return PICTURES
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """A running workbench."""
+    with serve(tmp_path_factory.mktemp("workbench")) as running:
+        yield running
+
+
+@pytest.fixture
+def shown(page: Page, bench: Bench) -> Page:
+    """The workbench in a page that may not complain."""
+    return bench.shown(page)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Selects hand over their value; upload buttons send a file; the browser's way back changes the
-   view; a server that is silent is told; messages go when they are past. */
+/* Selects pass their value on; upload buttons send a file; buttons lead to steps; the browser's way
+   back changes the view; a missing answer of the server and past messages are handled. */
 "use strict";
 (() => {
   const idOf = (element) => (element.id.startsWith("{") ? JSON.parse(element.id) : element.id);
@@ -24,6 +24,14 @@
   };
   document.addEventListener("click", past("button"), true);
   document.addEventListener("change", past("select"), true);
+
+  /* A button that leads to a step opens its view and puts the focus on its title. */
+  document.addEventListener("click", (event) => {
+    const step = event.target.closest("button[data-go]")?.dataset.go;
+    if (!step) return;
+    document.getElementById(`nav-${step}`)?.click();
+    setTimeout(() => document.querySelector(`#view-${step} h2`)?.focus(), 50);
+  });
 
   window.addEventListener("popstate", () => {
     const view = location.hash.slice(1) || "log";
