@@ -64,7 +64,7 @@ def test_all_steps_by_keyboard(shown: Page, tmp_path: Path) -> None:
     expect(page.locator("#model-fit")).to_contain_text("simulated and compared in")
     _press(page, "button[data-go=export]")
     with page.expect_download() as handed:
-        _press(page, "#view-export button.tall:has-text('Report')")
+        _press(page, "#view-export button[id*='report.html']")
     handed.value.save_as(tmp_path / "report.html")
     assert "Model: " in (tmp_path / "report.html").read_text()
     _wait_for_states(page, *["done"] * 7)
@@ -124,6 +124,39 @@ def test_each_view_is_accessible_wide_and_narrow_in_light_and_dark(
                 findings[width, scheme, name] = grave_findings(page, *only)
                 assert page.evaluate("document.body.scrollWidth <= window.innerWidth"), name
     assert {place: found for place, found in findings.items() if found} == {}
+
+
+def test_a_card_by_the_form(shown: Page, bench: Bench, pictures: Path) -> None:
+    """Questions follow from answers, the focus stays, and the written card is open."""
+    page = shown
+    page.get_by_role("button", name=bench.log).click()
+    expect(page.locator("#log-content")).to_contain_text("channels mapped")
+    show_view(page, "card")
+    page.click("#begin-card")
+    for element in ("B2", "B3"):
+        page.get_by_label(f"Is the gain of {element} known").fill("gain")
+        page.keyboard.press("Tab")
+        expect(page.get_by_label(f"Gain N·D·A·r of {element}")).to_be_visible()
+        page.wait_for_function("document.activeElement.tagName === 'INPUT'")
+    page.get_by_label("Gain N·D·A·r of B2").fill("0,03")
+    page.keyboard.press("Tab")
+    expect(page.locator("#form-fields")).to_contain_text("write a point instead of the comma")
+    for element, gain in (("B2", "0.0302"), ("B3", "0.027")):
+        page.get_by_label(f"Gain N·D·A·r of {element}").fill(gain)
+        page.get_by_label(f"P0 of {element}").fill("0.8+-0.1")
+        page.keyboard.press("Tab")
+    expect(page.locator("#form-state")).to_have_text("The card is complete.")
+    page.screenshot(path=pictures / "workbench-card-form.png", full_page=True)
+    assert grave_findings(page) == []
+    page.get_by_label("File name").fill("written.toml")
+    page.click("#write-card")
+    expect(page.locator("#message")).to_contain_text("written.toml is written and open")
+    expect(page.locator("#message")).not_to_contain_text("shifts lists")
+    page.click("#write-card")
+    expect(page.locator("#message")).to_contain_text("this file exists")
+    page.get_by_label("Replace an existing file").check()
+    page.click("#write-card")
+    expect(page.locator("#message")).to_contain_text("written.toml is written and open")
 
 
 def test_a_blocked_step_leads_to_what_is_missing(shown: Page) -> None:

@@ -87,7 +87,7 @@ def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Ques
         ("gearbox",), "--gearbox NAME", "Built-in gearbox, or none",
         f"A built-in gearbox gives ratios and elements: {', '.join(known)}.{fitting}",
         _make_optional(make_choice_parser([*known, "none"])),
-        default=Answer(None, Origin.DEFAULT), shown="none",
+        default=Answer(None, Origin.DEFAULT), shown="none", choices=("none", *known),
     )  # fmt: skip
     box = get_value(answers, "gearbox")
     if box is not None:
@@ -288,6 +288,7 @@ def _iterate_sensor_questions(sources: Sources) -> Iterator[Question]:
         yield Question(
             ("sensors", role), f"--sensor {role}=CLASS[:RANGE]", f"Sensor class of {role}, or none",
             _describe_classes(role), _make_sensor_parser(role), default=UNKNOWN, shown="none",
+            choices=("none", *list_classes(role)),
         )  # fmt: skip
 
 

@@ -15,15 +15,18 @@ from typing import IO, Any
 
 import plotly.graph_objects as go
 
+from drivetwin._util.atomic import write_text
+from drivetwin.authoring.answers import Key
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_file import find_project_mapping
-from drivetwin.errors import InputError, RefusedError
+from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
 from drivetwin.logs.formats.parser_limits import BASE_TIME, compute_parser_limits
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
+from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.identifying import Task, identify_all
 from drivetwin.workbench.locks import Lock
 from drivetwin.workbench.mapping import Entry, apply_entries
@@ -59,6 +62,7 @@ class Session:
     live: Live | None = None
     gearbox: Gearbox | None = None
     uploads: dict[str, uploads.Upload] = field(default_factory=dict)
+    form: CardForm | None = None
     previews: dict[ColumnKey, Preview] = field(default_factory=dict)
     used: float = field(default_factory=time.monotonic)
     lock: threading.RLock = field(default_factory=threading.RLock)
@@ -98,6 +102,7 @@ class Session:
             self.cancel()
             self._set(work)
             self.previews.clear()
+            self.form = None
 
     def open_log(self, log: Source) -> None:
         """Open a log with the card that is open, if any; see `open`."""
@@ -132,9 +137,10 @@ class Session:
                 )
             return self.previews[key]
 
-    def survey_for_card(self) -> LogSurvey:
-        """Read what the log shows of a vehicle. Raises the typed errors of the readers."""
+    def begin_card(self) -> None:
+        """Begin the form of a new card from the log. Raises the typed errors of the readers."""
         with self.lock:
+            self.work.require_opened()
             request = replace(
                 self._make_request(self.work, self.work.channels), card=None, card_label=""
             )
@@ -144,7 +150,27 @@ class Session:
                 self.scratch / "mapping.toml",
                 limit=compute_parser_limits(request.log).seconds,
             )
-            return surveyed
+            self.form = CardForm(surveyed)
+            self.form.fill_in({})
+
+    def write_card(self, name: str, texts: Mapping[Key, str], *, can_replace: bool) -> Source:
+        """Write the card of the form into the folder; over an existing file only if that may be.
+
+        Raises InputError for open answers, RefusedError for a name that cannot be or exists.
+        """
+        with self.lock:
+            if self.form is None:
+                raise InputError("no card is begun", "press Begin a card from the log first")
+            path = self.folder.make_new_path(name, ".toml")
+            self.form.fill_in(texts)
+            text = self.form.format_card(path.name)
+            if path.exists() and not can_replace:
+                raise RefusedError(
+                    "this file exists", "choose another name, or tick Replace an existing file",
+                    Where(file=path.name),
+                )  # fmt: skip
+            write_text(path, text)
+            return Source(self.folder.get_name(path), path)
 
     def correct_mapping(self, entries: Sequence[Entry]) -> None:
         """Read the log again with the corrected mapping; discard the previous results.

@@ -33,6 +33,18 @@
     setTimeout(() => document.querySelector(`#view-${step} h2`)?.focus(), 50);
   });
 
+  /* A view that is drawn again replaces its controls: the one with the focus gets it back. */
+  let focused = null;
+  document.addEventListener("focusin", (event) => { focused = event.target; });
+  const keepFocus = () => {
+    if (!focused?.id || focused.isConnected || document.activeElement !== document.body) return;
+    const again = document.getElementById(focused.id);
+    focused = again;
+    again?.focus();
+  };
+  new MutationObserver(() => requestAnimationFrame(keepFocus))
+    .observe(document.documentElement, { childList: true, subtree: true });
+
   window.addEventListener("popstate", () => {
     const view = location.hash.slice(1) || "log";
     document.getElementById(`nav-${view}`)?.click();

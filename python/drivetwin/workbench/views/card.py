@@ -14,6 +14,7 @@ from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
+from drivetwin.workbench.views import card_form
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import UploadField
 from drivetwin.workbench.views.sources import format_source, get_source
@@ -39,12 +40,14 @@ def layout() -> list[Component]:
         html.Datalist(id="card-names"),
         dcc.Store(id="card-upload"),
         html.Div(id="card-content"),
+        *card_form.layout(),
     ]
 
 
 def register(page: ui.Page) -> None:
     """Register opening, and the data of the open card."""
     _register_opening(page)
+    card_form.register(page)
 
     @page.callback(
         Output("card-content", "children"),
