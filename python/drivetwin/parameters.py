@@ -89,7 +89,7 @@ _SPECS = (
         1e4, "element",
     ),
     ParameterSpec(
-        "te_delay", "engine torque delay", "τ_e", "s", "age of a fresh engine torque value", -1.0,
+        "te_delay", "engine torque delay", "τ_e", "s", "engine-torque signal delay", -1.0,
         1.0, "log",
     ),
 )  # fmt: skip

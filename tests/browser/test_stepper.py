@@ -96,6 +96,7 @@ def test_two_cursors_by_mouse_and_keyboard(shown: Page, bench: Bench) -> None:
     expect(page.locator("#preview-plot .cursor")).to_have_count(0)
 
 
+@pytest.mark.timeout(1800)
 def test_each_view_is_accessible_wide_and_narrow_in_light_and_dark(
     shown: Page, pictures: Path
 ) -> None:
@@ -118,7 +119,6 @@ def test_each_view_is_accessible_wide_and_narrow_in_light_and_dark(
             page.emulate_media(color_scheme=scheme)
             for name in VIEWS:
                 show_view(page, name)
-                page.wait_for_timeout(300)
                 page.screenshot(path=pictures / f"workbench-{name}-{width}-{scheme}.png")
                 only = () if scheme == "light" else ("color-contrast",)
                 findings[width, scheme, name] = grave_findings(page, *only)

@@ -201,9 +201,7 @@ def test_a_typed_time_of_any_detail_counts(shown: Page, bench: Bench) -> None:
     expect(about).to_contain_text("Boundary 3 inertia phase starts is set by hand")
 
 
-@pytest.mark.parametrize(
-    ("answer", "told"), [(None, "does not answer"), (500, "met a fault of its own")]
-)
+@pytest.mark.parametrize(("answer", "told"), [(None, "does not answer"), (500, "internal error")])
 def test_a_server_that_fails_is_told(refusing: Page, answer: int | None, told: str) -> None:
     def fail(route: Route) -> None:
         route.abort() if answer is None else route.fulfill(status=answer)

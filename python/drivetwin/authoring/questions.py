@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, Origin, get_value
+from drivetwin.authoring.converter import make_converter_question
 from drivetwin.authoring.element_questions import iterate_element_questions
 from drivetwin.authoring.gearboxes import (
     GearboxFit,
@@ -69,6 +70,7 @@ def iterate_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
     yield from _iterate_gear_questions(answers, sources)
     yield from iterate_element_questions(answers, sources.survey, sources.estimates)
     yield from _iterate_drive_questions(sources)
+    yield make_converter_question(sources.survey)
     yield from _iterate_inertia_questions(answers, sources)
     yield from _iterate_sensor_questions(sources)
 

@@ -26,7 +26,7 @@ class CardForm:
     _estimates: dict[object, LogEstimates] = field(default_factory=dict)
 
     def fill_in(self, texts: Mapping[Key, str]) -> bool:
-        """Take the texts of the fields; return True if other questions or faults follow."""
+        """Take the texts of some fields; return True if the form shows something else then."""
         before = self.entries
         self.texts = {**self.texts, **texts}
         self.entries = self._begin().fill_form(self.texts)
@@ -55,6 +55,6 @@ class CardForm:
 def _list_shown(entries: list[FormEntry]) -> list[tuple[object, ...]]:
     """List what a form shows of its questions."""
     return [
-        (one.question.key, one.question.format_default(), one.question.meaning, one.fault)
+        (one.question.key, one.question.format_default(), one.question.meaning, one.text, one.fault)
         for one in entries
     ]

@@ -13,6 +13,7 @@ _FIELDS = {
     "--elements": "the shift elements",
     "--input-gear": "the input gear",
     "--final-drive": "the final drive",
+    "--converter": "the map of the converter",
     "--engine-inertia": "the inertia at the engine",
     "--vehicle-inertia": "the inertia of the vehicle",
     "--mass": "the mass of the vehicle",

@@ -38,9 +38,15 @@
   document.addEventListener("focusin", (event) => { focused = event.target; });
   const keepFocus = () => {
     if (!focused?.id || focused.isConnected || document.activeElement !== document.body) return;
-    const again = document.getElementById(focused.id);
+    const again = document.getElementById(focused.id), before = focused;
     focused = again;
     again?.focus();
+    /* In the card form text that is being typed is newer than what the server has drawn. */
+    if (again?.closest(".question") && again.value !== before.value) {
+      const { set: write } = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value");
+      write.call(again, before.value);
+      again.dispatchEvent(new Event("input", { bubbles: true }));
+    }
   };
   new MutationObserver(() => requestAnimationFrame(keepFocus))
     .observe(document.documentElement, { childList: true, subtree: true });
@@ -56,9 +62,9 @@
     try {
       const answer = await ask(...request);
       if (answer.status === 403) {
-        say("the workbench was started anew -> open the link that its terminal shows", true);
+        say("the workbench was restarted -> open the new link from its terminal", true);
       } else if (answer.status >= 500) {
-        say("the workbench met a fault of its own -> its terminal has the details", true);
+        say("internal error of the workbench -> its terminal has the details", true);
       }
       return answer;
     } catch (fault) {
@@ -74,7 +80,7 @@
     const limit = Number(button.dataset.limit);
     if (file.size > limit) {
       const has = (file.size / 1e6).toFixed(0), may = (limit / 1e6).toFixed(0);
-      say(`${file.name}: the file has ${has} MB, uploads may have ${may} MB`, true);
+      say(`${file.name}: the file has ${has} MB, the limit is ${may} MB`, true);
       return;
     }
     button.setAttribute("aria-busy", "true");
@@ -96,7 +102,7 @@
       say(`uploaded ${content.name}`, false);
       set(button.dataset.target, { data: content });
     } catch (fault) {
-      say(`${file.name} was not taken: ${fault.message}`, true);
+      say(`${file.name} was not uploaded: ${fault.message}`, true);
     } finally {
       button.removeAttribute("aria-busy");
     }

@@ -25,6 +25,7 @@ _GROUPS = {
     "elements": "Shift elements",
     "i_in": "Drive",
     "final_drive": "Drive",
+    "converter": "Drive",
     "inertia": "Inertias",
     "vehicle": "Inertias",
     "sensors": "Sensors",
@@ -81,7 +82,7 @@ def _register_writing(page: ui.Page) -> None:
         """Write the card into the folder and open it."""
         if not clicks:
             return
-        texts = collect_texts(values, ids)
+        texts = {key: text for key, text in collect_texts(values, ids).items() if text}
         source = session.write_card(name or "", texts, can_replace=_REPLACE in (ticks or ()))
         session.open_card(source)
         ui.notify_topic(ui.Topic.LOG)
@@ -100,7 +101,11 @@ def _register_fields(page: ui.Page) -> None:
     ) -> tuple[object, object]:
         """Ask what follows from the answers; the page stays as it is where nothing does."""
         form = session.form
-        if form is None or not ctx.triggered_id or not form.fill_in(collect_texts(values, ids)):
+        changed = [one.get("question") for one in ctx.triggered_prop_ids.values() if one]
+        # Only changed fields: others may be older than the texts that the server has.
+        rows = [k for k, one in enumerate(ids) if one.question in changed]
+        texts = collect_texts([values[k] for k in rows], [ids[k] for k in rows])
+        if form is None or not texts or not form.fill_in(texts):
             return no_update, no_update
         return _build_fields(form), _describe_state(form)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from dash import Dash, Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
+from drivetwin.report.html import read_template
 from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.session import Session, Sessions
 from drivetwin.workbench.session_state import Source
@@ -85,7 +86,8 @@ _DUE = """(hidden, ...rest) => {
 }"""
 _INDEX = """<!DOCTYPE html>
 <html lang="en">
-  <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
+  <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}
+    <style>STATUS</style></head>
   <body>{%app_entry%}<footer hidden>{%config%}{%scripts%}{%renderer%}</footer></body>
 </html>"""
 _SWITCH = """(...clicked) => {
@@ -107,7 +109,7 @@ The view stands in the address, for the browser's way back and for loading the p
 
 def build_page(app: Dash, sessions: Sessions, start: Start, access: Access) -> None:
     """Give the application its layout and the callbacks of all views."""
-    app.index_string = _INDEX
+    app.index_string = _INDEX.replace("STATUS", read_template("status.css"))
     app.layout = _build_layout
     _register_view_switch(app)
     _register_drawing(app)
