@@ -19,6 +19,8 @@ from drivetwin.dyno.scenario_file import load_scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 GIVEN = ROOT.parent / "shared" / "logs" / "truck_a.csv"
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+"""Programs of the browser."""
 PATIENCE = 120_000
 """Time [ms] that a step may take on a busy machine."""
 STEPS = ("log", "channels", "card", "shifts", "identify", "model", "export")
@@ -67,16 +69,25 @@ def serve(folder: Path) -> Iterator[Bench]:
     else:
         log, card, _ = write_run(folder / "bench.csv", run(load_scenario("paper_steps"), seed=1))
     wrong = _with_wrong_unit(log)
+    with serve_folder(folder) as address:
+        yield Bench(address, folder, log.name, card.name, wrong)
+
+
+@contextmanager
+def serve_folder(folder: Path) -> Iterator[str]:
+    """Run the program in a folder; yields the address of the page."""
     command = [sys.executable, "-m", "drivetwin", "app", "--port", "0", "--no-browser"]
     server = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     told = server.stdout.readline()
     found = re.search(r"http://\S+/\?token=\S+", told)
     assert found, told
-    yield Bench(found.group(), folder, log.name, card.name, wrong)
-    server.terminate()
-    server.wait(10.0)
-    server.stdout.close()
+    try:
+        yield found.group()
+    finally:
+        server.terminate()
+        server.wait(10.0)
+        server.stdout.close()
 
 
 def open_files(page: Page, bench: Bench) -> None:

@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
-from tests.browser.bench import Bench, serve
+from tests.browser.bench import NAMES, Bench, serve
 from tests.browser.watch import Watch
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
 PICTURES = Path(__file__).resolve().parents[2] / "out" / "browser"
 """Where tests leave their pictures, for people to look at."""
 
