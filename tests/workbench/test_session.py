@@ -10,6 +10,7 @@ import pytest
 
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.result.method import Method
+from drivetwin.findings import render
 from drivetwin.logs.formats import parser_limits
 from drivetwin.workbench.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
@@ -214,6 +215,7 @@ def test_a_log_without_a_card_has_its_pressures_by_label(session: Session) -> No
     session.open(session.get_folder_source(LOG))
     work = session.work
     assert {"pressure.B2", "pressure.B3"} <= set(work.require_log().channels)
+    assert "the vehicle card" not in " ".join(render(work.require_log().findings))
     assert not work.shifts
     with pytest.raises(InputError, match="no vehicle card"):
         session.identify([Method.PAPER])

@@ -35,7 +35,7 @@ from drivetwin.logs.formats.parser_limits import compute_parser_limits
 from drivetwin.logs.raw import Recording
 from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Survey, survey_recording
-from drivetwin.plausibility.check import check_card, select_card_findings
+from drivetwin.plausibility.check import FROM_READING, check_card, select_card_findings
 from drivetwin.report.decimate import extract_envelope
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
@@ -111,6 +111,9 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
             mapping = _write_mapping(scratch, stated)
             read = read_log(request.log, names, mapping, gearing=card is not None)
             log = replace(read, source=request.label, mappings={})
+            if card is None:
+                remarks = (one for one in log.findings if one.code not in FROM_READING)
+                log = replace(log, findings=tuple(remarks))
             found = None if card is None else detect_shifts(log, card)
     except InputError as error:
         emit(Opened(looked, card, fault=str(error)))
