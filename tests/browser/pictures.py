@@ -18,7 +18,7 @@ from tests.browser.bench import NAMES, PATIENCE, serve_folder, show_view
 from tests.system.test_first_hour import write_bench_export
 
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "img"
-WIDTH, HEIGHT = 1000, 700
+WIDTH, HEIGHT = 1280, 800
 LOG, CARD = "messung.csv", "wagen.toml"
 GAINS = {"B2": "0.0378", "B3": "0.027"}
 """Gains [m^3] that the user knows of the vehicle."""
