@@ -54,11 +54,10 @@ def _list_keys(form: CardForm) -> list[Key]:
 def test_answers_open_the_questions_that_follow_from_them(begun: Session) -> None:
     form = _get_form(begun)
     assert ("elements", "B2", "gain_m3") not in _list_keys(form)
-    assert form.fill_in({("elements", "B2", "form"): "gain"})
+    form.fill_in({("elements", "B2", "form"): "gain"})
     assert ("elements", "B2", "gain_m3") in _list_keys(form)
-    assert form.fill_in({("elements", "B2", "form"): "diameters"})
+    form.fill_in({("elements", "B2", "form"): "diameters"})
     assert ("elements", "B2", "outer_mm") in _list_keys(form)
-    assert not form.fill_in({})
 
 
 def test_a_refused_answer_has_its_reason_beside_the_field(begun: Session) -> None:

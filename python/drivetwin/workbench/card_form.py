@@ -25,12 +25,10 @@ class CardForm:
     entries: list[FormEntry] = field(default_factory=list)
     _estimates: dict[object, LogEstimates] = field(default_factory=dict)
 
-    def fill_in(self, texts: Mapping[Key, str]) -> bool:
-        """Take the texts of some fields; return True if the form shows something else then."""
-        before = self.entries
+    def fill_in(self, texts: Mapping[Key, str]) -> None:
+        """Take the texts of some fields, and ask the questions that follow."""
         self.texts = {**self.texts, **texts}
         self.entries = self._begin().fill_form(self.texts)
-        return _list_shown(before) != _list_shown(self.entries)
 
     def format_card(self, file: str) -> str:
         """Return the text of the card.
@@ -50,11 +48,3 @@ class CardForm:
 
     def _begin(self) -> Session:
         return Session({}, Sources("vehicle", self.survey), self._estimates)
-
-
-def _list_shown(entries: list[FormEntry]) -> list[tuple[object, ...]]:
-    """List what a form shows of its questions."""
-    return [
-        (one.question.key, one.question.format_default(), one.question.meaning, one.text, one.fault)
-        for one in entries
-    ]

@@ -39,16 +39,17 @@
   const keepFocus = () => {
     if (!focused?.id || focused.isConnected || document.activeElement !== document.body) return;
     const again = document.getElementById(focused.id), before = focused;
+    if (!again) return;
     focused = again;
-    again?.focus();
+    again.focus();
     /* In the card form text that is being typed is newer than what the server has drawn. */
-    if (again?.closest(".question") && again.value !== before.value) {
+    if (again.closest(".question") && again.value !== before.value) {
       const { set: write } = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value");
       write.call(again, before.value);
       again.dispatchEvent(new Event("input", { bubbles: true }));
     }
   };
-  new MutationObserver(() => requestAnimationFrame(keepFocus))
+  new MutationObserver(keepFocus)
     .observe(document.documentElement, { childList: true, subtree: true });
 
   window.addEventListener("popstate", () => {

@@ -93,21 +93,29 @@ def _register_fields(page: ui.Page) -> None:
     @page.callback(
         Output("form-fields", "children"),
         Output("form-state", "children"),
+        Output({"note": ALL}, "children"),
+        Output({"question": ALL}, "placeholder"),
         Input({"question": ALL}, "value"),
         State({"question": ALL}, "id"),
     )
     def fill_in(
         session: Session, values: Sequence[str | None], ids: Sequence[QuestionId]
-    ) -> tuple[object, object]:
-        """Ask what follows from the answers; the page stays as it is where nothing does."""
+    ) -> tuple[object, ...]:
+        """Ask what follows from the answers; fields stay as long as the questions do."""
         form = session.form
         changed = [one.get("question") for one in ctx.triggered_prop_ids.values() if one]
         # Only changed fields: others may be older than the texts that the server has.
         rows = [k for k, one in enumerate(ids) if one.question in changed]
         texts = collect_texts([values[k] for k in rows], [ids[k] for k in rows])
-        if form is None or not texts or not form.fill_in(texts):
-            return no_update, no_update
-        return _build_fields(form), _describe_state(form)
+        kept = [no_update] * len(ids)
+        if form is None or not texts:
+            return no_update, no_update, kept, kept
+        form.fill_in(texts)
+        state = _describe_state(form)
+        if [_name_key(one.question.key) for one in form.entries] != [one.question for one in ids]:
+            return _build_fields(form), state, kept, kept
+        defaults = [one.question.format_default() for one in form.entries]
+        return no_update, state, [_build_notes(one) for one in form.entries], defaults
 
     @page.callback(Output("form-content", "children"), Input(ui.make_due_id("card"), "data"))
     def show(session: Session, _: object) -> list[Component]:
@@ -166,14 +174,28 @@ def _build_fields(form: CardForm) -> list[Component]:
     ]
 
 
+def _name_key(key: Key) -> str:
+    """Return the id of a question."""
+    return json.dumps(list(key))
+
+
+def _build_notes(entry: FormEntry) -> list[Component]:
+    """Build the meaning of a question with the origin of its default, and the fault."""
+    question, meaning = entry.question, replace_options(entry.question.meaning)
+    if question.default is not None and question.default.note:
+        meaning = f"{meaning} {question.format_default()}: {question.default.note}."
+    parts: list[Component] = [html.P(meaning, className="hint")]
+    if entry.fault:
+        parts.append(html.P(replace_options(entry.fault), className="fault"))
+    return parts
+
+
 def _build_entry(entry: FormEntry) -> Component:
     """Build field, explanation, and the reason why the typed answer is refused."""
     question = entry.question
-    name = json.dumps(list(question.key))
+    name = _name_key(question.key)
     unit = f" [{question.unit}]" if question.unit else ""
     choices = f"choices {name}" if question.choices else ""
-    default, note = question.format_default(), question.default.note if question.default else ""
-    meaning = replace_options(question.meaning)
     parts: list[Component] = [
         ui.make_field(
             {"question": name},
@@ -181,13 +203,11 @@ def _build_entry(entry: FormEntry) -> Component:
             type="text",
             value=entry.text,
             debounce=True,
-            placeholder=default,
+            placeholder=question.format_default(),
             list=choices,
         ),
-        html.P(f"{meaning} {default}: {note}." if note else meaning, className="hint"),
+        html.Div(_build_notes(entry), id={"note": name}),
     ]
-    if entry.fault:
-        parts.append(html.P(replace_options(entry.fault), className="fault"))
     if question.choices:
         options = [html.Option(value=str(one)) for one in question.choices]
         parts.append(html.Datalist(options, id=choices))
