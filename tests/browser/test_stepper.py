@@ -154,7 +154,7 @@ def test_a_card_by_the_form(shown: Page, pictures: Path) -> None:
     expect(page.locator("#message")).not_to_contain_text("shifts lists")
     page.click("#write-card")
     expect(page.locator("#message")).to_contain_text("this file exists")
-    page.get_by_label("Replace an existing file").check()
+    page.select_option("#replace-card", "replace")
     page.click("#write-card")
     expect(page.locator("#message")).to_contain_text("written.toml is written and open")
 

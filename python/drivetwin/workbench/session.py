@@ -166,7 +166,7 @@ class Session:
             text = self.form.format_card(path.name)
             if path.exists() and not can_replace:
                 raise RefusedError(
-                    "this file exists", "choose another name, or tick Replace an existing file",
+                    "this file exists", "choose another name, or 'replace it' beside the name",
                     Where(file=path.name),
                 )  # fmt: skip
             write_text(path, text)

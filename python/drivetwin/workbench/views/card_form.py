@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from typing import Literal
 
-from dash import ALL, Input, Output, State, ctx, dcc, html, no_update
+from dash import ALL, Input, Output, State, ctx, html, no_update
 from dash.development.base_component import Component
 from pydantic import BaseModel
 
@@ -31,7 +32,7 @@ _GROUPS = {
     "sensors": "Sensors",
 }
 """Heading of the questions by the first part of their key."""
-_REPLACE = "replace"
+_EXISTING = {"keep": "keep it", "replace": "replace it"}
 
 
 class QuestionId(BaseModel, strict=True):
@@ -66,7 +67,7 @@ def _register_writing(page: ui.Page) -> None:
     @page.callback(
         Input("write-card", "n_clicks"),
         State("new-card-name", "value"),
-        State("replace-card", "value"),
+        State("replace-card", "data-value"),
         State({"question": ALL}, "value"),
         State({"question": ALL}, "id"),
         busy="write-card",
@@ -75,7 +76,7 @@ def _register_writing(page: ui.Page) -> None:
         session: Session,
         clicks: int | None,
         name: str | None,
-        ticks: tuple[str, ...] | None,
+        existing: Literal["keep", "replace"],
         values: Sequence[str | None],
         ids: Sequence[QuestionId],
     ) -> None:
@@ -83,7 +84,7 @@ def _register_writing(page: ui.Page) -> None:
         if not clicks:
             return
         texts = {key: text for key, text in collect_texts(values, ids).items() if text}
-        source = session.write_card(name or "", texts, can_replace=_REPLACE in (ticks or ()))
+        source = session.write_card(name or "", texts, can_replace=existing == "replace")
         session.open_card(source)
         ui.notify_topic(ui.Topic.LOG)
         ui.notify_opened_log(f"{source.name} is written and open", session.work)
@@ -147,11 +148,7 @@ def build_form(form: CardForm) -> list[Component]:
                 ui.make_field("new-card-name", "File name", type="text", value="vehicle.toml"),
                 className="wide",
             ),
-            dcc.Checklist(
-                id="replace-card",
-                options=[{"label": "Replace an existing file", "value": _REPLACE}],
-                value=[],
-            ),
+            ui.make_choice("replace-card", "If the file exists", _EXISTING, "keep"),
             ui.make_button("Write and open the card", "write-card", main=True),
         ),
     ]
