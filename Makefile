@@ -148,6 +148,7 @@ fleet-scaling: $(venv)/.dev native ## overhead, memory, two workers against one,
 .PHONY: picture
 picture: $(venv)/.dev native ## draw the pictures of the documents (needs Chromium)
 	$(bin)/python -m tools.picture
+	$(bin)/python -m tests.browser.pictures
 
 .PHONY: accuracy
 accuracy: $(venv)/.dev native ## Monte Carlo of the estimators against the bound, docs/accuracy.md (an hour)

@@ -85,11 +85,11 @@ _SPECS = (
         "element",
     ),
     ParameterSpec(
-        "drum", "drum inertia", "I_d", "kg*m^2", "drum that runs with the slip (THEORY §2)", 0.0,
-        1e4, "element",
+        "drum", "drum inertia", "I_d", "kg*m^2",
+        "inertia of the clutch drum, which rotates at slip speed (THEORY §2)", 0.0, 1e4, "element",
     ),
     ParameterSpec(
-        "te_delay", "engine torque delay", "τ_e", "s", "age of a fresh engine torque value", -1.0,
+        "te_delay", "engine torque delay", "τ_e", "s", "engine-torque signal delay", -1.0,
         1.0, "log",
     ),
 )  # fmt: skip

@@ -27,7 +27,7 @@ VALID = {
     "gain_m3": "0.03", "surfaces": "10", "derating": "0.9", "area_m2": "0.02", "radius_m": "0.15",
     "outer_mm": "340", "inner_mm": "0", "piston_outer_mm": "300", "piston_inner_mm": "0",
     "i_in": "1", "final_drive": "4.88", "J_prime": "4..20", "mass": "12000", "radius": "0.5",
-    "J_out": "",
+    "J_out": "", "converter": "none",
 }  # fmt: skip
 """An answer to each question that is taken in nearly all situations, by the end of its key."""
 POOL = (

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
+from tests.browser.bench import NAMES, Bench, serve
 from tests.browser.watch import Watch
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
 PICTURES = Path(__file__).resolve().parents[2] / "out" / "browser"
 """Where tests leave their pictures, for people to look at."""
 
@@ -51,3 +51,16 @@ def pictures() -> Path:
     """Folder for screenshots."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     return PICTURES
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    """A running workbench."""
+    with serve(tmp_path_factory.mktemp("workbench")) as running:
+        yield running
+
+
+@pytest.fixture
+def shown(page: Page, bench: Bench) -> Page:
+    """The workbench in a page that may not complain."""
+    return bench.shown(page)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.simulate import format_traces
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.logs.read import read_raw
 from drivetwin.shifts.shift import Shift
+from drivetwin.validation.signal_table import format_signals
 from drivetwin.validation.simulate_log import simulate_shift
 from tests.observer.conftest import Bench, bench
 from tests.shifts.test_split_gears import CHAIN
@@ -70,7 +70,7 @@ def test_time_increases_from_shift_to_shift(bench: Bench, tmp_path: Path) -> Non
     run = simulate_shift(bench.twin, bench.log, bench.shift)
     runs = [_as(run, shift) for shift in CHAIN[:2]]
     file = tmp_path / "traces.csv"
-    file.write_text(format_traces(runs, bench.log), encoding="utf-8")
+    file.write_text(format_signals(runs, bench.log), encoding="utf-8")
     (torque,) = (one for one in read_raw(file).channels if one.name == "output_torque_simulated")
     assert (np.diff(torque.time) > 0.0).all()
     one, other = (each.trajectory for each in runs)

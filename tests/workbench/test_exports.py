@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -84,3 +85,21 @@ def test_a_twin_from_a_workspace_has_no_report(identified: Session, tmp_path: Pa
     with pytest.raises(InputError, match="identify again"):
         make_product(work, Record.REPORT, tmp_path)
     assert make_product(work, Record.TWIN, tmp_path).content
+
+
+def test_signals_are_measured_and_simulated_with_the_sliders(
+    identified: Session, tmp_path: Path
+) -> None:
+    work = identified.work
+    plain = make_product(work, Record.SIGNALS, tmp_path).content.decode()
+    moved = make_product(replace(work, changes={"k_o": 1e5}), Record.SIGNALS, tmp_path)
+    names, units, *rows = plain.splitlines()
+    assert names.startswith("time,output_torque_measured,output_torque_simulated")
+    assert units.startswith("s,N*m,N*m")
+    assert len(rows) > 100
+    place = names.split(",").index("output_torque_simulated")
+    before, after = (
+        [float(row.split(",")[place]) for row in text.splitlines()[2:]]
+        for text in (plain, moved.content.decode())
+    )
+    assert max(abs(a - b) for a, b in zip(before, after, strict=True)) > 1.0

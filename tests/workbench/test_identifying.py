@@ -39,7 +39,10 @@ def test_a_method_that_finds_nothing_says_what_to_do(place: Path) -> None:
     ("fault", "told"),
     [
         (DamagedChannelError("the pressure has a gap", "record it again"), "-> record it again"),
-        (np.linalg.LinAlgError("singular"), "a fault of its own (LinAlgError: singular)"),
+        (
+            np.linalg.LinAlgError("singular"),
+            "internal error of the workbench (LinAlgError: singular)",
+        ),
     ],
 )
 def test_what_ends_one_method_is_told_beside_what_the_others_find(

@@ -71,8 +71,9 @@ def test_a_column_known_by_its_name_cannot_be_set_aside(identified: Session) -> 
 
 
 def test_roles_hold_the_elements_of_the_card(identified: Session) -> None:
-    card = identified.work.require_card()
-    assert {f"pressure.{name}" for name in card.elements} <= set(list_roles(card))
+    opened = identified.work.require_opened()
+    elements = identified.work.require_card().elements
+    assert {f"pressure.{name}" for name in elements} <= set(list_roles(opened.survey))
 
 
 def test_offered_units_are_known_units() -> None:

@@ -10,11 +10,13 @@ import pytest
 
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.result.method import Method
+from drivetwin.findings import render
 from drivetwin.logs.formats import parser_limits
 from drivetwin.workbench.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
 from drivetwin.workbench.phases import Boundary, get_boundary_times
 from drivetwin.workbench.session import MOST_SESSIONS, MOST_UPLOADS, Session, Sessions
+from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG, finish
 
@@ -201,3 +203,65 @@ def test_uploads_that_are_open_stay_however_many_come_after(session: Session, pl
     assert len(session.work.shifts) == 1
     session.store_upload(BytesIO(b"x"), "last.csv", 1, 10)
     assert keys[0] not in session.uploads
+
+
+def test_the_sample_opens_with_its_card(session: Session) -> None:
+    session.open_sample()
+    assert len(session.work.shifts) == 1
+    assert not session.work.require_opened().doubts
+
+
+def test_a_log_without_a_card_has_its_pressures_by_label(session: Session) -> None:
+    session.open(session.get_folder_source(LOG))
+    work = session.work
+    assert {"pressure.B2", "pressure.B3"} <= set(work.require_log().channels)
+    assert "the vehicle card" not in " ".join(render(work.require_log().findings))
+    assert not work.shifts
+    with pytest.raises(InputError, match="no vehicle card"):
+        session.identify([Method.PAPER])
+
+
+def test_another_log_keeps_the_card(session: Session) -> None:
+    _open(session)
+    session.open_log(session.get_folder_source(LOG))
+    assert len(session.work.shifts) == 1
+
+
+def test_corrections_of_elements_that_a_card_lacks_are_left_out(session: Session) -> None:
+    session.open(session.get_folder_source(LOG))
+    rows = list_rows(session.work.require_opened().survey)
+    session.correct_mapping([Entry(one.role, one.unit, one.reversed) for one in rows])
+    text = session.get_folder_source(CARD).path.read_text().replace("B2", "X2")
+    other = session.scratch / "other.toml"
+    other.write_text(text)
+    session.open_card(Source("other.toml", other))
+    opened = session.work.require_opened()
+    assert opened.card is not None
+    assert "pressure.B2" not in opened.survey.mapping
+    assert "is no element" not in opened.fault
+
+
+def test_any_column_can_be_previewed(session: Session) -> None:
+    session.open(session.get_folder_source(LOG))
+    survey = session.work.require_opened().survey
+    for index, column in enumerate(survey.columns):
+        shown = session.read_column(index)
+        assert shown.name == column.name
+        assert shown.time.size == shown.values.size <= 4001
+        assert column.range == pytest.approx((shown.values.min(), shown.values.max()))
+    with pytest.raises(InputError, match="no such column"):
+        session.read_column(len(survey.columns))
+
+
+def test_the_mapping_of_the_project_folder_is_used(session: Session, tmp_path: Path) -> None:
+    source = session.get_folder_source(LOG)
+    log = tmp_path / LOG
+    log.write_bytes(source.path.read_bytes())
+    session.open(Source(LOG, log))
+    names = {one.role: one.column.name for one in list_rows(session.work.require_opened().survey)}
+    (tmp_path / "channels.toml").write_text(
+        f'[channels.output_torque]\nsource = "{names["output_torque"]}"\ntime_shift_s = 0.25\n'
+    )
+    plain = session.work.require_log()["output_torque"].time
+    session.open(Source(LOG, log))
+    assert session.work.require_log()["output_torque"].time == pytest.approx(plain + 0.25)

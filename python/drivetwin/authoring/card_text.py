@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from drivetwin._util.toml import format_key, format_text, parse_toml, raise_faults
 from drivetwin._util.visible_text import escape_line
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Origin, get_value, list_gears
+from drivetwin.authoring.converter import KEY, format_converter
 from drivetwin.authoring.element_text import format_elements
 from drivetwin.authoring.entries import format_entry, format_range
 from drivetwin.authoring.log_estimates import LogEstimates
@@ -48,6 +49,7 @@ def format_card(
         _format_head(answers, survey, draft=draft),
         _format_gears(answers, survey),
         format_elements(answers, survey, estimates or LogEstimates()),
+        format_converter(answers),
         _format_inertia(answers),
         _format_sensors(answers),
         _format_channels(answers, survey),
@@ -97,7 +99,7 @@ def _format_gears(answers: Answers, survey: LogSurvey | None) -> Iterator[str]:
         yield from format_entry("ratio", _take(notes["ratios"], gear.ratio), "")
         yield from format_entry("elements", _take(notes["elements"], [gear.element]), "")
         yield ""
-    if survey is not None and survey.has_input_slip:
+    if survey is not None and survey.has_input_slip and get_value(answers, *KEY) is None:
         yield "# Engine and input speed slip: the torque converter is open. Shifts with it open"
         yield "# need its map as [converter]; see docs/reference/vehicle-card.md."
 

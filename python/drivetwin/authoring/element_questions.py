@@ -210,6 +210,7 @@ def _make_kind_question(element: str, gear: str, ratio: float) -> Question:
         f"A brake holds a member of the gearbox still{where}, a clutch connects two that turn.",
         _make_kind_parser(ratio),
         default=kind,
+        choices=("brake", "clutch"),
     )
 
 
@@ -267,6 +268,7 @@ def _iterate_gain_questions(
             "The gain N·D·A·r turns pressure into torque: friction surfaces, de-rating, area and "
             f"effective radius; it is one number, or computed from its parts.{hint}",
             make_choice_parser(tuple(GainForm)),
+            choices=tuple(GainForm),
         )
     elif form is GainForm.GAIN:
         yield _make_question(element, "gain_m3", hint=hint)

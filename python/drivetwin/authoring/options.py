@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.authoring.answers import Answer, Key
+from drivetwin.authoring.converter import KEY
 from drivetwin.authoring.derive import GEOMETRY, derive_answers
 from drivetwin.authoring.element_questions import ELEMENT_PARTS
 from drivetwin.authoring.questions import SENSOR_ROLES, Sources, iterate_questions
@@ -21,6 +22,7 @@ ORDER: dict[str, Key] = {
     "--elements": ("gears", "elements"),
     "--input-gear": ("i_in",),
     "--final-drive": ("final_drive",),
+    "--converter": KEY,
     "--engine-inertia": ("inertia", "J_prime"),
     "--vehicle-inertia": ("inertia", "J_vehicle"),
     "--mass": ("vehicle", "mass"),

@@ -16,7 +16,8 @@ class Question:
     `option` is the command-line option that replaces it, `prompt` names the quantity and `meaning`
     explains it in a sentence. `parse` converts the text of an answer and raises ValueError with the
     reason where it cannot. `default` is taken for an empty answer; without one an answer is
-    required. `shown` replaces the text of the default.
+    required. `shown` replaces the text of the default. `choices` are the possible
+    answers; empty where any text is one.
     """
 
     key: Key
@@ -27,6 +28,7 @@ class Question:
     unit: str = ""
     default: Answer | None = None
     shown: str = ""
+    choices: tuple[str, ...] = ()
 
     def format_default(self) -> str:
         """Return the default as a user would type it; empty without one."""
@@ -42,6 +44,15 @@ class Question:
                 raise ValueError("an answer is needed here")
             return self.default.confirm()
         return Answer(self.parse(text))
+
+
+@dataclass(frozen=True)
+class FormEntry:
+    """A question of a form, the text typed into its field, and the reason why it is refused."""
+
+    question: Question
+    text: str = ""
+    fault: str = ""
 
 
 def format_value(value: object, separator: str = ",") -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, Origin, get_value
+from drivetwin.authoring.converter import make_converter_question
 from drivetwin.authoring.element_questions import iterate_element_questions
 from drivetwin.authoring.gearboxes import (
     GearboxFit,
@@ -69,6 +70,7 @@ def iterate_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
     yield from _iterate_gear_questions(answers, sources)
     yield from iterate_element_questions(answers, sources.survey, sources.estimates)
     yield from _iterate_drive_questions(sources)
+    yield make_converter_question(sources.survey)
     yield from _iterate_inertia_questions(answers, sources)
     yield from _iterate_sensor_questions(sources)
 
@@ -87,7 +89,7 @@ def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Ques
         ("gearbox",), "--gearbox NAME", "Built-in gearbox, or none",
         f"A built-in gearbox gives ratios and elements: {', '.join(known)}.{fitting}",
         _make_optional(make_choice_parser([*known, "none"])),
-        default=Answer(None, Origin.DEFAULT), shown="none",
+        default=Answer(None, Origin.DEFAULT), shown="none", choices=("none", *known),
     )  # fmt: skip
     box = get_value(answers, "gearbox")
     if box is not None:
@@ -288,6 +290,7 @@ def _iterate_sensor_questions(sources: Sources) -> Iterator[Question]:
         yield Question(
             ("sensors", role), f"--sensor {role}=CLASS[:RANGE]", f"Sensor class of {role}, or none",
             _describe_classes(role), _make_sensor_parser(role), default=UNKNOWN, shown="none",
+            choices=("none", *list_classes(role)),
         )  # fmt: skip
 
 

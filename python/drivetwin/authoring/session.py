@@ -16,14 +16,14 @@ from drivetwin.authoring.answers import (
 )
 from drivetwin.authoring.derive import derive_answers
 from drivetwin.authoring.log_estimates import LogEstimates, estimate_entries
-from drivetwin.authoring.question import Question
+from drivetwin.authoring.question import FormEntry, Question
 from drivetwin.authoring.questions import (
     Sources,
     find_next,
     list_open_questions,
     list_stated_elements,
 )
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import CardError, InputError, Where
 
 Ask = Callable[[Question, str], str]
 """Asks a question, with the reason why the answer before was refused; returns the text."""
@@ -35,10 +35,16 @@ class Session:
     Estimates from the log are computed anew when an answer that they depend on is known.
     """
 
-    def __init__(self, answers: Mapping[Key, Answer], sources: Sources) -> None:
+    def __init__(
+        self,
+        answers: Mapping[Key, Answer],
+        sources: Sources,
+        estimates: dict[object, LogEstimates] | None = None,
+    ) -> None:
+        """Begin with `answers`; sessions on one log may share their `estimates`."""
         self._stated = dict(answers)
         self._sources = sources
-        self._based_on: object = None
+        self._estimates = {} if estimates is None else estimates
 
     @property
     def answers(self) -> dict[Key, Answer]:
@@ -95,6 +101,25 @@ class Session:
                 )
             self._stated[question.key] = question.default or UNKNOWN
 
+    def fill_form(self, texts: Mapping[Key, str]) -> list[FormEntry]:
+        """Answer each question by the text of its field, in order; an empty one by the default.
+
+        A refused or missing answer is a fault of its entry; the questions after it take it as
+        unknown. Guesses that were not typed remain guesses.
+        """
+        entries = []
+        while (question := self._find_next()) is not None:
+            text, fault = texts.get(question.key, "").strip(), ""
+            try:
+                answer = question.answer(text)
+                self._stated[question.key] = answer if text else question.default or answer
+                derive_answers(self._stated, self._sources.survey)
+            except (ValueError, CardError) as refusal:
+                self._stated[question.key] = UNKNOWN
+                fault = refusal.what if isinstance(refusal, CardError) else str(refusal)
+            entries.append(FormEntry(question, text, fault))
+        return entries
+
     def _find_next(self) -> Question | None:
         known = self.answers
         return find_next(known, self._update_sources(known))
@@ -104,11 +129,9 @@ class Session:
         if survey is None or not list_gears(answers):
             return self._sources
         based_on = _list_dependencies(answers)
-        if based_on != self._based_on:
-            self._based_on = based_on
-            estimates = estimate_entries(survey, answers)
-            self._sources = replace(self._sources, estimates=estimates)
-        return self._sources
+        if based_on not in self._estimates:
+            self._estimates[based_on] = estimate_entries(survey, answers)
+        return replace(self._sources, estimates=self._estimates[based_on])
 
 
 def _list_dependencies(answers: Answers) -> tuple[object, ...]:

@@ -18,6 +18,9 @@ from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.channels.roles import ROLES
 from drivetwin.errors import MappingError, Where
 
+PROJECT_MAPPING = "channels.toml"
+"""Channel mapping of a project folder, for the logs beside it."""
+
 Entry = TypeVar("Entry")
 
 
@@ -96,6 +99,12 @@ class MappingFile(StrictModel):
     bus: BusTable = BusTable()
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
     names: ByRole[list[str]] = ByRole[list[str]]()
+
+
+def find_project_mapping(log: Path) -> Path | None:
+    """Return the channel mapping of a project folder, `channels.toml` beside the log, if any."""
+    beside = log.parent / PROJECT_MAPPING
+    return beside if beside.is_file() else None
 
 
 def read_mapping(path: Path) -> Mapped:

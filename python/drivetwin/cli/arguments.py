@@ -104,16 +104,11 @@ ChannelsFile = Annotated[
 ]
 
 
-PROJECT_MAPPING = "channels.toml"
-"""Channel mapping of a project folder, for the logs beside it."""
-
-
 def find_mapping(channels: Path | None, log: Path) -> Path | None:
     """Return the mapping file that was given, else `channels.toml` beside the log, else None."""
-    if channels is not None:
-        return channels
-    beside = log.parent / PROJECT_MAPPING
-    return beside if beside.is_file() else None
+    from drivetwin.channels.mapping_file import find_project_mapping
+
+    return channels if channels is not None else find_project_mapping(log)
 
 
 def _load_twin_card(twin: Twin, vehicle: Path | None) -> VehicleCard:

@@ -76,6 +76,14 @@ def new(
     final_drive: Annotated[
         str | None, typer.Option(metavar="RATIO", help="Ratio of the final drive.")
     ] = None,
+    converter: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NU:MU:TORQUE,...",
+            help="Map of the torque converter: speed ratio, torque ratio and pump torque at "
+            "1000 rpm [N·m] of each point.",
+        ),
+    ] = None,
     engine_inertia: Annotated[
         str | None,
         typer.Option(metavar="LOW..HIGH", help="Range of the inertia J′ at the engine [kg·m²]."),
@@ -124,6 +132,7 @@ def new(
         "--elements": elements, "--input-gear": input_gear, "--final-drive": final_drive,
         "--engine-inertia": engine_inertia, "--vehicle-inertia": vehicle_inertia, "--mass": mass,
         "--wheel-radius": wheel_radius, "--output-inertia": output_inertia,
+        "--converter": converter,
     }  # fmt: skip
     given = {option: text for option, text in single.items() if text is not None}
     survey = None if from_log is None else _survey(from_log, channels)

@@ -71,7 +71,7 @@ def _build_table(rows: list[Row], scenario: ScenarioName) -> Table:
     from drivetwin.cli.numbers import format_deviation, format_estimate
 
     table = make_table(
-        f"Scenario {scenario}: truth and what the log tells",
+        f"Scenario {scenario}: truth and estimates",
         "parameter", "truth", "paper", "off %",
         DEFAULT_METHOD, "95 %", "off %", "unit",
         right=("truth", "paper", "off %", DEFAULT_METHOD, "95 %"),

@@ -199,7 +199,7 @@ def estimate(
         return
     _print_estimates(found)
     if missing:
-        print_paragraph(f"too few logs tell a value of their own: {', '.join(missing)}")
+        print_paragraph(f"too few logs have an estimate of: {', '.join(missing)}")
 
 
 def _print_estimates(found: list[JointEstimate]) -> None:

@@ -77,12 +77,12 @@ def identify(
     """Identify the driveline behind a shift log.
 
     With -o, DIR/result.json, DIR/twin.toml and DIR/report.html are written;
-    several logs are identified one by one, each into DIR/NAME-OF-LOG. One that cannot be
-    identified is told, and the exit code is 2; the others have their results.
+    several logs are identified one by one, each into DIR/NAME-OF-LOG. A log that cannot be
+    identified is reported, and the exit code is 2; the others have their results.
 
-    With --together they are fitted as one: the driveline is common to all, the load and the age
-    of the engine torque are each log's own. What --hold-out names takes no part in the fit; it is
-    simulated with what the others tell, and compared. It implies --together.
+    With --together they are fitted as one: the driveline is common to all logs, the load and the
+    delay of the engine torque are specific to each. A log or shift of --hold-out takes no part in
+    the fit; it is simulated with the parameters of the others and compared. It implies --together.
     """
     how = Request(vehicle, channels, method, tuple(effects or ()))
     if together or hold_out:

@@ -35,10 +35,10 @@ def reduce(
     ],
     as_json: JsonFlag = False,
 ) -> None:
-    """Reduce a shift to the dual-clutch form and tell how exact that is.
+    """Reduce a shift to the dual-clutch form and estimate the error of it.
 
     Ratios of both elements, mass matrix, condition (1) with the members that violate it, the error
-    of leaving their coupling out: estimated first, then simulated.
+    of neglecting their coupling, first estimated, then simulated.
     """
     from drivetwin.gearbox import describe_ratio_differences, load_gearbox
     from drivetwin.gearbox import reduce as reduce_shift
@@ -63,7 +63,7 @@ def reduce(
     print_line(reduction.describe_condition())
     print_line("")
     if errors.reason is not None:
-        print_line(f"No error of leaving M12 out is told: {errors.reason}")
+        print_line(f"The error of neglecting M12 is not known: {errors.reason}")
     else:
         print_table(_build_error_table(errors))
 

@@ -76,7 +76,7 @@ def _print_page_name(source: Path, *, as_json: bool) -> None:
     page = result.with_name(REPORT)
     if not page.is_file():
         raise ResultFileError(
-            f"{REPORT} does not stand beside {result.name}",
+            f"{REPORT} is not in the folder of {result.name}",
             "write all three files again with `drivetwin identify LOG --vehicle CARD -o DIR`",
             Where(file=str(page)),
         )

@@ -27,7 +27,6 @@ from drivetwin.cli.output import (
 from drivetwin.export.input_kind import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
-    from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.estimation.result.validation import Validation
     from drivetwin.twin.twin import Twin
 
@@ -93,6 +92,7 @@ def simulate(
     from drivetwin.files.twin_conversion import load_twin
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.command_pressures import replace_pressures
+    from drivetwin.validation.signal_table import format_signals
     from drivetwin.validation.simulate_log import simulate_shift
 
     model = (
@@ -109,7 +109,7 @@ def simulate(
             stepping = Stepping(DEFAULT_STEP if step_size is None else step_size, input_kind)
             runs = [rerun_fixed_step(run, model, recording, stepping) for run in runs]
     if output is not None:
-        write_text(output, format_traces(runs, recording))
+        write_text(output, format_signals(runs, recording))
     if html is not None:
         with show_step(f"writing {html.name}"):
             _write_page(html, model, runs, log.name)
@@ -167,48 +167,3 @@ def _to_document(run: Validation) -> dict[str, object]:
         },
         "findings": dump_findings(run.findings),
     }
-
-
-def format_traces(runs: Sequence[Validation], log: ShiftLog) -> str:
-    """CSV with a unit row: time, and each signal as measured and as simulated, SI.
-
-    The rows are the times of the simulation. Measured values are interpolated between samples and
-    empty where the log has none; a signal without a channel has no measured column. The shifts
-    follow each other, and a gear that is held between two shifts is divided in its middle: time
-    increases throughout.
-    """
-    import numpy as np
-
-    from drivetwin.report.labels import get_channel_unit
-    from drivetwin.shifts.split_gears import compute_exclusive_masks
-    from drivetwin.validation.simulate_log import SIGNALS, compute_run_signals
-
-    measured = dict.fromkeys(name for run in runs for name in run.all_traces)
-    names = list(dict.fromkeys((*SIGNALS, *measured)))
-    columns = [
-        (name, part)
-        for name in names
-        for part in ("measured", "simulated")
-        if part == "simulated" or name in measured
-    ]
-    lines = [
-        ",".join(["time", *(f"{name}_{part}" for name, part in columns)]),
-        ",".join(["s", *(get_channel_unit(name) for name, _ in columns)]),
-    ]
-    own = compute_exclusive_masks(
-        [run.shift for run in runs], [run.trajectory.time for run in runs]
-    )
-    for run, kept in zip(runs, own, strict=True):
-        time, simulated = run.trajectory.time, compute_run_signals(run.model, run.trajectory)
-        values = (
-            simulated[name] if part == "simulated" else log[name].interpolate(time)
-            for name, part in columns
-        )
-        rows = np.column_stack((time, *values))[kept].tolist()
-        lines += [",".join(map(_format_value, row)) for row in rows]
-    return "\n".join(lines) + "\n"
-
-
-def _format_value(value: float) -> str:
-    """Format a value; empty for none."""
-    return f"{value:.12g}" if value == value else ""

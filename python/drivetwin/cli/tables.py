@@ -122,7 +122,7 @@ def build_suggestion_table(
 ) -> Table:
     """By parameter the experiment that would narrow it most, with the interval now and then."""
     table = make_table(
-        "What would tell more", "parameter", "now", "experiment", "then", "unit",
+        "Next experiments", "parameter", "now", "experiment", "then", "unit",
         right=("now", "then"),
     )  # fmt: skip
     for one in suggestions:

@@ -62,7 +62,7 @@ def _list_element_entries(model: DualClutch, index: int) -> tuple[Entry, ...]:
         entry("gain", element.gain, "m^3", "surfaces, de-rating, area, effective radius", 0.0),
         entry("P0", element.P0, "Pa", "pressure at which the fill ends"),
         entry("peak", element.peak, "1", "static over kinetic capacity at zero slip", 1.0),
-        entry("drum_inertia", element.drum_inertia, "kg*m^2", "inertia that runs with the slip", 0),
+        entry("drum_inertia", element.drum_inertia, "kg*m^2", "inertia of the clutch drum", 0),
     )
     law = element.friction
     if isinstance(law, FrictionTable):

@@ -101,8 +101,8 @@ def render_page(
         title=title,
         subtitle=subtitle,
         sections=sections,
-        style=_read_resource("report.css"),
-        script=_read_resource("report.js"),
+        style=read_template("status.css") + read_template("report.css"),
+        script=read_template("report.js"),
         samples_index=lambda: _encode_json(store.index),
         samples=lambda: Markup(store.encode()),
         library=library,
@@ -159,5 +159,6 @@ def _show(value: object) -> object:
     return escape_text(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
-def _read_resource(name: str) -> Markup:
+def read_template(name: str) -> Markup:
+    """Return the text of a style sheet or script of pages."""
     return Markup(files("drivetwin.report").joinpath("templates", name).read_text("utf-8"))

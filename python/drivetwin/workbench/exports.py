@@ -14,7 +14,7 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.identification import Identification
 from drivetwin.export.targets import Target
 from drivetwin.files.twin_conversion import save_twin
-from drivetwin.workbench import jobs
+from drivetwin.workbench import jobs, what_if
 from drivetwin.workbench.identifying import render_log_report
 from drivetwin.workbench.session_state import SessionState
 
@@ -33,6 +33,7 @@ class Record(StrEnum):
     RESULT = "result.json"
     REPORT = "report.html"
     MAPPING = "channels.toml"
+    SIGNALS = "signals.csv"
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,8 @@ def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
             log = work.require_log()
             text: str = jobs.call(render_log_report, _get_evidence(work), log, limit=REPORT_LIMIT)
             return text.encode()
+        case Record.SIGNALS:
+            return _format_signals(work).encode()
         case Record.MAPPING:
             from drivetwin.channels.mapping_text import format_mapping
 
@@ -106,6 +109,17 @@ def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
                 {**survey.mapping, **work.channels}, survey.options, survey.names
             ).encode()
     return _read_file(path)
+
+
+def _format_signals(work: SessionState) -> str:
+    """Format the shift that is shown, simulated with the sliders as they are."""
+    from drivetwin.validation.signal_table import format_signals
+
+    twin, log = work.require_twin(), work.require_log()
+    run = what_if.simulate_identified(twin, log, work.require_shift())
+    if work.changes:
+        run = what_if.simulate_changes(run, twin, log, work.changes)
+    return format_signals([run], log)
 
 
 def _get_evidence(work: SessionState) -> Identification:

@@ -52,10 +52,10 @@ def to_fault(error: Exception) -> Fault:
         case DrivetwinError():
             return Fault(error.what, error.remedy, error.where)
         case MemoryError() | RecursionError():
-            return Fault("this takes more memory than there is", "cut or split the file")
+            return Fault("the file needs more memory than is available", "cut or split the file")
     traceback.print_exception(error)
     return Fault(
-        f"the workbench met a fault of its own ({type(error).__name__}: {error})",
+        f"internal error of the workbench ({type(error).__name__}: {error})",
         "its terminal has the details: please report them",
     )
 
@@ -120,7 +120,7 @@ class Job:
                 self.cancel()
                 raise InputError(
                     f"this took longer than {limit:.0f} s and was stopped",
-                    "hand in a shorter log, or cut it to the shift",
+                    "open a shorter log, or cut it to the shift",
                 )
             found += self.get_results()
         if self.fault is not None:
@@ -137,7 +137,7 @@ class Job:
         self.process.join(_PATIENCE)
         self.fault = Fault(
             f"the process that did this stopped (exit code {self.process.exitcode})",
-            "the file may be damaged, or expand to more memory than there is",
+            "the file may be damaged, or expand to more memory than is available",
         )
         self._end()
 

@@ -15,7 +15,6 @@ from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import list_first_spellings, resolve_channel_unit
 from drivetwin.errors import MappingError, UnitError, Where
 from drivetwin.logs.survey import Column, Survey
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 @dataclass(frozen=True)
@@ -37,9 +36,9 @@ class Entry:
     reversed: bool
 
 
-def list_roles(card: VehicleCard) -> tuple[str, ...]:
-    """All roles that a column may have, the pressures of the card's elements last."""
-    return (*ROLES, *(make_pressure_role(element) for element in card.elements))
+def list_roles(survey: Survey) -> tuple[str, ...]:
+    """List the roles that a column may have, the pressures of the elements last."""
+    return (*ROLES, *(make_pressure_role(element) for element in survey.elements or ()))
 
 
 def list_unit_names() -> list[str]:

@@ -11,18 +11,32 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.process_limits import limit_memory
+from drivetwin.authoring.log_survey import (
+    LogSurvey,
+    find_pressure_columns,
+    make_blank_card,
+    survey_log,
+)
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import format_mapping
+from drivetwin.channels.pressure_roles import get_element, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError, InputError
+from drivetwin.findings import Finding
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.formats.parser_limits import compute_parser_limits
+from drivetwin.logs.raw import Recording
 from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Survey, survey_recording
+from drivetwin.plausibility.check import FROM_READING, check_card, select_card_findings
+from drivetwin.report.decimate import extract_envelope
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.workbench.jobs import Emit
@@ -32,13 +46,16 @@ from drivetwin.workbench.jobs import Emit
 class Opened:
     """Contents of a log, and the mapping it was read with.
 
+    `card` is None as long as none is open: pressures then have the labels of their columns.
     `log` and `found` are None if the log cannot be read as mapped; `fault` then holds the reason.
+    `found` is also None without a card. `doubts` are the implausible entries of the card.
     """
 
     survey: Survey
-    card: VehicleCard
+    card: VehicleCard | None = None
     log: ShiftLog | None = None
     found: FoundShifts | None = None
+    doubts: tuple[Finding, ...] = ()
     fault: str = ""
 
 
@@ -46,15 +63,34 @@ class Opened:
 class Request:
     """Files to open, and the channels as corrected by the user.
 
-    The labels name the files in messages and results.
+    The labels name the files in messages and results; without a card `card` is None.
     """
 
     log: Path
     label: str
-    card: Path
-    card_label: str
+    card: Path | None = None
+    card_label: str = ""
     mapping: Path | None = None
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ColumnKey:
+    """A column of a log: name, group, and its number among those of the same name and group."""
+
+    name: str
+    group: str
+    number: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """A column as recorded: `time` (n,) [s], `values` (n,) in `unit`; long ones as envelope."""
+
+    name: str
+    unit: str
+    time: FloatArray
+    values: FloatArray
 
 
 def open_log(emit: Emit, request: Request, scratch: Path) -> None:
@@ -64,23 +100,112 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     those of the mapping become `fault`, so that it can be corrected.
     """
     limit_memory(compute_parser_limits(request.log).memory)
-    labels = {request.log: request.label, request.card: request.card_label}
-    with _apply_labels(labels):
-        card = replace(load_card(request.card), source=request.card_label)
-        stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
-        stated = replace(stated, channels={**stated.channels, **request.channels})
+    with _apply_labels(_get_labels(request)):
+        card = _load_card(request)
+        stated = _read_stated(request, card)
         with open_recording(request.log, stated.options) as recording:
-            looked = survey_recording(recording, str(request.log), card, stated)
+            names, stated = _name_pressures(recording, card, stated)
+            looked = survey_recording(recording, str(request.log), names, stated)
     try:
-        with _apply_labels(labels):
+        with _apply_labels(_get_labels(request)):
             mapping = _write_mapping(scratch, stated)
-            read = read_log(request.log, card, mapping)
+            read = read_log(request.log, names, mapping, gearing=card is not None)
             log = replace(read, source=request.label, mappings={})
-            found = detect_shifts(log, card)
+            if card is None:
+                remarks = (one for one in log.findings if one.code not in FROM_READING)
+                log = replace(log, findings=tuple(remarks))
+            found = None if card is None else detect_shifts(log, card)
     except InputError as error:
         emit(Opened(looked, card, fault=str(error)))
         return
-    emit(Opened(looked, card, log, found))
+    doubts = () if card is None or found is None else _check_card(card, log, found)
+    emit(Opened(looked, card, log, found, doubts))
+
+
+def read_column(emit: Emit, request: Request, key: ColumnKey) -> None:
+    """Read a column of a log, mapped or not; emits a Preview.
+
+    Raises InputError where the column holds no numbers.
+    """
+    limit_memory(compute_parser_limits(request.log).memory)
+    with (
+        _apply_labels(_get_labels(request)),
+        open_recording(request.log, _read_stated(request, None).options) as recording,
+    ):
+        places = [
+            place
+            for place, one in enumerate(recording.columns)
+            if (one.name, one.group) == (key.name, key.group)
+        ]
+        if key.number >= len(places):
+            raise InputError("there is no such column", "choose one that is listed")
+        channel = recording.load(places[key.number])
+    known = np.isfinite(channel.time)
+    time, values = extract_envelope(channel.time[known], channel.values[known])
+    emit(Preview(channel.name, channel.unit or "", time, values))
+
+
+def make_column_key(survey: Survey, index: int) -> ColumnKey:
+    """Return the key of a column of a survey. Raises InputError where it has none there."""
+    if not 0 <= index < len(survey.columns):
+        raise InputError("there is no such column", "choose one that is listed")
+    names = [(one.name, one.group) for one in survey.columns]
+    return ColumnKey(*names[index], names[:index].count(names[index]))
+
+
+def survey_for_card(emit: Emit, request: Request, scratch: Path) -> None:
+    """Read what a log shows of a vehicle, without a card; emits a LogSurvey."""
+    limit_memory(compute_parser_limits(request.log).memory)
+    with _apply_labels(_get_labels(request)):
+        survey: LogSurvey = survey_log(
+            request.log, _write_mapping(scratch, _read_stated(request, None))
+        )
+    emit(replace(survey, log=replace(survey.log, source=request.label, mappings={})))
+
+
+def _get_labels(request: Request) -> dict[Path, str]:
+    labels = {request.log: request.label}
+    return labels if request.card is None else {**labels, request.card: request.card_label}
+
+
+def _load_card(request: Request) -> VehicleCard | None:
+    if request.card is None:
+        return None
+    return replace(load_card(request.card), source=request.card_label)
+
+
+def _read_stated(request: Request, card: VehicleCard | None) -> Mapped:
+    """Read the mapping file with the corrections, those of elements that a card lacks left out."""
+    stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
+    corrected = {
+        role: spec
+        for role, spec in request.channels.items()
+        if card is None or (element := get_element(role)) is None or element in card.elements
+    }
+    return replace(stated, channels={**stated.channels, **corrected})
+
+
+def _name_pressures(
+    recording: Recording, card: VehicleCard | None, stated: Mapped
+) -> tuple[VehicleCard, Mapped]:
+    """Return the card that names the pressures, and the mapping with the pressures.
+
+    Without a card they have the labels of their columns.
+    """
+    if card is not None:
+        return card, stated
+    specs = find_pressure_columns(recording.columns, stated.channels)
+    pressures = {make_pressure_role(label): spec for label, spec in specs.items()}
+    return make_blank_card(specs), replace(stated, channels={**stated.channels, **pressures})
+
+
+def _check_card(card: VehicleCard, log: ShiftLog, found: FoundShifts) -> tuple[Finding, ...]:
+    """Return the implausible entries of the card; those of the log alone where that fails."""
+    remarks = select_card_findings(card, log.findings)
+    try:
+        return (*check_card(card, log, found.shifts), *remarks)
+    except DrivetwinError:
+        return (*check_card(card), *remarks)
 
 
 def open_gearbox(emit: Emit, path: Path, label: str) -> None:

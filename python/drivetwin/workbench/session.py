@@ -15,17 +15,24 @@ from typing import IO, Any
 
 import plotly.graph_objects as go
 
+from drivetwin._util.atomic import write_text
+from drivetwin.authoring.answers import Key
+from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.errors import InputError, RefusedError
+from drivetwin.channels.mapping_file import find_project_mapping
+from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
 from drivetwin.logs.formats.parser_limits import BASE_TIME, compute_parser_limits
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
+from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.identifying import Task, identify_all
 from drivetwin.workbench.locks import Lock
 from drivetwin.workbench.mapping import Entry, apply_entries
 from drivetwin.workbench.phases import Boundary
+from drivetwin.workbench.sample import write_sample
+from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
 from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.workspace_folder import Folder
 
@@ -55,6 +62,8 @@ class Session:
     live: Live | None = None
     gearbox: Gearbox | None = None
     uploads: dict[str, uploads.Upload] = field(default_factory=dict)
+    form: CardForm | None = None
+    previews: dict[ColumnKey, Preview] = field(default_factory=dict)
     used: float = field(default_factory=time.monotonic)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
@@ -82,8 +91,8 @@ class Session:
         path = self.folder.get_file(name)
         return Source(self.folder.get_name(path), path)
 
-    def open(self, log: Source, card: Source, mapping: Path | None = None) -> None:
-        """Open a log with its card; discard the work on the previous log.
+    def open(self, log: Source, card: Source | None = None, mapping: Path | None = None) -> None:
+        """Open a log, with its card if there is one; discard the work on the previous log.
 
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
@@ -92,6 +101,76 @@ class Session:
             work = work.set_opened(self._read(work, {}))
             self.cancel()
             self._set(work)
+            self.previews.clear()
+            self.form = None
+
+    def open_log(self, log: Source) -> None:
+        """Open a log with the card that is open, if any; see `open`."""
+        self.open(log, self.work.card)
+
+    def open_card(self, card: Source) -> None:
+        """Open a card for the log that is open; results on another card are discarded.
+
+        Raises the typed errors of the readers; the work stays as it was then, and goes on.
+        """
+        with self.lock:
+            self.work.require_opened()
+            work = replace(self.work, card=card, locks={})
+            work = work.set_opened(self._read(work, work.channels))
+            self.cancel()
+            self._set(work)
+
+    def open_sample(self) -> None:
+        """Open a synthetic log with its card, as an example."""
+        log, card = write_sample(self.scratch)
+        self.open(Source(log.name, log, uploaded=True), Source(card.name, card, uploaded=True))
+
+    def read_column(self, index: int) -> Preview:
+        """Read the column `index` of the survey as recorded. Raises InputError without numbers."""
+        with self.lock:
+            key = make_column_key(self.work.require_opened().survey, index)
+            if key not in self.previews:
+                request = self._make_request(self.work, {})
+                limit = compute_parser_limits(request.log).seconds
+                self.previews[key] = jobs.call(
+                    sandboxed_parse.read_column, request, key, limit=limit
+                )
+            return self.previews[key]
+
+    def begin_card(self) -> None:
+        """Begin the form of a new card from the log. Raises the typed errors of the readers."""
+        with self.lock:
+            self.work.require_opened()
+            request = replace(
+                self._make_request(self.work, self.work.channels), card=None, card_label=""
+            )
+            surveyed: LogSurvey = jobs.call(
+                sandboxed_parse.survey_for_card,
+                request,
+                self.scratch / "mapping.toml",
+                limit=compute_parser_limits(request.log).seconds,
+            )
+            self.form = CardForm(surveyed)
+            self.form.fill_in({})
+
+    def write_card(self, name: str, texts: Mapping[Key, str], *, can_replace: bool) -> Source:
+        """Write the card of the form into the folder; over an existing file only if that may be.
+
+        Raises InputError for open answers, RefusedError for a name that cannot be or exists.
+        """
+        with self.lock:
+            if self.form is None:
+                raise InputError("no card is begun", "press Begin a card from the log first")
+            path = self.folder.make_new_path(name, ".toml")
+            self.form.fill_in(texts)
+            text = self.form.format_card(path.name)
+            if path.exists() and not can_replace:
+                raise RefusedError(
+                    "this file exists", "choose another name, or 'replace it' beside the name",
+                    Where(file=path.name),
+                )  # fmt: skip
+            write_text(path, text)
+            return Source(self.folder.get_name(path), path)
 
     def correct_mapping(self, entries: Sequence[Entry]) -> None:
         """Read the log again with the corrected mapping; discard the previous results.
@@ -167,7 +246,7 @@ class Session:
         """Run and figure at the present sliders. Raises what the simulation needs and lacks."""
         with self.lock:
             if self.live is None:
-                work = self.work
+                work = self.work = replace(self.work, has_viewed=True)
                 twin, log = work.require_twin(), work.require_log()
                 identified = what_if.simulate_identified(twin, log, work.require_shift())
                 present = what_if.simulate_changes(identified, twin, log, work.changes)
@@ -184,6 +263,11 @@ class Session:
             self.work = replace(work, changes=dict(changes))
             self.live = replace(live, present=present)
             return what_if.collect_changed_curves(live.figure, present)
+
+    def note_export(self) -> None:
+        """Record that the result was exported."""
+        with self.lock:
+            self.work = replace(self.work, has_exported=True)
 
     def open_gearbox(self, card: Source | str) -> None:
         """Load a gearbox card, or a built-in one by its name. Raises CardError."""
@@ -227,16 +311,7 @@ class Session:
     def _read(
         self, work: SessionState, channels: Mapping[str, ChannelSpec]
     ) -> sandboxed_parse.Opened:
-        if work.log is None or work.card is None:
-            raise InputError("no log is open", "open a log and its vehicle card first")
-        request = sandboxed_parse.Request(
-            log=work.log.path,
-            label=work.log.name,
-            card=work.card.path,
-            card_label=work.card.name,
-            mapping=work.mapping,
-            channels=channels,
-        )
+        request = self._make_request(work, channels)
         scratch = self.scratch / "mapping.toml"
         opened: sandboxed_parse.Opened = jobs.call(
             sandboxed_parse.open_log,
@@ -245,6 +320,22 @@ class Session:
             limit=compute_parser_limits(request.log).seconds,
         )
         return opened
+
+    def _make_request(
+        self, work: SessionState, channels: Mapping[str, ChannelSpec]
+    ) -> sandboxed_parse.Request:
+        """The files of a session; a log of the folder has the mapping of its project."""
+        if work.log is None:
+            raise InputError("no log is open", "open one in the step Log")
+        project = None if work.log.uploaded else find_project_mapping(work.log.path)
+        return sandboxed_parse.Request(
+            log=work.log.path,
+            label=work.log.name,
+            card=None if work.card is None else work.card.path,
+            card_label="" if work.card is None else work.card.name,
+            mapping=work.mapping or project,
+            channels=channels,
+        )
 
 
 @dataclass(eq=False)

@@ -10,7 +10,7 @@ from pathlib import Path
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
-from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.card import VehicleCard
@@ -36,7 +36,8 @@ class SessionState:
     `channels` are the corrections of the mapping, `moves` the boundaries set by hand [s] by number
     of the shift, `changes` the sliders (SI) that differ from the identified values. `method` and
     `shift` select the result and the shift of the sliders. `ended` is the reason why the last
-    identification ended before its last method; empty if it was completed.
+    identification ended before its last method; empty if it was completed. `has_viewed` and
+    `has_exported` state whether the result was looked at in the step Model, and exported.
     """
 
     log: Source | None = None
@@ -53,6 +54,13 @@ class SessionState:
     method: Method | None = None
     shift: int = 0
     changes: Mapping[str, float] = field(default_factory=dict)
+    has_viewed: bool = False
+    has_exported: bool = False
+
+    @property
+    def verdict_outcome(self) -> Outcome | None:
+        """Result of the default method, which alone gives a verdict; None before it."""
+        return self.results.get(DEFAULT_METHOD)
 
     def set_opened(self, opened: Opened) -> SessionState:
         """After a log was read: what was found from another reading no longer holds."""
@@ -84,7 +92,10 @@ class SessionState:
 
     def drop_results(self) -> SessionState:
         """Before an identification."""
-        return replace(self, results={}, refusals={}, ended="", method=None, changes={})
+        return replace(
+            self, results={}, refusals={}, ended="", method=None, changes={},
+            has_viewed=False, has_exported=False,
+        )  # fmt: skip
 
     def add_result(self, result: Outcome | Refusal) -> SessionState:
         """With what one method found, which is shown from now on."""
@@ -104,33 +115,39 @@ class SessionState:
     def require_opened(self) -> Opened:
         """Return the opened log; raise InputError if none is open."""
         if self.opened is None:
-            raise InputError("no log is open", "open a log and its vehicle card first")
+            raise InputError("no log is open", "open one in the step Log")
         return self.opened
 
     def require_card(self) -> VehicleCard:
         """The vehicle card; raises InputError before one is open."""
-        return self.require_opened().card
+        card = self.require_opened().card
+        if card is None:
+            raise InputError("no vehicle card is open", "open or write one in the step Card")
+        return card
 
     def require_log(self) -> ShiftLog:
         """Return the log; raise InputError if none is open or it cannot be read."""
         opened = self.require_opened()
         if opened.log is None:
-            raise InputError("the log cannot be read as mapped", "correct the mapping first")
+            raise InputError(
+                "the log cannot be read as mapped", "correct the mapping in the step Channels"
+            )
         return opened.log
 
     def require_shift(self) -> Shift:
         """Return the selected shift; raise InputError if the log has none."""
         self.require_log()
+        self.require_card()
         if not self.shifts:
             raise InputError(
-                "the log holds no usable gear shift", "see the log view for what was refused"
+                "the log holds no usable gear shift", "the step Shifts lists the reasons"
             )
         return self.shifts[self.shift]
 
     def require_outcome(self) -> Outcome:
         """The result that is shown; raises InputError before an identification."""
         if self.method is None:
-            raise InputError("nothing is identified yet", "run the identification first")
+            raise InputError("nothing is identified yet", "press Identify in the step Identify")
         return self.results[self.method]
 
     def require_twin(self) -> Twin:

@@ -119,7 +119,7 @@ def _copy(stream: IO[bytes], file: IO[bytes], limit: int) -> int:
 
 def _make_size_error(label: str, size: str, limit: int) -> RefusedError:
     return RefusedError(
-        f"the file has {size}, uploads may have {limit / 1e6:.0f} MB",
+        f"the file has {size}, the limit is {limit / 1e6:.0f} MB",
         "copy it into the folder of the workbench and open it by its path, or cut the log",
         Where(file=label),
     )

@@ -18,7 +18,7 @@ from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.decimate import decimate_around
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import build_validation_panels
-from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.labels import get_parameter_name
 from drivetwin.report.sections.blocks import make_link
 from drivetwin.report.style import COMPARED
 from drivetwin.shifts.shift import Shift
@@ -77,7 +77,9 @@ def list_sliders(twin: Twin, shift: Shift) -> list[Slider]:
     ids = (*names, "te_delay", *(f"P0.{element}" for element in elements))
     told = [_build_slider(twin, name) for name in ids]
     laws = [
-        Slider.from_range(FRICTION + element, f"μ {element}", "× identified", (0.5, 1.0, 1.5))
+        Slider.from_range(
+            FRICTION + element, f"Friction μ {element}", "× identified", (0.5, 1.0, 1.5)
+        )
         for element in elements
     ]
     return [one for one in told if one is not None] + laws
@@ -173,7 +175,7 @@ def _build_slider(twin: Twin, name: str) -> Slider | None:
         span = _DELAY_SPAN
     low, high = max(value - span, spec.lower), min(value + span, spec.upper)
     shown = (low * display.factor, value * display.factor, high * display.factor)
-    return Slider.from_range(name, get_parameter_label(name), display.label, shown)
+    return Slider.from_range(name, get_parameter_name(name), display.label, shown)
 
 
 def _scale_friction(element: ShiftElement, factor: float) -> ShiftElement:

@@ -118,7 +118,7 @@ def load_workspace(path: Path, label: str) -> WorkspaceFile:
     where = Where(file=label)
     if path.stat().st_size > LARGEST:
         text = f"the file has more than {LARGEST / 1e6:.0f} MB"
-        raise RefusedError(text, "hand in a workspace that the workbench has saved", where)
+        raise RefusedError(text, "open a workspace that the workbench has saved", where)
     try:
         return WorkspaceFile.model_validate_json(path.read_bytes())
     except ValidationError as error:
@@ -128,7 +128,7 @@ def load_workspace(path: Path, label: str) -> WorkspaceFile:
         )
         raise RefusedError(
             f"this is no workspace of this version: {listed}",
-            "hand in a workspace that the workbench has saved",
+            "open a workspace that the workbench has saved",
             where,
         ) from None
 

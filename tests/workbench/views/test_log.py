@@ -18,7 +18,7 @@ def test_whatever_a_fleet_takes_for_a_log_is_offered(tmp_path: Path) -> None:
         (tmp_path / name).write_text("x")
     app, sessions = build_server(Folder.from_path(tmp_path), Start(), Access())
     (drawn,) = [one for key, one in app.callback_map.items() if "log-content" in key]
-    *_, offered, cards = drawn["callback"].__wrapped__("1", sessions.create())
+    *_, offered, files = drawn["callback"].__wrapped__("1", sessions.create())
     sessions.close()
     assert [option.value for option in offered] == logs
-    assert [option.value for option in cards] == ["card.toml"]
+    assert [button.children for button in files[1].children] == logs

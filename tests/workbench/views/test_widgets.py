@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import errno
+from dataclasses import replace
 
 import pytest
 from dash import no_update
 
 from drivetwin.errors import RefusedError
+from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets
 
 
@@ -41,18 +43,32 @@ def test_what_works_is_handed_on() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "shifts", "says", "bad"),
+    ("shifts", "says", "bad"),
     [
-        ("", 1, "a.csv is open: 1 usable shift", False),
-        ("", 2, "a.csv is open: 2 usable shifts", False),
-        ("", 0, "a.csv is open, but holds no usable shift: the view Log says why", True),
-        ("no unit", 0, "The log cannot be read as mapped. no unit", True),
+        (1, "a.csv is open: 1 usable shift", False),
+        (0, "a.csv is open, but it has no usable shift. The step Shifts lists the reasons", True),
     ],
 )
 def test_a_log_without_a_shift_is_no_success(
-    fault: str, shifts: int, says: str, bad: bool, monkeypatch: pytest.MonkeyPatch
+    shifts: int, says: str, bad: bool, identified: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[tuple[str, bool]] = []
     monkeypatch.setattr(widgets, "notify", lambda text, fault=False: told.append((text, fault)))
-    widgets.notify_opened_log("a.csv is open", fault, shifts)
+    work = replace(identified.work, shifts=identified.work.shifts[:shifts])
+    widgets.notify_opened_log("a.csv is open", work)
     assert told == [(says, bad)]
+
+
+def test_a_fault_of_the_mapping_speaks_of_the_page(
+    identified: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(widgets, "notify", lambda text, **_: told.append(text))
+    fault = (
+        "no channel -> name it in a channel mapping file (--channels) or in [channels] of the card"
+    )
+    opened = replace(identified.work.require_opened(), fault=fault)
+    widgets.notify_opened_log("a.csv is open", replace(identified.work, opened=opened))
+    assert told == [
+        "The log cannot be read as mapped. no channel -> correct it in the step Channels"
+    ]

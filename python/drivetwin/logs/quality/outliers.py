@@ -344,8 +344,8 @@ def find_dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
 def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -> Damage | None:
     """Short stretches of one number far beyond all others, entered and left in one step.
 
-    Numbers that stand for no value, as -9999, and those of a message that was not received; at the
-    start of a log that of one that was not received yet. What is positive and not above `possible`
+    Invalid-value codes (as -9999) and values of a message that was not received, at the start of a
+    log also of one that was not received yet. What is positive and not above `possible`
     may have been commanded: at the ends of the log, and where it is a fill pulse, it stays.
     """
     if compute_median_step(time) > _BEYOND_STEP:

@@ -66,7 +66,7 @@ def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
 
 def _write_headline(judged: Sequence[Agreement], differing: Sequence[Agreement]) -> str:
     if not judged:
-        return "No parameter that two of them tell has an uncertainty."
+        return "No parameter has an uncertainty in two of the results."
     text = f"{len(judged) - len(differing)} of {len(judged)} common parameters agree"
     return f"{text} within their total uncertainty ({DIFFER} standard deviations)."
 

@@ -48,8 +48,8 @@ OF_TORQUE = (
     "the slip from both speeds (eq. 15); μ = T_c / (N·D·A·r·(P − P0))."
 )
 OF_SPEEDS = (
-    "The log has no output torque: the clutch torque follows from the engine torque and what it "
-    "does to the speeds, which tells it over η alone. So the curve is "
+    "The log has no output torque: the clutch torque follows from engine torque and speeds, and is "
+    "known over η only. The curve is therefore "
     "μ/η = T_c/η / (N·D·A·r·(P − P0)), the slip from both speeds (eq. 15); the twin has μ where "
     "the vehicle card states η."
 )
@@ -141,9 +141,9 @@ def build_friction_section(found: Identification) -> Section:
     return Section(
         "friction",
         "Friction over slip",
-        f"{OF_SPEEDS if over_eta else OF_TORQUE} Only the product of μ and N·D·A·r can be told "
-        "from a log: an error of the geometry scales the whole curve. Points that scatter at one "
-        "slip are of the torque phase, where the element carries little.",
+        f"{OF_SPEEDS if over_eta else OF_TORQUE} A log determines only the "
+        "product of μ and N·D·A·r: an error of the geometry scales the whole curve. Points that "
+        "scatter at one slip are of the torque phase, where the element carries little.",
         blocks,
     )
 

@@ -66,7 +66,7 @@ def build_joint_section(found: Identification, several: Several) -> Section:
         _build_shared_table(shared, several.logs, tested),
         FigureBlock(
             plot_agreement([*names, _TOGETHER], compared),
-            "What each log tells alone and what all tell together, against their common mean, "
+            "Values of each log alone and of all together, relative to their common mean, "
             "with total 95 % intervals in standard deviations of the parameter. Of logs alike in "
             "what they excite the common interval is narrower by the root of their number; the "
             "part that the sensors' tolerances make stays, for it is the same in all logs.",
@@ -149,8 +149,8 @@ def _build_shared_table(
         Cell("farthest off", number=True, note="a log against the others"),
     )
     return TableBlock(
-        "What the logs share. Farthest off: by how much one log moves the value from what the "
-        "others say, in standard deviations of that, noise alone; doubtful beyond "
+        "What the logs share. Farthest off: the largest shift of the value by one log against the "
+        "others, in standard deviations of noise; doubtful beyond "
         f"{CONSISTENCY.far:g}.",
         head,
         rows,
@@ -172,7 +172,7 @@ def build_holdout_section(found: Identification, held: Sequence[HeldOut]) -> Sec
             Cell("value", number=True),
             *make_cells("unit", "from"),
         )
-        text = "What these logs have of their own, told by the gear held before the shift alone."
+        text = "Log-specific parameters, from the gear held before the shift."
         blocks.append(TableBlock(text, head, own))
     notes = [f"{one.name}: {text}" for one in held for text in render(one.findings)]
     if notes:

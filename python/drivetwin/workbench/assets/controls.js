@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Selects hand over their value; upload buttons send a file; the browser's way back changes the
-   view; a server that is silent is told; messages go when they are past. */
+/* Selects pass their value on; upload buttons send a file; buttons lead to steps; the browser's way
+   back changes the view; a missing answer of the server and past messages are handled. */
 "use strict";
 (() => {
   const idOf = (element) => (element.id.startsWith("{") ? JSON.parse(element.id) : element.id);
@@ -25,6 +25,33 @@
   document.addEventListener("click", past("button"), true);
   document.addEventListener("change", past("select"), true);
 
+  /* A button that leads to a step opens its view and puts the focus on its title. */
+  document.addEventListener("click", (event) => {
+    const step = event.target.closest("button[data-go]")?.dataset.go;
+    if (!step) return;
+    document.getElementById(`nav-${step}`)?.click();
+    setTimeout(() => document.querySelector(`#view-${step} h2`)?.focus(), 50);
+  });
+
+  /* A view that is drawn again replaces its controls: the one with the focus gets it back. */
+  let focused = null;
+  document.addEventListener("focusin", (event) => { focused = event.target; });
+  const keepFocus = () => {
+    if (!focused?.id || focused.isConnected || document.activeElement !== document.body) return;
+    const again = document.getElementById(focused.id), before = focused;
+    if (!again) return;
+    focused = again;
+    again.focus();
+    /* In the card form text that is being typed is newer than what the server has drawn. */
+    if (again.closest(".question") && again.value !== before.value) {
+      const { set: write } = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value");
+      write.call(again, before.value);
+      again.dispatchEvent(new Event("input", { bubbles: true }));
+    }
+  };
+  new MutationObserver(keepFocus)
+    .observe(document.documentElement, { childList: true, subtree: true });
+
   window.addEventListener("popstate", () => {
     const view = location.hash.slice(1) || "log";
     document.getElementById(`nav-${view}`)?.click();
@@ -36,9 +63,9 @@
     try {
       const answer = await ask(...request);
       if (answer.status === 403) {
-        say("the workbench was started anew -> open the link that its terminal shows", true);
+        say("the workbench was restarted -> open the new link from its terminal", true);
       } else if (answer.status >= 500) {
-        say("the workbench met a fault of its own -> its terminal has the details", true);
+        say("internal error of the workbench -> its terminal has the details", true);
       }
       return answer;
     } catch (fault) {
@@ -54,7 +81,7 @@
     const limit = Number(button.dataset.limit);
     if (file.size > limit) {
       const has = (file.size / 1e6).toFixed(0), may = (limit / 1e6).toFixed(0);
-      say(`${file.name}: the file has ${has} MB, uploads may have ${may} MB`, true);
+      say(`${file.name}: the file has ${has} MB, the limit is ${may} MB`, true);
       return;
     }
     button.setAttribute("aria-busy", "true");
@@ -76,7 +103,7 @@
       say(`uploaded ${content.name}`, false);
       set(button.dataset.target, { data: content });
     } catch (fault) {
-      say(`${file.name} was not taken: ${fault.message}`, true);
+      say(`${file.name} was not uploaded: ${fault.message}`, true);
     } finally {
       button.removeAttribute("aria-busy");
     }

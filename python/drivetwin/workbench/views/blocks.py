@@ -86,4 +86,5 @@ def _render_cell(cell: Cell, kind: type[html.Td] | type[html.Th], **options: Any
         make_badge(cell.text, cell.tone.value) if cell.badge and cell.text else cell.text
     ]
     content += [html.Small(text) for text in (cell.note, cell.remark) if text]
-    return kind(content, className="number" if cell.number else "text", **options)
+    name = "number" if cell.number else "text"
+    return kind(content, className=f"{name} secondary" if cell.secondary else name, **options)

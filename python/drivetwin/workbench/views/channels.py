@@ -1,45 +1,66 @@
 # SPDX-License-Identifier: MIT
-"""Channels: what each column is taken for, and how that is corrected."""
+"""Channels: the role of each column, its correction, and a preview of any column."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any, Literal
 
+import plotly.graph_objects as go
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
+from drivetwin._util.display_units import Display
+from drivetwin.logs.survey import Column
 from drivetwin.report.figures.recording import plot_log
+from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
+from drivetwin.report.style import MEASURED
+from drivetwin.workbench.exports import Record
 from drivetwin.workbench.mapping import Entry, Row, list_roles, list_rows, list_unit_names
-from drivetwin.workbench.sandboxed_parse import Opened
+from drivetwin.workbench.page_words import replace_options
+from drivetwin.workbench.sandboxed_parse import Opened, Preview
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import Index
 
+_PREVIEW_HEIGHT = 330
 _SIGNS = {"+": "as recorded", "-": "reversed"}
 
 
 def layout() -> list[Component]:
-    """The table of columns, and the channels as read."""
+    """Build the table of columns, the preview, and the channels as read."""
     return [
         ui.make_hint(
-            "Every column of the file with the role that it is proposed for. Correct role, unit or "
-            "sign and apply: the log is then read again. An empty role leaves a column aside."
+            "Each column of the file with its proposed role. Correct role, unit or sign, then "
+            "apply: the log is read again. Set 'not used' to ignore a column."
         ),
         html.Datalist([html.Option(value=name) for name in list_unit_names()], id="unit-names"),
         html.Div(id="channels-content"),
+        html.H3("Preview of a column"),
+        html.Div(id="preview-choice"),
+        html.Div(id="preview-content"),
+        html.Div(id="channels-figure"),
     ]
 
 
 def register(page: ui.Page) -> None:
     """Showing and correcting the mapping."""
 
+    _register_preview(page)
+
     @page.callback(
-        Output("channels-content", "children"), Input(ui.make_due_id("channels"), "data")
+        Output("channels-content", "children"),
+        Output("preview-choice", "children"),
+        Output("preview-content", "children", allow_duplicate=True),
+        Output("channels-figure", "children"),
+        Input(ui.make_due_id("channels"), "data"),
     )
-    def show(session: Session, _: object) -> list[Component]:
+    def show(session: Session, _: object) -> tuple[list[Component], ...]:
         """Columns, faults and the channels over time."""
         opened = session.work.opened
-        return [ui.make_hint("No log is open.")] if opened is None else _build_content(opened)
+        if opened is None:
+            return [], [], [], []
+        return _build_content(opened), [_build_choice(opened)], [], _build_figure(opened)
 
     @page.callback(
         Input("apply-mapping", "n_clicks"),
@@ -64,31 +85,72 @@ def register(page: ui.Page) -> None:
                 for role, unit, sign in zip(roles, units, signs, strict=True)
             ]
         )
-        opened = session.work.require_opened()
         ui.notify_topic(ui.Topic.LOG)
-        ui.notify_opened_log("The log is read as mapped", opened.fault, len(session.work.shifts))
+        ui.notify_opened_log("The log is read as mapped", session.work)
 
 
 def _build_content(opened: Opened) -> list[Component]:
-    roles = {"": "not used", **{role: role for role in list_roles(opened.card)}}
+    roles = {"": "not used", **{role: role for role in list_roles(opened.survey)}}
     rows = [_build_row(number, one, roles) for number, one in enumerate(list_rows(opened.survey))]
-    head = ("column", "unit in the file", "Hz", "least", "greatest", "gaps", "role", "unit", "sign")
-    content = [
-        ui.make_notes("The log cannot be read as mapped", [opened.fault] if opened.fault else []),
-        ui.make_notes("About the columns", opened.survey.notes),
+    head = ("column", "unit in the file", "Hz", "min", "max", "gaps", "role", "unit", "sign")
+    return [
+        ui.make_notes(
+            "The log cannot be read as mapped", filter(None, [replace_options(opened.fault)])
+        ),
+        ui.make_notes("About the columns", map(replace_options, opened.survey.notes)),
         ui.make_table(head, rows, name="mapping"),
-        ui.make_row(ui.make_button("Apply the mapping", "apply-mapping", main=True)),
+        ui.make_row(
+            ui.make_button("Apply the mapping", "apply-mapping", main=True),
+            ui.make_button(
+                "Download the mapping", {"export": Record.MAPPING.value, "at": "channels"}
+            ),
+        ),
     ]
-    if opened.log is not None:
-        figure = plot_log(opened.log)
-        content.append(ui.make_graph("channels-plot", "All channels over time", figure))
-    return content
+
+
+def _build_choice(opened: Opened) -> Component:
+    """Build the choice of the column to preview."""
+    columns = {str(k): _name_column(one) for k, one in enumerate(opened.survey.columns)}
+    return ui.make_row(ui.make_choice("preview", "Column", {"": "none", **columns}, ""))
+
+
+def _build_figure(opened: Opened) -> list[Component]:
+    if opened.log is None:
+        return []
+    graph = ui.make_graph(
+        "channels-plot", "All channels over time", plot_log(opened.log), cursors=True
+    )
+    return [html.H3("Channels as read"), graph]
+
+
+def _register_preview(page: ui.Page) -> None:
+    @page.callback(Output("preview-content", "children"), Input("preview", "data-value"))
+    def preview(session: Session, column: Index | Literal[""] | None) -> list[Component]:
+        """Draw a column as recorded, whether it has a role or not."""
+        if not column:
+            return []
+        shown = session.read_column(int(column))
+        graph = ui.make_graph(
+            "preview-plot", f"{shown.name} over time", plot_preview(shown), cursors=True
+        )
+        return [graph]
+
+
+def plot_preview(shown: Preview) -> go.Figure:
+    """Draw a column over time in the unit of the file."""
+    curve = Curve(shown.name, shown.time, shown.values, MEASURED)
+    panels = [Panel(shown.name, Display(shown.unit or "no unit"), [curve])]
+    return plot_over_time_axis(panels, compute_full_range(panels), _PREVIEW_HEIGHT)
+
+
+def _name_column(column: Column) -> str:
+    return f"{column.name} ({column.group})" if column.group else column.name
 
 
 def _build_row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
     column = one.column
     low, high = column.range or (None, None)
-    name = f"{column.name} ({column.group})" if column.group else column.name
+    name = _name_column(column)
 
     def part(of: str) -> dict[str, str | int]:
         return {"part": of, "column": number}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compare: what the paper's, the integral and the likelihood method found, side by side."""
+"""Compare: results of the paper's, the integral and the likelihood method side by side."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from drivetwin.report.sections.comparison import (
     build_friction_overlay_section,
     build_trial_sections,
 )
+from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
@@ -25,8 +26,8 @@ def layout() -> list[Component]:
     """Filled when there are results."""
     return [
         ui.make_hint(
-            "Parameters with intervals, simulation over measurement and friction of every method "
-            "that has answered. Identify with all three methods to fill this view."
+            "Parameters with intervals, simulation over measurement and friction of each method. "
+            "Run all three methods in the step Identify first."
         ),
         ui.make_button("Simulate and draw all methods", "draw-comparison"),
         html.Div(id="compare-content"),
@@ -41,12 +42,12 @@ def register(page: ui.Page) -> None:
         """The parameters side by side, as soon as there are two results."""
         work = session.work
         refusals = [
-            ui.make_notes(f"The {method.value} method found nothing", [text])
+            ui.make_notes(f"Identification failed: {method.value} method", [replace_options(text)])
             for method, text in work.refusals.items()
         ]
         candidates = _collect_candidates(work)
         if len(candidates) < 2:
-            return [*refusals, ui.make_hint("There are no two results to compare yet.")]
+            return [*refusals, ui.make_hint("Run at least two methods first.")]
         return [*refusals, *render_section(build_agreement_section(candidates), "agree")]
 
     @page.callback(

@@ -31,6 +31,7 @@ RECORDS = {
     Record.REPORT: ("Report", "one offline page with all evidence"),
     Record.TWIN: ("Twin", "twin.toml, for simulate, report and export"),
     Record.RESULT: ("Result", "result.json, for other programs"),
+    Record.SIGNALS: ("Signals", "measured and simulated, of the shift and sliders in Model (CSV)"),
     Record.MAPPING: ("Channel mapping", "channels.toml, for logs of the same logger"),
 }
 
@@ -39,8 +40,7 @@ def layout() -> list[Component]:
     """Two groups of buttons."""
     return [
         ui.make_hint(
-            "What is exported is the result shown under Model, as identified: sliders do not "
-            "change it."
+            "The result that is shown in the step Model, as identified: sliders do not change it."
         ),
         html.H3("The twin for other programs"),
         _build_group({target.value: text for target, text in TARGETS.items()}),
@@ -55,7 +55,7 @@ def _build_group(entries: dict[str, tuple[str, str]]) -> Component:
         [
             html.Button(
                 [html.Strong(title), html.Small(text)],
-                id={"export": name},
+                id={"export": name, "at": "export"},
                 type="button",
                 className="tall",
             )
@@ -68,14 +68,16 @@ def _build_group(entries: dict[str, tuple[str, str]]) -> Component:
 def register(page: ui.Page) -> None:
     """Register the callback that writes the requested file."""
 
-    @page.callback(Output("download", "data"), Input({"export": ALL}, "n_clicks"))
+    @page.callback(Output("download", "data"), Input({"export": ALL, "at": ALL}, "n_clicks"))
     def hand_over(session: Session, clicks: list[int | None]) -> Any:
         """Write the file and send it to the browser."""
         if not ctx.triggered_id or not any(clicks):
             return no_update
-        product = make_product(
-            session.work, _parse_choice(get_triggered_part("export")), session.scratch
-        )
+        wanted = _parse_choice(get_triggered_part("export"))
+        product = make_product(session.work, wanted, session.scratch)
+        if wanted is not Record.MAPPING:
+            session.note_export()
+            ui.notify_topic(ui.Topic.STEPS)
         ui.notify(f"{product.name}: {len(product.content) / 1e3:.0f} kB")
         content = base64.b64encode(product.content).decode()
         return {"content": content, "filename": product.name, "base64": True}

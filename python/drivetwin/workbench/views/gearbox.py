@@ -29,7 +29,7 @@ def layout() -> list[Component]:
     return [
         ui.make_hint(
             "A built-in gearbox, or a gearbox card of the folder. Ratios are computed from the "
-            "members; a shift is reduced to two speeds, and the error of that is told."
+            "members. A shift is reduced to two speeds, with the error of the reduction."
         ),
         ui.make_row(
             ui.make_choice(
@@ -168,9 +168,9 @@ def _build_reduction(found: ReducedShift) -> list[Component]:
 
 def _build_error_table(found: ReducedShift) -> Component:
     if found.reduction.exact:
-        return ui.make_hint("Nothing couples the two shafts: the reduced form makes no error.")
+        return ui.make_hint("Nothing couples the two shafts: the reduced form is exact.")
     if found.estimated is None or found.simulated is None:
-        return ui.make_hint(f"The error of leaving M12 out is not told: {found.reason}")
+        return ui.make_hint(f"The error of neglecting M12 is not known: {found.reason}")
     rows: list[list[ui.Content]] = [
         [
             label,
@@ -187,7 +187,7 @@ def _build_error_table(found: ReducedShift) -> Component:
             ("output speed", "output_speed", RPM),
         )
     ]
-    caption = "Largest error over the reference shift of the card without M12."
+    caption = "Largest error over the reference shift of the card if M12 is neglected."
     return ui.make_table(("signal", "estimated", "simulated"), rows, caption)
 
 

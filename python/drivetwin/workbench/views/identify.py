@@ -1,29 +1,50 @@
 # SPDX-License-Identifier: MIT
-"""Identify: the run in the background, how far it is, and what came of it."""
+"""Identify: the run in the background, its progress and its result."""
 
 from __future__ import annotations
 
 from collections import Counter
+from enum import StrEnum
 
 from dash import Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.parameters import build_findings_section, build_result_section
+from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.locks import LockKind
+from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
+from drivetwin.workbench.views import locks
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.blocks import render_block, render_section
 from drivetwin.workbench.views.log import build_facts_line
 
-_UP_TO = {
-    "likelihood": "paper, integral and likelihood",
-    "integral": "paper and integral (quick)",
-    "paper": "paper alone",
+
+class RunKind(StrEnum):
+    """Methods of a run."""
+
+    DEFAULT = "default"
+    ALL = "all"
+    QUICK = "quick"
+    PAPER = "paper"
+
+
+_METHODS = {
+    RunKind.DEFAULT: (DEFAULT_METHOD,),
+    RunKind.ALL: tuple(Method),
+    RunKind.QUICK: (Method.PAPER, Method.INTEGRAL),
+    RunKind.PAPER: (Method.PAPER,),
+}
+_RUNS = {
+    RunKind.DEFAULT.value: "likelihood, the default method",
+    RunKind.ALL.value: "all three methods, to compare",
+    RunKind.QUICK.value: "paper and integral (quick, no verdict)",
+    RunKind.PAPER.value: "paper alone (no verdict)",
 }
 _POLL = 300
 """Time [ms] between two looks at the running job."""
@@ -33,11 +54,11 @@ def layout() -> list[Component]:
     """Run, cancel, progress, outcome."""
     return [
         ui.make_hint(
-            "Runs in a process of its own; the page stays free. The integral and the likelihood "
-            "method take phases and locks as set; the paper's procedure knows no locks."
+            "Runs in the background. Fixed and prior settings apply to the integral and likelihood "
+            "methods only."
         ),
         ui.make_row(
-            ui.make_choice("methods", "Methods", _UP_TO, "likelihood"),
+            ui.make_choice("methods", "Methods", _RUNS, RunKind.DEFAULT),
             ui.make_button("Identify", "identify", main=True),
             ui.make_button("Cancel", "cancel", disabled=True),
         ),
@@ -68,10 +89,9 @@ def register(page: ui.Page) -> None:
 
 def _register_buttons(page: ui.Page) -> None:
     @page.callback(Input("identify", "n_clicks"), State("methods", "data-value"))
-    def start(session: Session, _: object, up_to: Method) -> None:
+    def start(session: Session, _: object, kind: RunKind) -> None:
         """Begin the identification."""
-        order = list(Method)
-        session.identify(order[: order.index(up_to) + 1])
+        session.identify(_METHODS[kind])
         ui.notify("")
         ui.notify_topic(ui.Topic.RESULTS)
 
@@ -119,19 +139,46 @@ def _register_progress(page: ui.Page) -> None:
     )
     def show(session: Session, _: object) -> list[Component]:
         """Render the present results."""
-        return _build_content(session.work)
+        return _build_content(session.work, running=session.job is not None)
 
 
-def _build_content(work: SessionState) -> list[Component]:
-    content: list[Component] = [_describe_inputs(work)]
+def _build_content(work: SessionState, *, running: bool) -> list[Component]:
+    """Build the result of the default method once its run is finished, and what a run takes."""
+    if not work.shifts:
+        return []
+    content: list[Component] = []
     for text in dict.fromkeys(work.refusals.values()):
         methods = [method.value for method, why in work.refusals.items() if why == text]
-        content.append(ui.make_notes(f"Nothing found by: {', '.join(methods)} method", [text]))
+        title = f"Identification failed: {', '.join(methods)} method"
+        content.append(ui.make_notes(title, [replace_options(text)]))
     if work.ended:
-        content.append(ui.make_notes("The identification ended early", [work.ended]))
-    if work.method is None:
-        return content
-    outcome = work.results[work.method]
+        ended = [replace_options(work.ended)]
+        content.append(ui.make_notes("The identification ended early", ended))
+    if not running and work.verdict_outcome is not None:
+        content += _build_result(work.verdict_outcome)
+    elif work.results:
+        names = ", ".join(method.value for method in work.results)
+        content.append(
+            ui.make_hint(
+                f"Finished: {names}. Only the likelihood method gives a verdict on the model. "
+                "Compare shows the values of all methods."
+            )
+        )
+    content.append(_describe_inputs(work))
+    if not running and work.method is None:
+        content.append(_build_known(work))
+    return content
+
+
+def _build_known(work: SessionState) -> Component:
+    """Build the locks before an identification; after it they are beside the sliders."""
+    summary = html.Summary("Known values of parameters (locks)")
+    table = locks.build_table(work, locks.list_default_ids(work))
+    return html.Details([summary, ui.make_hint(locks.HINT), table])
+
+
+def _build_result(outcome: Outcome) -> list[Component]:
+    content: list[Component] = []
     if outcome.found is None:
         count = Counter(one.verdict for one in outcome.twin.parameters.values())
         told = {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
@@ -162,4 +209,5 @@ def _describe_inputs(work: SessionState) -> Component:
         rows.append((get_parameter_label(name), f"{lock.kind.value}: {text}"))
     if not rows:
         return html.Div()
-    return ui.make_table(("set by hand", ""), rows, "Beside the vehicle card, the next run takes")
+    caption = "The next run uses these settings besides the vehicle card"
+    return ui.make_table(("set by hand", ""), rows, caption)

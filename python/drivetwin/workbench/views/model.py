@@ -1,38 +1,36 @@
 # SPDX-License-Identifier: MIT
-"""Model: sliders that move the simulation over the measurement, and locks for the next run."""
+"""Model: sliders that move the simulation over the measurement, each with its lock."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from dash import ALL, MATCH, Input, Output, Patch, State, ctx, html, no_update
+from dash import ALL, MATCH, Input, Output, Patch, State, html, no_update
 from dash.development.base_component import Component
 
-from drivetwin._util.display_units import format_uncertainty, get_display_unit
 from drivetwin.errors import MissingParameterError
-from drivetwin.estimation.result.estimate import Z95
-from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.parameters import get_parameter_spec
-from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.sections.parameters import TONES
 from drivetwin.shifts.shift import make_shift_labels
-from drivetwin.workbench.locks import Lock, LockKind, can_fix, parse_lock
+from drivetwin.workbench.exports import Record
+from drivetwin.workbench.locks import can_fix
+from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import SessionState
+from drivetwin.workbench.steps import Step
+from drivetwin.workbench.views import locks
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.fields import (
-    ControlId,
-    Index,
-    get_place,
-    get_triggered_part,
-    parse_positions,
+from drivetwin.workbench.views.fields import ControlId, Index, parse_positions
+from drivetwin.workbench.what_if import (
+    FRICTION,
+    Slider,
+    collect_changes,
+    get_display,
+    list_sliders,
 )
-from drivetwin.workbench.what_if import Slider, collect_changes, get_display, list_sliders
 
-_KINDS = {kind.value: kind.value for kind in LockKind}
 _BOTH = """(a, b) => {
   const typed = dash_clientside.callback_context.triggered_id || {};
   const given = typed.part === "number" ? b : a;
@@ -43,27 +41,21 @@ _BOTH = """(a, b) => {
 
 
 def layout() -> list[Component]:
-    """Filled when there is a twin."""
+    """Build the place of sliders and figure, which are filled when there is a twin."""
     return [
         ui.make_hint(
-            "Move a parameter: the simulation is driven by the measured engine torque and "
-            "pressures again. The dotted curve is the model as identified."
+            "Move a slider: the measured engine torque and pressures drive the simulation with the "
+            "changed parameter. The dotted curve is the model as identified."
         ),
         html.Div(id="model-content"),
-        html.H3("Parameters and locks"),
-        ui.make_hint(
-            "free: the log alone decides. prior: value ± one standard deviation counts as a "
-            "measurement. fixed: taken as known. Locks count from the next identification on."
-        ),
-        html.Div(id="locks-content"),
     ]
 
 
 def register(page: ui.Page) -> None:
-    """Sliders and locks."""
+    """Register sliders, the choice of result and shift, and the next identification."""
     _register_bench(page)
     _register_sliders(page)
-    _register_locks(page)
+    locks.register(page)
 
 
 def _register_bench(page: ui.Page) -> None:
@@ -71,12 +63,22 @@ def _register_bench(page: ui.Page) -> None:
     def show(session: Session, _: object) -> list[Component]:
         """Render the sliders next to the figure."""
         if session.work.method is None or not session.work.shifts:
-            return [ui.make_hint("Nothing is identified yet.")]
+            return []
+        is_first = not session.work.has_viewed
         try:
             live = session.get_simulation()
         except MissingParameterError as incomplete:
-            return [_build_choices(session.work), ui.make_hint(str(incomplete))]
+            return [_build_choices(session.work), ui.make_hint(replace_options(str(incomplete)))]
+        if is_first:
+            ui.notify_topic(ui.Topic.STEPS)
         return _build_bench(session, live)
+
+    @page.callback(Input("identify-again", "n_clicks"))
+    def identify_again(session: Session, clicks: int | None) -> None:
+        """Start the default method with the locks as set; the page goes to Identify."""
+        if clicks:
+            session.identify([DEFAULT_METHOD])
+            ui.notify_topic(ui.Topic.RESULTS)
 
     @page.callback(Input("reset-sliders", "n_clicks"))
     def reset(session: Session, clicks: int | None) -> None:
@@ -134,48 +136,6 @@ def _register_sliders(page: ui.Page) -> None:
         )
 
 
-def _register_locks(page: ui.Page) -> None:
-    @page.callback(Output("locks-content", "children"), Input(ui.make_due_id("model"), "data"))
-    def show(session: Session, _: object) -> list[Component]:
-        """One row for each parameter."""
-        work = session.work
-        return _build_locks(work) if work.shifts else [ui.make_hint("No shift is open.")]
-
-    @page.callback(
-        Input({"lock": "kind", "id": ALL}, "data-value"),
-        Input({"lock": "value", "id": ALL}, "value"),
-        Input({"lock": "std", "id": ALL}, "value"),
-        State({"lock": "kind", "id": ALL}, "id"),
-    )
-    def lock(
-        session: Session,
-        kinds: Sequence[LockKind],
-        values: Sequence[float | None],
-        stds: Sequence[float | None],
-        ids: Sequence[ControlId],
-    ) -> None:
-        """A lock was changed by hand."""
-        if not ctx.triggered_id:
-            return
-        name = get_triggered_part("id")
-        place = get_place(name, ids)
-        wanted = parse_lock(name, kinds[place], values[place], stds[place])
-        if _is_same(wanted, session.work.get_lock(name)):
-            ui.notify("")
-            return
-        session.set_lock(name, wanted)
-        ui.notify(
-            f"{get_parameter_label(name)} is {wanted.kind.value} from the next identification on"
-        )
-
-
-def _is_same(one: Lock, other: Lock) -> bool:
-    if one.kind is not other.kind or one.kind is LockKind.FREE:
-        return one.kind is other.kind
-    near = abs(one.value - other.value) <= 1e-5 * abs(other.value)
-    return near and abs(one.std - other.std) <= 1e-5 * abs(other.std)
-
-
 def _build_choices(work: SessionState) -> Component:
     methods = {method.value: method.value for method in work.results}
     shifts = {str(k): name for k, name in enumerate(make_shift_labels(work.shifts))}
@@ -183,58 +143,87 @@ def _build_choices(work: SessionState) -> Component:
     return ui.make_row(
         ui.make_choice("model-method", "Result", methods, shown),
         ui.make_choice("model-shift", "Shift", shifts, str(work.shift)),
-        ui.make_button("As identified", "reset-sliders"),
+        ui.make_button("Reset the sliders", "reset-sliders"),
+        html.Button(
+            "Identify again with these locks",
+            id="identify-again",
+            type="button",
+            **ui.make_attributes(data_go=Step.IDENTIFY.value),
+        ),
+        ui.make_button("Signals as CSV", {"export": Record.SIGNALS.value, "at": "model"}),
     )
 
 
 def _build_bench(session: Session, live: Live) -> list[Component]:
     work = session.work
-    sliders = list_sliders(work.require_twin(), work.require_shift())
+    twin = work.require_twin()
+    sliders = list_sliders(twin, work.require_shift())
+    others = [name for name in twin.parameters if name not in {one.id for one in sliders}]
     return [
         _build_choices(work),
+        ui.make_hint(locks.HINT),
         html.Div(
             [
-                html.Div(
-                    [_build_slider(one, work.changes) for one in sliders], className="sliders"
-                ),
+                html.Div([_build_slider(one, work) for one in sliders], className="sliders"),
                 html.Div(
                     [
                         html.Div(_build_fit(live, ""), id="model-fit"),
-                        ui.make_graph("model-plot", "Simulation over measurement", live.figure),
+                        ui.make_graph(
+                            "model-plot",
+                            "Simulation over measurement",
+                            live.figure,
+                            cursors=True,
+                        ),
                     ]
                 ),
             ],
             className="bench",
         ),
+        html.H3("Parameters without a slider"),
+        locks.build_table(work, others),
     ]
 
 
-def _build_slider(one: Slider, changes: Mapping[str, float]) -> Component:
-    value = one.value
+def _build_slider(one: Slider, work: SessionState) -> Component:
+    """Build a slider between the ends of its range, its number with the unit, and its lock."""
+    value, changes = one.value, work.changes
+    lock = [locks.build_controls(work, one.id, locks.Place.SLIDER)] if _has_lock(one) else []
     if one.id in changes:
         value = round(changes[one.id] * get_display(one.id).factor / one.step) * one.step
     limits = {"min": one.low, "max": one.high, "step": one.step, "value": value}
     return html.Div(
         [
-            html.Div([one.label, html.Small(one.unit)], className="name"),
-            ui.make_field(
-                {"part": "range", "id": one.id},
-                f"{one.label}, slider",
-                hidden_label=True,
-                type="range",
-                **limits,
-            ),
-            ui.make_field(
-                {"part": "number", "id": one.id},
-                f"{one.label}, number in {one.unit}",
-                hidden_label=True,
-                type="number",
-                debounce=True,
-                **limits,
+            html.Div([html.Span(one.label, className="name"), *lock], className="top"),
+            html.Div(
+                [
+                    html.Small(f"{one.low:g}"),
+                    ui.make_field(
+                        {"part": "range", "id": one.id},
+                        f"{one.label}, slider",
+                        hidden_label=True,
+                        type="range",
+                        **limits,
+                    ),
+                    html.Small(f"{one.high:g}"),
+                    ui.make_field(
+                        {"part": "number", "id": one.id},
+                        f"{one.label}, number in {one.unit}",
+                        hidden_label=True,
+                        type="number",
+                        debounce=True,
+                        **limits,
+                    ),
+                    html.Small(one.unit),
+                ],
+                className="range",
             ),
         ],
         className="slider",
     )
+
+
+def _has_lock(one: Slider) -> bool:
+    return not one.id.startswith(FRICTION) and can_fix(one.id)
 
 
 def _build_fit(live: Live, remark: str) -> list[Component]:
@@ -255,75 +244,3 @@ def _build_fit(live: Live, remark: str) -> list[Component]:
 
 def _format_percent(run: Validation, name: str) -> str:
     return f"{run.fit[name]['all'].fit_percent:.2f} %"
-
-
-def _build_locks(work: SessionState) -> list[Component]:
-    names = list(work.require_twin().parameters) if work.method else _list_default_ids(work)
-    head = ("parameter", "value", "± 95 %", "unit", "verdict", "lock", "at", "± std")
-    return [ui.make_table(head, [_build_lock_row(work, name) for name in names], name="locks")]
-
-
-def _list_default_ids(work: SessionState) -> list[str]:
-    """List the parameters that can be fixed before an identification."""
-    gears = dict.fromkeys(g for s in work.shifts for g in (s.start_gear, s.end_gear))
-    elements = dict.fromkeys(e for s in work.shifts for e in (s.offgoing, s.oncoming))
-    return [
-        "eta",
-        *(f"J_prime_{gear}" for gear in gears),
-        *("J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay"),
-        *(f"P0.{element}" for element in elements),
-    ]
-
-
-def _build_lock_row(work: SessionState, name: str) -> list[Any]:
-    spec = get_parameter_spec(name)
-    display = get_display_unit(spec.unit)
-    estimate = work.require_twin().parameters[name] if work.method else None
-    value, width = "–", "–"
-    if estimate is not None and estimate.value is not None:
-        std = estimate.std_total
-        half = None if std is None else Z95 * std * display.factor
-        value, width = format_uncertainty(estimate.value * display.factor, half)
-    verdict: Any = ""
-    if estimate is not None:
-        verdict = ui.make_badge(estimate.verdict.value, TONES[estimate.verdict].value)
-    label = html.Div([get_parameter_label(name), html.Small(spec.meaning)])
-    cells: list[Any] = [
-        label,
-        html.Div(value, className="number"),
-        html.Div(width or "–", className="number"),
-        display.label,
-        verdict,
-    ]
-    if not can_fix(name):
-        return [*cells, "follows", "", ""]
-    return [*cells, *_build_lock_controls(work, name, None if estimate is None else estimate.value)]
-
-
-def _build_lock_controls(
-    work: SessionState, name: str, told_value: float | None
-) -> list[Component]:
-    lock, factor = work.get_lock(name), get_display_unit(get_parameter_spec(name).unit).factor
-    at = lock.value if lock.kind is not LockKind.FREE else told_value
-    std = lock.std if lock.kind is LockKind.PRIOR else 0.05 * abs(at or 0.0)
-    label = get_parameter_label(name)
-
-    def number(part: str, text: str, value: float | None) -> Component:
-        shown = None if value is None else float(f"{value * factor:.6g}")
-        return ui.make_field(
-            {"lock": part, "id": name},
-            f"{text} of {label}",
-            hidden_label=True,
-            type="number",
-            debounce=True,
-            step="any",
-            value=shown,
-        )
-
-    return [
-        ui.make_choice(
-            {"lock": "kind", "id": name}, f"lock of {label}", _KINDS, lock.kind, hidden_label=True
-        ),
-        number("value", "locked value", at),
-        number("std", "standard deviation", std),
-    ]

@@ -9,10 +9,13 @@ from pathlib import Path
 from dash import Dash, Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
+from drivetwin.report.html import read_template
 from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.session import Session, Sessions
 from drivetwin.workbench.session_state import Source
+from drivetwin.workbench.steps import Step
 from drivetwin.workbench.views import (
+    card,
     channels,
     compare,
     export,
@@ -20,13 +23,18 @@ from drivetwin.workbench.views import (
     identify,
     log,
     model,
-    phases,
+    shifts,
     workspace,
+)
+from drivetwin.workbench.views.stepper import (
+    TITLES,
+    build_navigation,
+    build_panel,
+    register_states,
 )
 from drivetwin.workbench.views.widgets import (
     Page,
     Topic,
-    make_attributes,
     make_due_id,
     make_topic_id,
     notify_topic,
@@ -43,23 +51,28 @@ class Start:
     mapping: Path | None = None
 
 
-VIEWS = {
-    "log": ("Log", log),
-    "channels": ("Channels", channels),
-    "phases": ("Phases", phases),
-    "identify": ("Identify", identify),
-    "model": ("Model", model),
+_STEPS = {
+    Step.LOG: log,
+    Step.CHANNELS: channels,
+    Step.CARD: card,
+    Step.SHIFTS: shifts,
+    Step.IDENTIFY: identify,
+    Step.MODEL: model,
+    Step.EXPORT: export,
+}
+_MORE = {
     "compare": ("Compare", compare),
     "gearbox": ("Gearbox", gearbox),
-    "export": ("Export", export),
     "workspace": ("Workspace", workspace),
 }
-_FIRST = "log"
+VIEWS = {**{step.value: (TITLES[step], view) for step, view in _STEPS.items()}, **_MORE}
+"""Title and module of each view: the steps in order, then those beside them."""
 _TOPICS = {
     "log": (Topic.LOG,),
     "channels": (Topic.LOG,),
-    "phases": (Topic.PHASES,),
-    "identify": (Topic.RESULTS, Topic.PHASES),
+    "card": (Topic.LOG, Topic.FORM),
+    "shifts": (Topic.PHASES,),
+    "identify": (Topic.RESULTS, Topic.PHASES, Topic.LOCKS),
     "model": (Topic.RESULTS, Topic.LIVE),
     "compare": (Topic.RESULTS,),
     "gearbox": (Topic.GEARBOX,),
@@ -73,7 +86,8 @@ _DUE = """(hidden, ...rest) => {
 }"""
 _INDEX = """<!DOCTYPE html>
 <html lang="en">
-  <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
+  <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}
+    <style>STATUS</style></head>
   <body>{%app_entry%}<footer hidden>{%config%}{%scripts%}{%renderer%}</footer></body>
 </html>"""
 _SWITCH = """(...clicked) => {
@@ -95,37 +109,20 @@ The view stands in the address, for the browser's way back and for loading the p
 
 def build_page(app: Dash, sessions: Sessions, start: Start, access: Access) -> None:
     """Give the application its layout and the callbacks of all views."""
-    app.index_string = _INDEX
+    app.index_string = _INDEX.replace("STATUS", read_template("status.css"))
     app.layout = _build_layout
     _register_view_switch(app)
     _register_drawing(app)
     _register_entry(app, sessions, start)
     _show_status(app, sessions, access)
+    register_states(app, sessions)
     for _, view in VIEWS.values():
         view.register(Page(app, sessions))
 
 
 def _build_layout() -> Component:
-    navigation = html.Nav(
-        [
-            html.H1(["drivetwin", html.Small("workbench")]),
-            *(
-                html.Button(
-                    title, id=f"nav-{name}", type="button", **make_attributes(aria_current="false")
-                )
-                for name, (title, _) in VIEWS.items()
-            ),
-        ],
-        className="side",
-        **make_attributes(aria_label="Views"),
-    )
     panels = [
-        html.Section(
-            [html.H2(title), *view.layout()],
-            id=f"view-{name}",
-            hidden=name != _FIRST,
-            **make_attributes(aria_label=f"{title} view"),
-        )
+        build_panel(name, title, view.layout(), hidden=name != Step.LOG)
         for name, (title, view) in VIEWS.items()
     ]
     return html.Div(
@@ -133,7 +130,7 @@ def _build_layout() -> Component:
             dcc.Store(id="session", storage_type="session"),
             *(dcc.Store(id=make_topic_id(topic)) for topic in Topic),
             *(dcc.Store(id=make_due_id(name)) for name in _TOPICS),
-            navigation,
+            build_navigation({name: title for name, (title, _) in _MORE.items()}),
             html.Main(
                 [
                     html.P(id="status", className="status"),
@@ -180,14 +177,14 @@ def _register_entry(app: Dash, sessions: Sessions, start: Start) -> None:
             notify_topic(Topic.GEARBOX)
             return no_update
         fresh = sessions.create()
-        if start.log is not None and start.card is not None:
+        if start.log is not None:
             _open_first(sessions.get(fresh), start)
         return fresh
 
 
 @show_errors
 def _open_first(session: Session, start: Start) -> None:
-    if start.log is not None and start.card is not None:
+    if start.log is not None:
         session.open(start.log, start.card, start.mapping)
 
 
@@ -204,9 +201,10 @@ def _show_status(app: Dash, sessions: Sessions, access: Access) -> None:
         if key not in sessions:
             return []
         work = sessions.get(key).work
-        if work.log is None or work.card is None:
+        if work.log is None or work.opened is None:
             return [f"no log is open · {access.describe()}"]
-        parts: list[Component | str] = [html.B(work.log.name), f" · card {work.card.name}"]
+        parts: list[Component | str] = [html.B(work.log.name)]
+        parts.append(f" · {'no card' if work.card is None else f'card {work.card.name}'}")
         for shift in work.shifts:
             parts.append(f" · shift {shift.start_gear}→{shift.end_gear}")
         if work.results:

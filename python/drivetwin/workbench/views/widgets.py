@@ -21,7 +21,9 @@ from dash.dependencies import DashDependency
 from dash.development.base_component import Component
 
 from drivetwin.errors import DrivetwinError, Where
+from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Sessions
+from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_fields
 
@@ -41,14 +43,20 @@ class Topic(StrEnum):
     RESULTS = "results"
     LIVE = "live"
     GEARBOX = "gearbox"
+    FORM = "form"
+    LOCKS = "locks"
+    STEPS = "steps"
 
 
 _CONCERNED = {
-    Topic.LOG: (Topic.LOG, Topic.PHASES, Topic.RESULTS, Topic.LIVE),
+    Topic.LOG: (Topic.LOG, Topic.PHASES, Topic.RESULTS, Topic.LIVE, Topic.STEPS),
     Topic.PHASES: (Topic.PHASES, Topic.LIVE),
-    Topic.RESULTS: (Topic.RESULTS, Topic.LIVE),
+    Topic.RESULTS: (Topic.RESULTS, Topic.LIVE, Topic.STEPS),
     Topic.LIVE: (Topic.LIVE,),
     Topic.GEARBOX: (Topic.GEARBOX,),
+    Topic.FORM: (Topic.FORM,),
+    Topic.LOCKS: (Topic.LOCKS,),
+    Topic.STEPS: (Topic.STEPS,),
 }
 
 
@@ -80,14 +88,17 @@ def notify(text: str, *, fault: bool = False) -> None:
     )
 
 
-def notify_opened_log(how: str, fault: str, shifts: int) -> None:
-    """Show what came of reading a log, `how` in words: its fault, or how many shifts it holds."""
-    if fault:
-        notify(f"The log cannot be read as mapped. {fault}", fault=True)
+def notify_opened_log(how: str, work: SessionState) -> None:
+    """Show the result of reading a log, `how` in words: its fault, or the number of its shifts."""
+    opened, shifts = work.require_opened(), len(work.shifts)
+    if opened.fault:
+        notify(f"The log cannot be read as mapped. {replace_options(opened.fault)}", fault=True)
+    elif opened.card is None:
+        notify(how)
     elif shifts:
         notify(f"{how}: {shifts} usable {'shift' if shifts == 1 else 'shifts'}")
     else:
-        notify(f"{how}, but holds no usable shift: the view Log says why", fault=True)
+        notify(f"{how}, but it has no usable shift. The step Shifts lists the reasons", fault=True)
 
 
 def show_errors(callback: Callable[P, R], unchanged: object = no_update) -> Callable[P, R]:
@@ -140,7 +151,7 @@ class Page:
 def _format_fault(fault: DrivetwinError | OSError) -> str:
     """Format a typed error or an OS error as a message; files without their folders."""
     if isinstance(fault, DrivetwinError):
-        return str(fault)
+        return replace_options(str(fault))
     where = Where(file=None if fault.filename is None else Path(fault.filename).name)
     remedy = "see whether the file is there, its permissions and the free space"
     return str(DrivetwinError(fault.strerror or type(fault).__name__, remedy, where))
@@ -223,8 +234,13 @@ def make_hint(text: str) -> Component:
     return html.P(text, className="hint")
 
 
-def make_graph(id: str, label: str, figure: go.Figure, **config: Any) -> Component:
-    """Build a figure; `label` is its description for screen readers."""
+def make_graph(
+    id: str, label: str, figure: go.Figure, *, cursors: bool = False, **config: Any
+) -> Component:
+    """Build a figure; `label` is its description for screen readers.
+
+    With `cursors` two times can be compared below it, and it can be saved as an image.
+    """
     options: Any = {
         "displaylogo": False,
         "responsive": True,
@@ -232,4 +248,8 @@ def make_graph(id: str, label: str, figure: go.Figure, **config: Any) -> Compone
         **config,
     }
     plot = dcc.Graph(id=id, config=options, figure=figure, className="plot")
-    return html.Figure(plot, **make_attributes(aria_label=label))
+    parts: list[Component] = [plot]
+    if cursors:
+        place = make_attributes(data_plot=id, data_label=label)
+        parts.append(html.Div(className="cursors", **place))
+    return html.Figure(parts, **make_attributes(aria_label=label))

@@ -16,9 +16,9 @@ def layout() -> list[Component]:
     """Save and reopen."""
     return [
         ui.make_hint(
-            "A workspace holds the paths of log and card with their check sums, the mapping, "
-            "phases, locks, the identified twins and the sliders; not the log itself. "
-            "It is a JSON file in the folder of the workbench."
+            "A workspace is a JSON file in the folder of the workbench. It contains the paths of "
+            "log and card with their check sums, mapping, phases, locks, twins and sliders, but "
+            "not the log."
         ),
         html.H3("Save"),
         ui.make_row(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Phases: the shift with its boundaries, dragged in the figure or typed."""
+"""Shifts: those of the log, and the phase boundaries of one, dragged or typed."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from drivetwin.findings import render
 from drivetwin.report.sections.summary import describe_phases
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.phases import (
     LABELS,
     get_display_times,
@@ -26,14 +27,13 @@ from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import Index
 
+_SHIFT_HEAD = ("shift", "kind", "elements", "starts", "locks")
+
 
 def layout() -> list[Component]:
-    """The figure and the times."""
+    """Build the list of shifts, and the phases of one."""
     return [
-        ui.make_hint(
-            "Drag a dashed line to move a phase boundary, or type its time. What is set by hand "
-            "counts for the next identification."
-        ),
+        html.Div(id="shifts-content"),
         html.Div(id="phases-content"),
     ]
 
@@ -45,11 +45,15 @@ def register(page: ui.Page) -> None:
 
 
 def _register_figure(page: ui.Page) -> None:
-    @page.callback(Output("phases-content", "children"), Input(ui.make_due_id("phases"), "data"))
-    def show(session: Session, _: object) -> list[Component]:
-        """The shift that is chosen."""
+    @page.callback(
+        Output("shifts-content", "children"),
+        Output("phases-content", "children"),
+        Input(ui.make_due_id("shifts"), "data"),
+    )
+    def show(session: Session, _: object) -> tuple[list[Component], list[Component]]:
+        """List all shifts, and draw the one that is chosen."""
         work = session.work
-        return _build_content(work) if work.shifts else [ui.make_hint("No shift is open.")]
+        return _build_shifts(work), _build_content(work) if work.shifts else []
 
     @page.callback(Input("phases-plot", "relayoutData"))
     def drag(session: Session, change: dict[str, Any] | None) -> None:
@@ -95,6 +99,33 @@ def _register_fields(page: ui.Page) -> None:
             ui.notify_topic(ui.Topic.PHASES)
 
 
+def _build_shifts(work: SessionState) -> list[Component]:
+    """List the shifts, and the reasons why other gear changes are not used."""
+    if work.opened is None or work.opened.found is None:
+        return []
+    found = work.opened.found
+    rows = [
+        (
+            label,
+            one.kind.value,
+            f"{one.offgoing} → {one.oncoming}",
+            f"{one.torque_phase[0]:.3f} s",
+            f"{one.lockup_time:.3f} s",
+        )
+        for label, one in zip(make_shift_labels(work.shifts), work.shifts, strict=True)
+    ]
+    rejected = [
+        f"{one.time[0]:.2f} s to {one.time[1]:.2f} s: {replace_options(one.reason)}"
+        for one in found.rejected
+    ]
+    return [
+        *([ui.make_table(_SHIFT_HEAD, rows, "Shifts of the log")] if rows else []),
+        ui.make_notes(
+            "Not used" if rows else "No usable shift", rejected, "plain" if rows else "doubtful"
+        ),
+    ]
+
+
 def _build_content(work: SessionState) -> list[Component]:
     shift = work.require_shift()
     names = {str(k): name for k, name in enumerate(make_shift_labels(work.shifts))}
@@ -109,6 +140,11 @@ def _build_content(work: SessionState) -> list[Component]:
         for one, time in get_display_times(shift).items()
     ]
     return [
+        html.H3("Phases"),
+        ui.make_hint(
+            "Drag a dashed line to move a phase boundary, or type its time. Boundaries set by hand "
+            "are used in the next identification."
+        ),
         ui.make_row(ui.make_choice("phases-shift", "Shift", names, str(work.shift)), *fields),
         ui.make_row(
             ui.make_button("Apply times", "apply-phases", main=True),
@@ -118,6 +154,7 @@ def _build_content(work: SessionState) -> list[Component]:
             "phases-plot",
             "The shift over time with its phases",
             plot_phases(work.require_log(), shift),
+            cursors=True,
             edits={"shapePosition": True},
         ),
         ui.make_hint(describe_phases(shift.kind)),

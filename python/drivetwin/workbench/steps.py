@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""Steps from a log to an exported model, and the state of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivetwin.channels.roles import NEEDED
+from drivetwin.estimation.result.method import DEFAULT_METHOD
+from drivetwin.shifts.shift import make_shift_labels
+from drivetwin.workbench.session_state import SessionState
+
+
+class Step(StrEnum):
+    """Step of the workbench, in order; the values are those of the views."""
+
+    LOG = "log"
+    CHANNELS = "channels"
+    CARD = "card"
+    SHIFTS = "shifts"
+    IDENTIFY = "identify"
+    MODEL = "model"
+    EXPORT = "export"
+
+
+class Status(StrEnum):
+    """Status of a step."""
+
+    DONE = "done"
+    NEXT = "next"
+    OPEN = "open"
+    RUNNING = "running"
+    BLOCKED = "blocked"
+
+
+@dataclass(frozen=True)
+class StepState:
+    """Status of a step, what was done or what is missing, and the step that resolves a block."""
+
+    step: Step
+    status: Status
+    text: str
+    remedy: Step | None = None
+    has_content: bool = False
+    """True where the view of a blocked step shows the reasons."""
+
+
+def assess_steps(work: SessionState, *, running: bool = False) -> list[StepState]:
+    """Return the state of each step in order; the first one that can be done is the next."""
+    found: list[StepState] = []
+    for one in _iterate_states(work, running):
+        is_next = one.status is Status.OPEN and not any(
+            other.status in (Status.NEXT, Status.RUNNING) for other in found
+        )
+        found.append(StepState(one.step, Status.NEXT, one.text) if is_next else one)
+    return found
+
+
+def _iterate_states(work: SessionState, running: bool) -> Iterator[StepState]:
+    """Yield the state of each step; a step that can be done is open."""
+    if work.opened is None or work.log is None:
+        yield StepState(Step.LOG, Status.OPEN, "Open a log, or the sample.")
+        for step in list(Step)[1:]:
+            yield StepState(step, Status.BLOCKED, "No log is open.", Step.LOG)
+        return
+    yield StepState(Step.LOG, Status.DONE, f"{work.log.name} is open.")
+    yield _assess_channels(work)
+    yield _assess_card(work)
+    yield _assess_shifts(work)
+    yield _assess_identification(work, running)
+    yield from _assess_use(work, running)
+
+
+def _assess_channels(work: SessionState) -> StepState:
+    log = work.require_opened().log
+    if log is None:
+        return StepState(Step.CHANNELS, Status.OPEN, "The log cannot be read as mapped.")
+    missing = [role for role in NEEDED if role not in log]
+    if missing:
+        text = f"{len(log.channels)} channels are mapped; not in the log: {', '.join(missing)}."
+        return StepState(Step.CHANNELS, Status.DONE, text)
+    return StepState(Step.CHANNELS, Status.DONE, f"{len(log.channels)} channels are mapped.")
+
+
+def _assess_card(work: SessionState) -> StepState:
+    opened = work.require_opened()
+    if opened.card is None:
+        return StepState(Step.CARD, Status.OPEN, "Open a vehicle card, or write one.")
+    name = work.card.name if work.card is not None else opened.card.name
+    count = len(opened.doubts)
+    doubt = f"; {count} {'remark' if count == 1 else 'remarks'}" if count else ""
+    return StepState(Step.CARD, Status.DONE, f"{name} is open{doubt}.")
+
+
+def _assess_shifts(work: SessionState) -> StepState:
+    opened = work.require_opened()
+    if opened.log is None:
+        text = "The log cannot be read as mapped."
+        return StepState(Step.SHIFTS, Status.BLOCKED, text, Step.CHANNELS)
+    if opened.card is None:
+        return StepState(Step.SHIFTS, Status.BLOCKED, "No vehicle card is open.", Step.CARD)
+    if not work.shifts:
+        text = "The log has no usable shift. The reasons are below."
+        return StepState(Step.SHIFTS, Status.BLOCKED, text, Step.CARD, has_content=True)
+    return StepState(
+        Step.SHIFTS, Status.DONE, f"{', '.join(make_shift_labels(work.shifts))} found."
+    )
+
+
+def _assess_identification(work: SessionState, running: bool) -> StepState:
+    if running:
+        return StepState(Step.IDENTIFY, Status.RUNNING, "The identification is running.")
+    if not work.shifts:
+        return StepState(Step.IDENTIFY, Status.BLOCKED, "There is no shift.", Step.SHIFTS)
+    if work.verdict_outcome is not None:
+        return StepState(Step.IDENTIFY, Status.DONE, "The model is identified.")
+    if DEFAULT_METHOD in work.refusals or work.ended:
+        return StepState(Step.IDENTIFY, Status.OPEN, "The identification failed.")
+    return StepState(Step.IDENTIFY, Status.OPEN, "Press Identify.")
+
+
+def _assess_use(work: SessionState, running: bool) -> Iterator[StepState]:
+    """Yield the states of model and export, which need a finished identification."""
+    if running or work.method is None:
+        text = "The identification is running." if running else "Nothing is identified."
+        for step in (Step.MODEL, Step.EXPORT):
+            yield StepState(step, Status.BLOCKED, text, Step.IDENTIFY)
+        return
+    if work.has_viewed:
+        yield StepState(Step.MODEL, Status.DONE, "Simulation and measurement are shown.")
+    else:
+        yield StepState(Step.MODEL, Status.OPEN, "Compare simulation and measurement.")
+    if work.has_exported:
+        yield StepState(Step.EXPORT, Status.DONE, "A file was exported.")
+    else:
+        yield StepState(Step.EXPORT, Status.OPEN, "Download report or model.")

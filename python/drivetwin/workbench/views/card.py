@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Card: open the vehicle card, its data and what is implausible about them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dash import Input, Output, State, dcc, html
+from dash.development.base_component import Component
+
+from drivetwin.findings import render
+from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.workbench.page_words import replace_options
+from drivetwin.workbench.sandboxed_parse import Opened
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.session_state import Source
+from drivetwin.workbench.views import card_form
+from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import UploadField
+from drivetwin.workbench.views.sources import format_source, get_source
+
+_CARDS = (".toml",)
+
+
+def layout() -> list[Component]:
+    """Build the ways to a card, and the data of the open one."""
+    return [
+        ui.make_hint(
+            "The vehicle card has the design data: gears, shift elements, ranges of inertias and "
+            "the tolerances of the sensors."
+        ),
+        ui.make_row(
+            html.Div(
+                ui.make_field("card-path", "Vehicle card", type="text", list="card-names"),
+                className="wide",
+            ),
+            ui.make_button("Open card", "open-card", main=True),
+            ui.make_upload_button("Upload a card…", "card", "card-upload"),
+        ),
+        html.Datalist(id="card-names"),
+        dcc.Store(id="card-upload"),
+        html.Div(id="card-content"),
+        *card_form.layout(),
+    ]
+
+
+def register(page: ui.Page) -> None:
+    """Register opening, and the data of the open card."""
+    _register_opening(page)
+    card_form.register(page)
+
+    @page.callback(
+        Output("card-content", "children"),
+        Output("card-path", "value"),
+        Output("card-names", "children"),
+        Input(ui.make_due_id("card"), "data"),
+    )
+    def show(session: Session, _: str) -> tuple[Any, ...]:
+        """Render the open card."""
+        work = session.work
+        content = [] if work.opened is None else _build_content(work.opened)
+        names = [html.Option(value=name) for name in session.folder.list_names(_CARDS)]
+        return content, format_source(work.card), names
+
+
+def _register_opening(page: ui.Page) -> None:
+    @page.callback(Output("card-path", "value", allow_duplicate=True), Input("card-upload", "data"))
+    def open_upload(session: Session, upload: UploadField) -> str:
+        """Open an upload at once."""
+        source = session.get_uploaded(upload.key)
+        open_card(session, source)
+        return format_source(source)
+
+    @page.callback(
+        Input("open-card", "n_clicks"),
+        State("card-path", "value"),
+        State("card-upload", "data"),
+        busy="open-card",
+    )
+    def open_path(
+        session: Session, _: object, card: str | None, upload: UploadField | None
+    ) -> None:
+        """Open the card of the field."""
+        open_card(session, get_source(session, card, upload))
+
+
+def open_card(session: Session, source: Source) -> None:
+    """Open a card for the log of the session, and show what came of it."""
+    session.open_card(source)
+    ui.notify_topic(ui.Topic.LOG)
+    ui.notify_opened_log(f"{source.name} is open", session.work)
+
+
+def _build_content(opened: Opened) -> list[Component]:
+    if opened.card is None:
+        return []
+    doubts = map(replace_options, render(opened.doubts))
+    return [
+        ui.make_notes("Implausible on this card", doubts),
+        *_build_tables(opened.card),
+    ]
+
+
+def _build_tables(card: VehicleCard) -> list[Component]:
+    gears = [(gear.name, f"{gear.ratio:.4g}", ", ".join(gear.elements)) for gear in card.gears]
+    elements = [
+        (name, spec.kind, f"{spec.P0.value * 1e-5:.3g} bar", f"{spec.gain:.4g} m³")
+        for name, spec in card.elements.items()
+    ]
+    low, high = card.J_prime_range
+    least, most = card.J_vehicle_range
+    facts = [
+        ("Final drive", f"{card.final_drive:.4g}"),
+        ("Inertia at the engine J′", f"{low:.3g} to {high:.3g} kg·m²"),
+        ("Inertia of the vehicle J3", f"{least:.4g} to {most:.4g} kg·m²"),
+        ("Sensor tolerances", ", ".join(card.sensors) or "none: intervals cover noise only"),
+    ]
+    return [
+        html.Div(
+            [
+                ui.make_table(("gear", "ratio", "elements"), gears, "Gears"),
+                ui.make_table(("element", "kind", "P0", "gain"), elements, "Shift elements"),
+                ui.make_table(("quantity", "value"), facts, f"{card.name}"),
+            ],
+            className="columns",
+        )
+    ]

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: MIT
+"""Form for a new vehicle card: a field for each question, with its explanation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Literal
+
+from dash import ALL, Input, Output, State, ctx, html, no_update
+from dash.development.base_component import Component
+from pydantic import BaseModel
+
+from drivetwin.authoring.answers import Key
+from drivetwin.authoring.question import FormEntry
+from drivetwin.errors import RefusedError
+from drivetwin.workbench.card_form import CardForm
+from drivetwin.workbench.page_words import replace_options
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.views import widgets as ui
+
+_GROUPS = {
+    "name": "Vehicle",
+    "gearbox": "Gears",
+    "gears": "Gears",
+    "elements": "Shift elements",
+    "i_in": "Drive",
+    "final_drive": "Drive",
+    "converter": "Drive",
+    "inertia": "Inertias",
+    "vehicle": "Inertias",
+    "sensors": "Sensors",
+}
+"""Heading of the questions by the first part of their key."""
+_EXISTING = {"keep": "keep it", "replace": "replace it"}
+
+
+class QuestionId(BaseModel, strict=True):
+    """Id of a field: the key of its question as a JSON list."""
+
+    question: str
+
+
+def layout() -> list[Component]:
+    """Build the begin of the form; the fields follow from the log."""
+    return [
+        html.H3("New card"),
+        ui.make_row(ui.make_button("Begin a card from the log", "begin-card")),
+        html.Div(id="form-content"),
+    ]
+
+
+def register(page: ui.Page) -> None:
+    """Register the begin of a form, its fields, and the writing of the card."""
+    _register_fields(page)
+    _register_writing(page)
+
+    @page.callback(Input("begin-card", "n_clicks"), busy="begin-card")
+    def begin(session: Session, _: object) -> None:
+        """Read the log and show the questions."""
+        session.begin_card()
+        ui.notify_topic(ui.Topic.FORM)
+        ui.notify("Values in grey come from the log or are defaults. Type what is known better.")
+
+
+def _register_writing(page: ui.Page) -> None:
+    @page.callback(
+        Input("write-card", "n_clicks"),
+        State("new-card-name", "value"),
+        State("replace-card", "data-value"),
+        State({"question": ALL}, "value"),
+        State({"question": ALL}, "id"),
+        busy="write-card",
+    )
+    def write(
+        session: Session,
+        clicks: int | None,
+        name: str | None,
+        existing: Literal["keep", "replace"],
+        values: Sequence[str | None],
+        ids: Sequence[QuestionId],
+    ) -> None:
+        """Write the card into the folder and open it."""
+        if not clicks:
+            return
+        texts = {key: text for key, text in collect_texts(values, ids).items() if text}
+        source = session.write_card(name or "", texts, can_replace=existing == "replace")
+        session.open_card(source)
+        ui.notify_topic(ui.Topic.LOG)
+        ui.notify_opened_log(f"{source.name} is written and open", session.work)
+
+
+def _register_fields(page: ui.Page) -> None:
+    @page.callback(
+        Output("form-fields", "children"),
+        Output("form-state", "children"),
+        Output({"note": ALL}, "children"),
+        Output({"question": ALL}, "placeholder"),
+        Input({"question": ALL}, "value"),
+        State({"question": ALL}, "id"),
+    )
+    def fill_in(
+        session: Session, values: Sequence[str | None], ids: Sequence[QuestionId]
+    ) -> tuple[object, ...]:
+        """Ask what follows from the answers; fields stay as long as the questions do."""
+        form = session.form
+        changed = [one.get("question") for one in ctx.triggered_prop_ids.values() if one]
+        # Only changed fields: others may be older than the texts that the server has.
+        rows = [k for k, one in enumerate(ids) if one.question in changed]
+        texts = collect_texts([values[k] for k in rows], [ids[k] for k in rows])
+        kept = [no_update] * len(ids)
+        if form is None or not texts:
+            return no_update, no_update, kept, kept
+        form.fill_in(texts)
+        state = _describe_state(form)
+        if [_name_key(one.question.key) for one in form.entries] != [one.question for one in ids]:
+            return _build_fields(form), state, kept, kept
+        defaults = [one.question.format_default() for one in form.entries]
+        return no_update, state, [_build_notes(one) for one in form.entries], defaults
+
+    @page.callback(Output("form-content", "children"), Input(ui.make_due_id("card"), "data"))
+    def show(session: Session, _: object) -> list[Component]:
+        """Draw the form."""
+        return [] if session.form is None else build_form(session.form)
+
+
+def collect_texts(values: Sequence[str | None], ids: Sequence[QuestionId]) -> dict[Key, str]:
+    """Return the texts by key. Raises RefusedError for an id that is no key."""
+    found: dict[Key, str] = {}
+    for value, one in zip(values, ids, strict=True):
+        try:
+            key = json.loads(one.question)
+        except (ValueError, RecursionError):
+            key = None
+        if not isinstance(key, list) or not all(isinstance(part, str) for part in key):
+            raise RefusedError("the request names no question of the form", "load the page again")
+        found[tuple(key)] = value or ""
+    return found
+
+
+def build_form(form: CardForm) -> list[Component]:
+    """Build the fields in groups, and below them the name of the file."""
+    return [
+        html.Div(_build_fields(form), id="form-fields"),
+        html.P(_describe_state(form), id="form-state", className="hint"),
+        ui.make_row(
+            html.Div(
+                ui.make_field("new-card-name", "File name", type="text", value="vehicle.toml"),
+                className="wide",
+            ),
+            ui.make_choice("replace-card", "If the file exists", _EXISTING, "keep"),
+            ui.make_button("Write and open the card", "write-card", main=True),
+        ),
+    ]
+
+
+def _describe_state(form: CardForm) -> str:
+    open_ = sum(bool(one.fault) for one in form.entries)
+    if not open_:
+        return "The card is complete."
+    return f"{open_} of {len(form.entries)} answers are missing or refused."
+
+
+def _build_fields(form: CardForm) -> list[Component]:
+    groups: dict[str, list[Component]] = {}
+    for entry in form.entries:
+        groups.setdefault(_GROUPS[entry.question.key[0]], []).append(_build_entry(entry))
+    return [
+        html.Fieldset([html.Legend(title), *fields], className="questions")
+        for title, fields in groups.items()
+    ]
+
+
+def _name_key(key: Key) -> str:
+    """Return the id of a question."""
+    return json.dumps(list(key))
+
+
+def _build_notes(entry: FormEntry) -> list[Component]:
+    """Build the meaning of a question with the origin of its default, and the fault."""
+    question, meaning = entry.question, replace_options(entry.question.meaning)
+    if question.default is not None and question.default.note:
+        meaning = f"{meaning} {question.format_default()}: {question.default.note}."
+    parts: list[Component] = [html.P(meaning, className="hint")]
+    if entry.fault:
+        parts.append(html.P(replace_options(entry.fault), className="fault"))
+    return parts
+
+
+def _build_entry(entry: FormEntry) -> Component:
+    """Build field, explanation, and the reason why the typed answer is refused."""
+    question = entry.question
+    name = _name_key(question.key)
+    unit = f" [{question.unit}]" if question.unit else ""
+    choices = f"choices {name}" if question.choices else ""
+    parts: list[Component] = [
+        ui.make_field(
+            {"question": name},
+            f"{question.prompt}{unit}",
+            type="text",
+            value=entry.text,
+            debounce=True,
+            placeholder=question.format_default(),
+            list=choices,
+        ),
+        html.Div(_build_notes(entry), id={"note": name}),
+    ]
+    if question.choices:
+        options = [html.Option(value=str(one)) for one in question.choices]
+        parts.append(html.Datalist(options, id=choices))
+    return html.Div(parts, className="question")
