@@ -17,6 +17,7 @@ from drivetwin.errors import DrivetwinError, FileFormatError
 from drivetwin.files.result_file import load_result
 from drivetwin.files.twin_file import read_twin_file
 from drivetwin.fleet.rules import read_rules
+from drivetwin.fleet.sources import Sources
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.can.database import read_database
 from drivetwin.logs.read import read_raw
@@ -32,6 +33,7 @@ READERS: tuple[Callable[[Path], object], ...] = (
     read_twin_file,
     load_result,
     lambda path: read_database((path,)),
+    lambda path: Sources([], path).count(),
 )
 
 

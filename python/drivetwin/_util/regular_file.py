@@ -31,8 +31,25 @@ def measure_regular_file(
     except (OSError, ValueError) as fault:  # ValueError: the path contains a NUL
         why = getattr(fault, "strerror", None) or fault
         raise error(f"cannot read the file: {why}", remedy, where) from None
-    if not stat.S_ISREG(status.st_mode):
-        kind = next((name for is_kind, name in _KINDS if is_kind(status.st_mode)), "special")
+    if kind := _name_kind(status.st_mode):
         what = f"cannot read the file: it is {kind}, not a regular file"
         raise error(what, "name a regular file; copy the data into one first", where)
     return status.st_size
+
+
+def find_special_kind(path: Path) -> str | None:
+    """Return the kind of what exists at a path, such as `a device`; None for a regular file.
+
+    None is also returned where nothing can be found there.
+    """
+    try:
+        return _name_kind(path.stat().st_mode)
+    except (OSError, ValueError):
+        return None
+
+
+def _name_kind(mode: int) -> str | None:
+    """Return the kind of file by its mode; None for a regular file."""
+    if stat.S_ISREG(mode):
+        return None
+    return next((name for is_kind, name in _KINDS if is_kind(mode)), "special")
