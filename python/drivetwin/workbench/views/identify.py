@@ -13,7 +13,7 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.parameters import build_findings_section, build_result_section
-from drivetwin.workbench.locks import LockKind
+from drivetwin.vehicle.locks import LockKind
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
