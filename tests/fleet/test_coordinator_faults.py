@@ -62,8 +62,9 @@ def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
     dice, killed = random.Random(1), []
 
     def kill_now_and_then(event: Event) -> None:
-        if isinstance(event, Settled) and dice.random() < 0.2:
-            killed.append(dice.choice(children(os.getpid())))
+        workers = children(os.getpid())
+        if isinstance(event, Settled) and workers and dice.random() < 0.2:
+            killed.append(dice.choice(workers))
             os.kill(killed[-1], signal.SIGKILL)
 
     asked = request(logs, tmp_path / "store", wishes=RunOptions(attempts=50))
