@@ -14,6 +14,7 @@ from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError, FileFormatError
+from drivetwin.export.parameters.template import read_template
 from drivetwin.files.result_file import load_result
 from drivetwin.files.twin_file import read_twin_file
 from drivetwin.fleet.rules import read_rules
@@ -34,6 +35,7 @@ READERS: tuple[Callable[[Path], object], ...] = (
     load_result,
     lambda path: read_database((path,)),
     lambda path: Sources([], path).count(),
+    read_template,
 )
 
 

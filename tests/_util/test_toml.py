@@ -23,6 +23,7 @@ from drivetwin._util.toml import (
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError
+from drivetwin.export.parameters.template import read_template
 from drivetwin.files.twin_file import read_twin_file
 from drivetwin.fleet.rules import read_rules
 from drivetwin.gearbox import load_gearbox
@@ -35,6 +36,7 @@ READERS: tuple[Callable[[Path], object], ...] = (
     load_powertrain,
     read_rules,
     read_twin_file,
+    read_template,
 )
 BOMBS = {
     "arrays": "x = " + 100_000 * "[" + 100_000 * "]",
