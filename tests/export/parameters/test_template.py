@@ -82,7 +82,8 @@ def test_labels_units_and_breakpoints_are_those_of_the_template(
     pressure, curve, before = back["Clt_pKissB3_C"], back["Clt_muB3_CUR"], own["P0.B3"]
     assert isinstance(pressure, Scalar)
     assert isinstance(before, Scalar)
-    assert (pressure.unit, pressure.value) == ("bar", pytest.approx(1e-5 * before.value))
+    assert pressure.unit == "bar"
+    assert pressure.value == pytest.approx(1e-5 * before.value)
     assert pressure.text == "kiss point of B3"
     assert isinstance(curve, Curve)
     assert curve.axis.points == (0.0, 50.0, 100.0, 300.0, 900.0)
