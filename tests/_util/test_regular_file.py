@@ -14,6 +14,7 @@ from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError, FileFormatError
+from drivetwin.export.parameters.files import ParameterFormat, read_parameters
 from drivetwin.export.parameters.template import read_template
 from drivetwin.files.result_file import load_result
 from drivetwin.files.twin_file import read_twin_file
@@ -36,6 +37,7 @@ READERS: tuple[Callable[[Path], object], ...] = (
     lambda path: read_database((path,)),
     lambda path: Sources([], path).count(),
     read_template,
+    lambda path: read_parameters(path, ParameterFormat.DCM),
 )
 
 
@@ -87,3 +89,12 @@ def test_a_loop_of_links(tmp_path: Path) -> None:
     path.symlink_to(path)
     with pytest.raises(FileFormatError, match="cannot read the file"):
         read_raw(path)
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_file_too_large_for_memory(tmp_path: Path, reader: Callable[[Path], object]) -> None:
+    path = tmp_path / "file.dcm"
+    with path.open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(DrivetwinError, match=r"MB are read|is binary"):
+        reader(path)

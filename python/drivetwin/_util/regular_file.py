@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import stat
 from pathlib import Path
 
@@ -17,13 +18,21 @@ _KINDS = (
 )
 
 
+LARGEST_RECORD = 200_000_000
+"""Largest file [bytes] that is read into memory as one text: results, parameters, databases."""
+
+
 def measure_regular_file(
-    path: Path, error: type[DrivetwinError], remedy: str = "check the path"
+    path: Path,
+    error: type[DrivetwinError],
+    remedy: str = "check the path",
+    largest: float = math.inf,
 ) -> int:
     """Return the size [bytes] of a regular file, without opening it.
 
     A device, named pipe or socket could block or never end. Symbolic links are followed. Raises
-    `error`, with `remedy`, where the path is missing, and where it is no regular file.
+    `error`, with `remedy`, where the path is missing, and where it is no regular file or has more
+    than `largest` bytes.
     """
     where = Where(file=str(path))
     try:
@@ -34,6 +43,9 @@ def measure_regular_file(
     if kind := _name_kind(status.st_mode):
         what = f"cannot read the file: it is {kind}, not a regular file"
         raise error(what, "name a regular file; copy the data into one first", where)
+    if status.st_size > largest:
+        what = f"the file has {status.st_size / 1e6:.1f} MB, at most {largest / 1e6:g} MB are read"
+        raise error(what, "hand in a file written for this purpose", where)
     return status.st_size
 
 

@@ -48,13 +48,7 @@ class Fault:
 def read_toml(path: Path | str, error: type[InputError]) -> dict[str, Any]:
     """Return the document in `path`; raises `error` where it cannot be read or is no TOML."""
     file, where = Path(path), Where(file=str(path))
-    size = measure_regular_file(file, error)
-    if size > MAX_SIZE:
-        raise error(
-            f"the file has {size / 1e6:.1f} MB, at most {MAX_SIZE / 1e6:g} MB are read",
-            "hand in a TOML file written for this purpose",
-            where,
-        )
+    measure_regular_file(file, error, largest=MAX_SIZE)
     try:
         return parse_toml(file.read_text(encoding="utf-8-sig"))
     except OSError as fault:
