@@ -35,7 +35,7 @@ demo: native ## build, identify a synthetic shift with known truth, name the rep
 	$(bin)/drivetwin demo -o out/demo
 
 .PHONY: test
-test: lint-rust lint-python tidy test-rust test-python ## all checks and tests
+test: lint-rust lint-python tidy deny test-rust test-python ## all checks and tests
 
 .PHONY: lint-rust
 lint-rust: $(venv)/.dev ## rustfmt and clippy
@@ -53,6 +53,12 @@ lint-python: $(venv)/.dev native ## ruff, mypy --strict, and the native module a
 tidy: $(venv)/.dev ## directions of imports, and the project's own rules (circles, names, sizes, paths)
 	PYTHONPATH=python $(bin)/lint-imports --no-cache --no-logo
 	$(bin)/python -m tools.tidy
+
+# What needs no network; `advisories` needs the RustSec database.
+deny_checks ?= bans licenses sources
+.PHONY: deny
+deny: $(venv)/.dev ## licences, sources and duplicates of the crates by deny.toml (deny_checks=advisories)
+	PATH="$(CURDIR)/$(bin):$$PATH" cargo deny --locked check $(deny_checks)
 
 .PHONY: test-rust
 test-rust: $(venv)/.dev ## tests of the core

@@ -26,6 +26,18 @@ result = drivetwin.attach_validation(result, twin, log)
 print(result.summary())
 result.plot()
 
+# %% The same shift, with what is known of the truck: one value exactly, one with its standard
+# deviation, one between two bounds.
+known = drivetwin.identify(
+    log,
+    card,
+    found,
+    fixed={"eta": 0.93},
+    priors={"J_out": (0.9, 0.1)},
+    bounds={"J_vehicle": (5000.0, 7000.0)},
+)
+print(known.summary())
+
 # %% Friction over slip with its 95 % band.
 twin.plot()
 

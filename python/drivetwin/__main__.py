@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import sys
 
-from drivetwin._util.interrupts import interrupt_on_sigterm
+from drivetwin._util.interrupts import interrupt_on_signals, was_interrupted
 from drivetwin.errors import INTERRUPTED
 
 LINEAR_ALGEBRA = ("OPENBLAS", "OMP", "MKL", "VECLIB")
@@ -20,12 +20,16 @@ def main() -> int:
     for library in LINEAR_ALGEBRA:  # before NumPy reads it
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
-        interrupt_on_sigterm()
+        interrupt_on_signals()
         from drivetwin.cli import main as run
 
         return run()
     except KeyboardInterrupt:
         return INTERRUPTED
+    except Exception:
+        if was_interrupted():
+            return INTERRUPTED
+        raise
 
 
 if __name__ == "__main__":

@@ -107,6 +107,7 @@ class Code(StrEnum):
     CARD_CONTRADICTED = auto()
     FIXED_VALUE_CONTRADICTED = auto()
     OUTSIDE_DESIGN_RANGE = auto()
+    OUTSIDE_BOUNDS = auto()
     EFFICIENCY_ABOVE_ONE = auto()
     EFFICIENCY_ABOVE_ONE_BY_PAPER = auto()
     LOGS_AGREE = auto()

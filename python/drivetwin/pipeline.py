@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import InputError
 from drivetwin.estimation.data.actuators import identify_actuators
 from drivetwin.estimation.data.compare_logs import require_compatible
 from drivetwin.estimation.data.prepare import DetectedShifts, prepare
@@ -16,13 +18,21 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
 from drivetwin.estimation.multi_log.fit import identify_joint
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.findings import Code, report
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.check import check_card
+from drivetwin.vehicle.locks import apply_locks, collect_locks
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 def identify(
-    log: ShiftLog, card: VehicleCard, shifts: DetectedShifts, method: Method = DEFAULT_METHOD
+    log: ShiftLog,
+    card: VehicleCard,
+    shifts: DetectedShifts,
+    method: Method = DEFAULT_METHOD,
+    *,
+    fixed: Mapping[str, float] = MappingProxyType({}),
+    priors: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
 ) -> Identification:
     """Identify the driveline from all usable shifts of a log.
 
@@ -31,9 +41,21 @@ def identify(
     log, card : the channels of a recording and the design data of its vehicle
     shifts : result of `detect_shifts`
     method : estimator of the reported values; the results of all stages are in `evidence`
+    fixed : exact values by parameter id, SI, such as `{"eta": 0.97}`
+    priors : values and their standard deviations, such as `{"J_out": (0.9, 0.1)}`
+    bounds : lower and upper ends between which all values are equally probable, such as
+        `{"k_o": (1.5e5, 2.5e5)}`. They count as the prior with the same mean and standard
+        deviation; a result outside them is reported.
+
+    Returns
+    -------
+    Identification
+        `assumptions` and `settings["stated"]` record fixed values, priors and bounds.
 
     Raises
     ------
+    InputError
+        For fixed values, priors and bounds that cannot be used, all named at once.
     NoShiftError
         Without a usable shift.
     MissingChannelError
@@ -43,8 +65,34 @@ def identify(
     IdentificationError
         If the data cannot carry the method.
     """
-    found = identify_prepared(_prepare_checked(log, card, shifts), method)
-    return attach_actuators(found, [log], card)
+    stated = {"fixed": fixed, "priors": priors, "bounds": bounds}
+    locks = collect_locks(card, fixed, priors, bounds)
+    if locks and method is Method.PAPER:
+        raise InputError(
+            "the paper's method takes no fixed values, priors and bounds",
+            "use the integral or the likelihood method",
+        )
+    found = identify_prepared(_prepare_checked(log, apply_locks(card, locks), shifts), method)
+    found = attach_actuators(found, [log], card)
+    if not locks:
+        return found
+    return replace(
+        found,
+        inputs={**card.inputs, **found.inputs},
+        settings={**found.settings, "stated": {name: {**one} for name, one in stated.items()}},
+        findings=(*found.findings, *_report_excess(found, bounds)),
+    )
+
+
+def _report_excess(
+    found: Identification, bounds: Mapping[str, tuple[float, float]]
+) -> Iterator[Finding]:
+    """Report the estimates outside their bounds."""
+    for name, (low, high) in bounds.items():
+        one = found.estimates.get(name)
+        if one is not None and one.value is not None and not low <= one.value <= high:
+            ends = {"low": Number(low, one.unit), "high": Number(high, one.unit)}
+            yield report(Code.OUTSIDE_BOUNDS, name, value=Number(one.value, one.unit), **ends)
 
 
 def identify_jointly(

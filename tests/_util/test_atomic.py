@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import os
+import socket
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -47,3 +50,35 @@ def test_a_file_to_be_kept_is_not_written_over(tmp_path: Path, how: str) -> None
     assert kept.read_text() == "log"
     write_text(path, "result")
     assert path.read_text() == "result"
+
+
+def make_socket(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as one:
+        one.bind(str(path))
+
+
+SPECIAL: dict[str, Callable[[Path], object]] = {
+    "a named pipe": os.mkfifo,
+    "a socket": make_socket,
+    "a device": lambda path: path.symlink_to("/dev/full"),
+}
+
+
+@pytest.mark.parametrize("kind", SPECIAL)
+def test_a_device_is_not_replaced_by_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    monkeypatch.chdir(tmp_path)  # the path of a socket is short
+    path = Path("out.json")
+    SPECIAL[kind](path)
+    before = path.lstat()
+    with pytest.raises(InputError, match=f"cannot write here: it is {kind}"):
+        write_text(path, "{}")
+    assert path.lstat() == before
+    assert list(tmp_path.iterdir()) == [tmp_path / path]
+
+
+@pytest.mark.parametrize("name", ["", ".", "/"])
+def test_a_path_without_a_file_name(name: str) -> None:
+    with pytest.raises(InputError, match="names no file"):
+        write_text(Path(name), "{}")

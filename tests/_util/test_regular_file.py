@@ -14,9 +14,12 @@ from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError, FileFormatError
+from drivetwin.export.parameters.files import ParameterFormat, read_parameters
+from drivetwin.export.parameters.template import read_template
 from drivetwin.files.result_file import load_result
 from drivetwin.files.twin_file import read_twin_file
 from drivetwin.fleet.rules import read_rules
+from drivetwin.fleet.sources import Sources
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.can.database import read_database
 from drivetwin.logs.read import read_raw
@@ -32,6 +35,9 @@ READERS: tuple[Callable[[Path], object], ...] = (
     read_twin_file,
     load_result,
     lambda path: read_database((path,)),
+    lambda path: Sources([], path).count(),
+    read_template,
+    lambda path: read_parameters(path, ParameterFormat.DCM),
 )
 
 
@@ -83,3 +89,12 @@ def test_a_loop_of_links(tmp_path: Path) -> None:
     path.symlink_to(path)
     with pytest.raises(FileFormatError, match="cannot read the file"):
         read_raw(path)
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_file_too_large_for_memory(tmp_path: Path, reader: Callable[[Path], object]) -> None:
+    path = tmp_path / "file.dcm"
+    with path.open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(DrivetwinError, match=r"MB are read|is binary"):
+        reader(path)

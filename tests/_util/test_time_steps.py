@@ -6,9 +6,10 @@ from __future__ import annotations
 import gc
 
 import numpy as np
+import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.time_steps import compute_median_step, remember_for_stamps
+from drivetwin._util.time_steps import compute_median_step, is_time_axis, remember_for_stamps
 
 
 def test_a_result_is_kept_as_long_as_the_stamps() -> None:
@@ -34,3 +35,20 @@ def test_the_median_step_is_that_of_the_array() -> None:
     for size in (2, 9_999, 10_000, 50_000):
         time = np.cumsum(np.random.default_rng(size).uniform(0.5, 1.5, size))
         assert compute_median_step(time) == float(np.median(np.diff(time)))
+
+
+STEPS = np.arange(100.0)
+
+
+@pytest.mark.parametrize(
+    "time",
+    [0.0 * STEPS, -STEPS, 1e300 * STEPS, 1e9 * STEPS, STEPS[:1], STEPS[:0],
+     np.append(STEPS, np.nan), np.append(STEPS, np.inf), np.array([-1e308, 0.0, 1e308])],
+)  # fmt: skip
+def test_stamps_that_are_no_record(time: FloatArray) -> None:
+    assert not is_time_axis(time)
+
+
+@pytest.mark.parametrize("time", [STEPS, 1e-6 * STEPS, 1.7e9 + STEPS, 1e7 * STEPS])
+def test_stamps_of_records(time: FloatArray) -> None:
+    assert is_time_axis(time)

@@ -23,6 +23,7 @@ from drivetwin._util.toml import (
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError
+from drivetwin.export.parameters.template import read_template
 from drivetwin.files.twin_file import read_twin_file
 from drivetwin.fleet.rules import read_rules
 from drivetwin.gearbox import load_gearbox
@@ -35,6 +36,7 @@ READERS: tuple[Callable[[Path], object], ...] = (
     load_powertrain,
     read_rules,
     read_twin_file,
+    read_template,
 )
 BOMBS = {
     "arrays": "x = " + 100_000 * "[" + 100_000 * "]",
@@ -49,6 +51,9 @@ BOMBS = {
     "integer": "x = " + 4_000 * "9",
     "hexadecimal integer": "x = 0x" + 100_000 * "F",
     "integer of 64 bits": f"x = {2**63}",
+    "denormal number": "x = 1e-320",
+    "small number": "x = [-1e-151]",
+    "large number": "x = 1e151",
     "text": f'x = "{(MAX_TEXT + 1) * "x"}"',
     "text of the name": f'name = "{1_000_000 * "x"}"',
     "key": (MAX_TEXT + 1) * "x" + " = 1",

@@ -22,7 +22,7 @@ INTERRUPT = b"\x03"
 def run_in_terminal(
     arguments: Sequence[str], answers: Sequence[tuple[str, bytes]], folder: Path
 ) -> tuple[int, str]:
-    """Run the program; return its exit code and what it wrote.
+    """Run the program; return its exit code as a shell shows it and what it wrote.
 
     Each of the `answers` is sent as it is when its question, a part of the text since the answer
     before, has been asked.
@@ -57,4 +57,5 @@ def run_in_terminal(
     os.close(terminal)
     code = process.wait()
     assert not waiting, (waiting[0], shown.decode(errors="replace"))
-    return code, shown.decode(errors="replace")
+    # A repeated interrupt may come while Python ends, which then ends by the signal itself.
+    return 128 - code if code < 0 else code, shown.decode(errors="replace")

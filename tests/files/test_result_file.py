@@ -92,6 +92,7 @@ def test_round_trip(tmp_path: Path) -> None:
         ("[1, 2]", "cannot be read"),
         ("{}", "schema is None"),
         ('{"schema": "drivetwin/result-5"}', "newer"),
+        (f'{{"schema": "drivetwin/result-{5_000 * "9"}"}}', "schema is 'drivetwin/result-9"),
         ('{"schema": "drivetwin/twin-1"}', "expected 'drivetwin/result-5'"),
         ('{"schema": "drivetwin/result-1"}', "shifts: this key is required and missing"),
     ],

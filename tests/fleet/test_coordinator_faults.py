@@ -49,6 +49,12 @@ def undisturbed(logs: Path, store: Path) -> dict[str, Any]:
     return contents(store)
 
 
+def start_coordinator(logs: Path, store: Path) -> subprocess.Popen[bytes]:
+    """Start a run in another process."""
+    command = [sys.executable, "-m", "tests.fleet.toys", str(logs), str(store)]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE)
+
+
 @pytest.mark.short
 @pytest.mark.faults
 def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
@@ -56,8 +62,9 @@ def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
     dice, killed = random.Random(1), []
 
     def kill_now_and_then(event: Event) -> None:
-        if isinstance(event, Settled) and dice.random() < 0.2:
-            killed.append(dice.choice(children(os.getpid())))
+        workers = children(os.getpid())
+        if isinstance(event, Settled) and workers and dice.random() < 0.2:
+            killed.append(dice.choice(workers))
             os.kill(killed[-1], signal.SIGKILL)
 
     asked = request(logs, tmp_path / "store", wishes=RunOptions(attempts=50))
@@ -72,8 +79,7 @@ def test_a_coordinator_killed_three_times_goes_on_where_it_was(tmp_path: Path) -
     logs = make_logs(tmp_path / "logs", COUNT, word="slow", spoilt=["bad"])
     store, computed = tmp_path / "store", []
     for share in (0.2, 0.5, 0.8, None):
-        command = [sys.executable, "-m", "tests.fleet.toys", str(logs), str(store)]
-        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE) as coordinator:
+        with start_coordinator(logs, store) as coordinator:
             assert coordinator.stdout is not None
             settled = 0
             for line in coordinator.stdout:
@@ -139,10 +145,36 @@ def test_a_read_only_store_is_told_and_can_still_be_read(tmp_path: Path) -> None
 
 
 def test_two_coordinators_do_not_share_a_store(tmp_path: Path) -> None:
-    logs, store = make_logs(tmp_path / "logs", 3), tmp_path / "store"
-    with Store(store, write=True), pytest.raises(StoreError, match="another"):
-        run_toys(logs, store)
-    assert run_toys(logs, store)[0].done == 3
+    logs, store = make_logs(tmp_path / "logs", 30, word="slow"), tmp_path / "store"
+    with start_coordinator(logs, store) as first:
+        assert first.stdout is not None
+        first.stdout.readline()
+        with pytest.raises(StoreError, match="another"):
+            run_toys(logs, store)
+        first.communicate(timeout=60.0)
+    assert first.returncode == 0
+    assert run_toys(logs, store)[0].computed == 0
+    assert contents(store) == undisturbed(logs, tmp_path / "calm")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_a_run_in_two_seconds(tmp_path: Path, number: int) -> None:
+    logs = make_logs(tmp_path / "logs", 12, word="slow", spoilt=["", "", "", "hang"])
+    store = tmp_path / "store"
+    with start_coordinator(logs, store) as coordinator:
+        assert coordinator.stdout is not None
+        for _ in range(4):
+            coordinator.stdout.readline()
+        sent = time.monotonic()
+        coordinator.send_signal(number)
+        coordinator.communicate(timeout=60.0)
+    assert time.monotonic() - sent < 2.0
+    assert coordinator.returncode == 0
+    assert not [path for path in store.rglob("*") if path.suffix == ".partial"]
+    (logs / "unit_0" / "log_0003.csv").write_text("n3 slow \n")
+    assert run_toys(logs, store)[0].computed < 12
+    rows = contents(store)["rows"]
+    assert rows == undisturbed(logs, tmp_path / "calm")["rows"]
 
 
 def test_an_interrupted_run_tells_what_it_did_and_goes_on(tmp_path: Path) -> None:
@@ -163,8 +195,7 @@ def test_an_interrupted_run_tells_what_it_did_and_goes_on(tmp_path: Path) -> Non
 
 def test_no_worker_outlives_its_coordinator(tmp_path: Path) -> None:
     logs = make_logs(tmp_path / "logs", 4, word="hang")
-    command = [sys.executable, "-m", "tests.fleet.toys", str(logs), str(tmp_path / "store")]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE) as coordinator:
+    with start_coordinator(logs, tmp_path / "store") as coordinator:
         deadline = time.monotonic() + 20.0
         while len(workers := children(coordinator.pid)) < 2 and time.monotonic() < deadline:
             time.sleep(0.02)

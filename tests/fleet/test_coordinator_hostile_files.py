@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import signal
@@ -12,6 +13,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,7 +23,13 @@ from drivetwin.fleet.run import run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State
-from tests.fleet.toys import make_logs, names, request, run_toys
+from tests.fleet.toys import contents, make_logs, names, request, run_toys
+
+
+def _run_calmly(logs: Path, store: Path) -> dict[str, Any]:
+    """Contents of a store to which nothing happened."""
+    run_toys(logs, store)
+    return contents(store)
 
 
 def _spoil(logs: Path) -> list[str]:
@@ -57,14 +65,26 @@ def test_a_device_of_a_list_is_a_bad_log(tmp_path: Path) -> None:
     assert (summary.done, summary.bad) == (1, 3)
 
 
-def test_many_tiny_logs_with_clocks_set_back(tmp_path: Path) -> None:
-    logs = make_logs(tmp_path / "logs", 200)
-    run_toys(logs, tmp_path / "store")
+@pytest.mark.parametrize("count", [200, pytest.param(3000, marks=pytest.mark.faults)])
+def test_many_tiny_logs_and_one_from_the_past(tmp_path: Path, count: int) -> None:
+    logs = make_logs(tmp_path / "logs", count)
+    assert run_toys(logs, tmp_path / "store")[0].computed == count
     changed = logs / "unit_0" / "log_0000.csv"
     changed.write_text("changed\n")
     os.utime(changed, (1e9, 1e9))  # years before it was scanned
     summary, _ = run_toys(logs, tmp_path / "store")
-    assert (summary.done, summary.computed) == (200, 1)
+    assert (summary.done, summary.computed) == (count, 1)
+
+
+def test_a_clock_set_back_at_every_look(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    logs, now = make_logs(tmp_path / "logs", 5), itertools.count(2_000_000_000, -86_400)
+    with monkeypatch.context() as clock:
+        clock.setattr(time, "time", lambda: float(next(now)))
+        clock.setattr(time, "time_ns", lambda: next(now) * 10**9)
+        assert run_toys(logs, tmp_path / "store")[0].computed == 5
+        summary, _ = run_toys(logs, tmp_path / "store")
+    assert (summary.done, summary.computed) == (5, 0)
+    assert contents(tmp_path / "store") == _run_calmly(logs, tmp_path / "calm")
 
 
 def test_a_store_that_was_copied_goes_on(tmp_path: Path) -> None:

@@ -114,7 +114,20 @@ def test_what_a_stopped_compaction_left_is_no_harm(tmp_path: Path) -> None:
     with Store(tmp_path / "a", write=True) as store:
         assert store.read_rows() == before
         assert not _files(store)
-        assert not list(store.folder.glob("inbox/*/*.partial"))
+
+
+@pytest.mark.parametrize("folder", ["inbox/00", "reports", "traces"])
+def test_no_half_written_file_stays(tmp_path: Path, folder: str) -> None:
+    half = tmp_path / "a" / folder / "x.html.host.1.partial"
+    with Store(tmp_path / "a", write=True):
+        half.parent.mkdir(parents=True, exist_ok=True)
+        half.write_bytes(b"of a worker that the end of the run killed")
+    assert not half.exists()
+    half.write_bytes(b"of a coordinator that was killed itself")
+    with Store(tmp_path / "a"):
+        assert half.exists()
+    with Store(tmp_path / "a", write=True):
+        assert not half.exists()
 
 
 def test_what_is_no_store_is_told(tmp_path: Path) -> None:

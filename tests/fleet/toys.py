@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from drivetwin._util.interrupts import interrupt_on_signals
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.coordinator import RunOptions
 from drivetwin.fleet.events import Event, Settled, Summary, to_document
@@ -77,6 +78,7 @@ def _tell(event: Event) -> None:
 
 
 if __name__ == "__main__":
+    interrupt_on_signals()
     scheduler = sys.argv[3] if len(sys.argv) > 3 else None
     asked = request(
         Path(sys.argv[1]), Path(sys.argv[2]), scheduler=scheduler, wishes=RunOptions(attempts=20)

@@ -99,6 +99,10 @@ CASES = {
         "UnitError", "PrsBrk2.*torque.*pressure", _edit(_unit("PrsBrk2", "Nm"))
     ),
     "time not increasing": Case("TimeError", "increas.*->", _edit(_swapped_times)),
+    "time constant": Case("TimeError", "repeat.*->", _edit(_column("time", lambda *_: "1.5"))),
+    "time beyond all clocks": Case(
+        "TimeError", "apart.*->", _edit(_column("time", lambda n, _: f"{n}e300"))
+    ),
     "NaN run": Case(
         "DamagedChannelError",
         "SpdOut.*->",

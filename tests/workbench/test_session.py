@@ -12,7 +12,7 @@ from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
 from drivetwin.logs.formats import parser_limits
-from drivetwin.workbench.locks import Lock, LockKind
+from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
 from drivetwin.workbench.phases import Boundary, get_boundary_times
 from drivetwin.workbench.session import MOST_SESSIONS, MOST_UPLOADS, Session, Sessions

@@ -15,7 +15,7 @@ import pytest
 
 from drivetwin.errors import RefusedError
 from drivetwin.estimation.result.method import Method
-from drivetwin.workbench.locks import Lock, LockKind
+from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.phases import Boundary, get_boundary_times
 from drivetwin.workbench.session import Session, Sessions
 from drivetwin.workbench.workspace import load_workspace

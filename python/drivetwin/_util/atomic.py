@@ -12,6 +12,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import BinaryIO
 
+from drivetwin._util.regular_file import find_special_kind
 from drivetwin.errors import InputError, Where
 
 _Identity = tuple[int, int]
@@ -35,7 +36,15 @@ def protect_files(files: Iterable[Path]) -> Iterator[None]:
 
 
 def refuse_overwrite(path: Path) -> None:
-    """Raise InputError where `path` is a file to be kept, also by another path or a link."""
+    """Raise InputError where `path` is a file to be kept, also by another path or a link.
+
+    Such are the protected files, and devices, named pipes and sockets: a file would take the place
+    of the device itself.
+    """
+    kind = find_special_kind(path)
+    if kind not in (None, "a folder"):
+        what = f"cannot write here: it is {kind}, not a regular file"
+        raise InputError(what, "name a regular file", Where(file=str(path)))
     if _get_identity(path) in _kept.get():
         what = "this file is read by the same command and would be written over"
         raise InputError(what, "give the result another name or folder", Where(file=str(path)))
@@ -58,6 +67,8 @@ def open_atomic(path: Path | str) -> Iterator[BinaryIO]:
     """
     path = Path(path)
     refuse_overwrite(path)
+    if not path.name:
+        raise InputError("this names no file to write to", "name a file", Where(file=str(path)))
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f"{path.name}.{platform.node()}.{os.getpid()}.partial")
     try:

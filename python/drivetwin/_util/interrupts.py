@@ -9,11 +9,26 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
+_raised: list[int] = []
+"""Signals for which `_interrupt` raised KeyboardInterrupt."""
 
 
-def interrupt_on_sigterm() -> None:
-    """Let SIGTERM raise KeyboardInterrupt, so that it cleans up as Ctrl-C does."""
+def interrupt_on_signals() -> None:
+    """Let SIGTERM raise KeyboardInterrupt as Ctrl-C does, and remember both.
+
+    A SIGINT that the caller of the program ignores, as for jobs in the background, stays ignored.
+    """
     signal.signal(signal.SIGTERM, _interrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
+
+
+def was_interrupted() -> bool:
+    """Return True after an interrupt, also where its KeyboardInterrupt became another exception.
+
+    An extension module that is interrupted while it is imported raises ImportError.
+    """
+    return bool(_raised)
 
 
 @contextmanager
@@ -33,5 +48,6 @@ def defer_interrupts() -> Iterator[None]:
             signal.raise_signal(came[0])
 
 
-def _interrupt(_number: int, _frame: object) -> None:
+def _interrupt(number: int, _frame: object) -> None:
+    _raised.append(number)
     raise KeyboardInterrupt

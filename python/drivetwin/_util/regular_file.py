@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import stat
 from pathlib import Path
 
@@ -17,13 +18,21 @@ _KINDS = (
 )
 
 
+LARGEST_RECORD = 200_000_000
+"""Largest file [bytes] that is read into memory as one text: results, parameters, databases."""
+
+
 def measure_regular_file(
-    path: Path, error: type[DrivetwinError], remedy: str = "check the path"
+    path: Path,
+    error: type[DrivetwinError],
+    remedy: str = "check the path",
+    largest: float = math.inf,
 ) -> int:
     """Return the size [bytes] of a regular file, without opening it.
 
     A device, named pipe or socket could block or never end. Symbolic links are followed. Raises
-    `error`, with `remedy`, where the path is missing, and where it is no regular file.
+    `error`, with `remedy`, where the path is missing, and where it is no regular file or has more
+    than `largest` bytes.
     """
     where = Where(file=str(path))
     try:
@@ -31,8 +40,28 @@ def measure_regular_file(
     except (OSError, ValueError) as fault:  # ValueError: the path contains a NUL
         why = getattr(fault, "strerror", None) or fault
         raise error(f"cannot read the file: {why}", remedy, where) from None
-    if not stat.S_ISREG(status.st_mode):
-        kind = next((name for is_kind, name in _KINDS if is_kind(status.st_mode)), "special")
+    if kind := _name_kind(status.st_mode):
         what = f"cannot read the file: it is {kind}, not a regular file"
         raise error(what, "name a regular file; copy the data into one first", where)
+    if status.st_size > largest:
+        what = f"the file has {status.st_size / 1e6:.1f} MB, at most {largest / 1e6:g} MB are read"
+        raise error(what, "hand in a file written for this purpose", where)
     return status.st_size
+
+
+def find_special_kind(path: Path) -> str | None:
+    """Return the kind of what exists at a path, such as `a device`; None for a regular file.
+
+    None is also returned where nothing can be found there.
+    """
+    try:
+        return _name_kind(path.stat().st_mode)
+    except (OSError, ValueError):
+        return None
+
+
+def _name_kind(mode: int) -> str | None:
+    """Return the kind of file by its mode; None for a regular file."""
+    if stat.S_ISREG(mode):
+        return None
+    return next((name for is_kind, name in _KINDS if is_kind(mode)), "special")

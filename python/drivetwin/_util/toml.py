@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,6 +23,8 @@ MAX_DEPTH = 50
 """Largest number of nested tables and arrays."""
 MAX_TEXT = 100_000
 """Longest text or key [characters]."""
+MAX_EXPONENT = 150
+"""Power of ten that no number exceeds, nor its inverse: squares neither overflow nor vanish."""
 
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}", re.ASCII)
@@ -48,13 +51,7 @@ class Fault:
 def read_toml(path: Path | str, error: type[InputError]) -> dict[str, Any]:
     """Return the document in `path`; raises `error` where it cannot be read or is no TOML."""
     file, where = Path(path), Where(file=str(path))
-    size = measure_regular_file(file, error)
-    if size > MAX_SIZE:
-        raise error(
-            f"the file has {size / 1e6:.1f} MB, at most {MAX_SIZE / 1e6:g} MB are read",
-            "hand in a TOML file written for this purpose",
-            where,
-        )
+    measure_regular_file(file, error, largest=MAX_SIZE)
     try:
         return parse_toml(file.read_text(encoding="utf-8-sig"))
     except OSError as fault:
@@ -68,7 +65,7 @@ def read_toml(path: Path | str, error: type[InputError]) -> dict[str, Any]:
 def parse_toml(text: str) -> dict[str, Any]:
     """Return the document in a text.
 
-    Raises ValueError where the text is no TOML or exceeds the limits on nesting, integers and
+    Raises ValueError where the text is no TOML or exceeds the limits on nesting, numbers and
     texts, which no file of this program reaches.
     """
     if _LONG_KEY.search(text):
@@ -100,8 +97,16 @@ def _iterate_excess(document: dict[str, Any]) -> Iterator[str]:
             waiting += [(item, (*place, name)) for name, item in inside]
         elif isinstance(value, int) and not -(2**63) <= value < 2**63:
             yield f"{key}: the integer exceeds 64 bits"
+        elif isinstance(value, float) and _is_extreme(value):
+            yield f"{key}: {value:g} is beyond 1e{MAX_EXPONENT} or within 1e-{MAX_EXPONENT} of zero"
         if any(isinstance(one, str) and len(one) > MAX_TEXT for one in (value, *place[-1:])):
             yield f"{key}: a text of more than {MAX_TEXT} characters"
+
+
+def _is_extreme(value: float) -> bool:
+    """Return whether a number exceeds the limits; zero, NaN and infinity do not."""
+    size = abs(value)
+    return 0.0 < size < 10.0**-MAX_EXPONENT or 10.0**MAX_EXPONENT < size < math.inf
 
 
 def validate_schema(document: Mapping[str, Any], model: type[BaseModel]) -> list[Fault]:

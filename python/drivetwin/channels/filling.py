@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import find_true_runs
+from drivetwin._util.time_steps import is_time_axis
 from drivetwin.channels.knot_fit import (
     ROUND_OFF,
     Interpolant,
@@ -131,7 +132,7 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     """
     finite = np.isfinite(values)
     time, values = time[finite], values[finite]
-    if time.size < FILLING.least:
+    if time.size < FILLING.least or not is_time_axis(time):
         return None
     for part in _list_windows(time, values):
         found = _find_in_window(time[part], values[part])

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.time_steps import compute_median_step, remember_for_stamps
+from drivetwin._util.time_steps import compute_median_step, is_time_axis, remember_for_stamps
 
 MIN_CHANGES = 10
 """Fewer changes of value cannot prove a raster."""
@@ -86,7 +86,7 @@ def find_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | None:
     squares so that clock drift does not add up. Where stamps jitter or messages are lost, it is the
     distance that most changes have.
     """
-    if time.size <= MIN_CHANGES:
+    if time.size <= MIN_CHANGES or not is_time_axis(time):
         return None
     raster = _find_stamp_raster(time, values)
     if raster is None:

@@ -38,6 +38,14 @@ _Powertrain = Annotated[
         help="Parameter files: add the torque converter of this powertrain (TOML or built-in).",
     ),
 ]
+_Template = Annotated[
+    Path | None,
+    typer.Option(
+        "--template",
+        metavar="FILE",
+        help="Parameter files: labels, units, axes and breakpoints of this file (TOML).",
+    ),
+]
 _Shift = Annotated[
     str | None,
     typer.Option(
@@ -66,6 +74,7 @@ def export(
         Names, typer.Option("--names", help="Parameter files: whose names the parameters get.")
     ] = Names.DRIVETWIN,
     powertrain: _Powertrain = None,
+    template: _Template = None,
     shift: _Shift = None,
     log: _Log = None,
     channels: ChannelsFile = None,
@@ -102,7 +111,8 @@ def export(
                 write_modelica(*_load_subject(model, shift, log, channels), path)
                 listed = {}
             case _:
-                content = _write_parameters(model, path, to, (names, _load_converter(powertrain)))
+                content = _collect_parameters(model, names, powertrain)
+                content = _write_parameters(content, model, template, path, to)
                 listed = {"parameters": [one.name for one in content.entries]}
                 if not as_json:
                     for line in content.notes:
@@ -113,14 +123,26 @@ def export(
         print_line(f"wrote {path}")
 
 
-def _write_parameters(
-    twin: Twin, path: Path, to: Target, options: tuple[Names, Converter | None]
-) -> ParameterSet:
-    from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+def _collect_parameters(twin: Twin, names: Names, powertrain: str | None) -> ParameterSet:
     from drivetwin.export.parameters.of_twin import collect_parameters
 
-    content = collect_parameters(twin, *options)
-    write_parameters(content, path, ParameterFormat(to.value))
+    return collect_parameters(twin, names, _load_converter(powertrain))
+
+
+def _write_parameters(
+    content: ParameterSet, twin: Twin, template: Path | None, path: Path, to: Target
+) -> ParameterSet:
+    """Write a parameter file, in the form of a template if one is given; return its contents."""
+    from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+    from drivetwin.export.parameters.template import apply_template, read_template, require_labels
+
+    kind = ParameterFormat(to.value)
+    if template is not None:
+        form = read_template(template)
+        unvalued = [one.id for one in twin.parameters.values() if one.value is None]
+        content = apply_template(content, form, unvalued)
+        require_labels(content, form, kind)
+    write_parameters(content, path, kind)
     return content
 
 

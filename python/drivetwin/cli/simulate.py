@@ -78,6 +78,14 @@ def simulate(
             help="Take pressures from the commands in the log, through the twin's actuators.",
         ),
     ] = False,
+    template: Annotated[
+        Path | None,
+        typer.Option(
+            "--template",
+            metavar="FILE",
+            help="Template by which the file of --parameters was exported.",
+        ),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Simulate the shifts of a log with an identified model and compare.
@@ -95,9 +103,9 @@ def simulate(
     from drivetwin.validation.signal_table import format_signals
     from drivetwin.validation.simulate_log import simulate_shift
 
-    model = (
-        load_twin(twin) if parameters is None else _apply_parameters(load_twin(twin), parameters)
-    )
+    model = load_twin(twin)
+    if parameters is not None:
+        model = _apply_parameters(model, parameters, template)
     recording, card = read_twin_log(model, log, vehicle, channels)
     if from_command:
         recording, replaced = replace_pressures(model, recording)
@@ -137,12 +145,16 @@ def _write_page(path: Path, twin: Twin, runs: Sequence[Validation], log: str) ->
     save_comparison(path, [Candidate.from_twin(twin.name, twin)], trials)
 
 
-def _apply_parameters(twin: Twin, parameters: Path) -> Twin:
+def _apply_parameters(twin: Twin, parameters: Path, template: Path | None) -> Twin:
     """The twin with the values of a parameter file, and what that changed on stderr."""
     from drivetwin.export.parameters.files import read_parameters
+    from drivetwin.export.parameters.of_twin import collect_parameters
+    from drivetwin.export.parameters.template import read_template, restore_entries
     from drivetwin.export.parameters.to_twin import update_twin
 
     content = read_parameters(parameters)
+    if template is not None:
+        content = restore_entries(content, collect_parameters(twin), read_template(template))
     update = update_twin(twin, content)
     print_line(f"{parameters.name} changes {', '.join(update.changed) or 'nothing'}", stderr=True)
     if update.idle:

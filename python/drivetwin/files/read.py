@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from drivetwin._util.regular_file import measure_regular_file
+from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.errors import ResultFileError, Where
 from drivetwin.files.records import Record
@@ -25,7 +25,7 @@ def read_record(path: Path | str, parse: Callable[[str], Any], schema: str, mode
     """
     where = Where(file=str(path))
     remedy = "check the path, or write it with `drivetwin identify`"
-    measure_regular_file(Path(path), ResultFileError, remedy)
+    measure_regular_file(Path(path), ResultFileError, remedy, LARGEST_RECORD)
     try:
         tree = parse(Path(path).read_text(encoding="utf-8"))
     except OSError as fault:
@@ -46,11 +46,15 @@ def _check_schema(found: object, known: str, file: str) -> None:
     `known` reads like `drivetwin/twin-1`: family, dash, version. Older versions stay readable.
     """
     family, _, version = known.rpartition("-")
-    match = re.fullmatch(rf"{re.escape(family)}-(\d+)", found) if isinstance(found, str) else None
+    match = (
+        re.fullmatch(rf"{re.escape(family)}-(\d{{1,9}})", found) if isinstance(found, str) else None
+    )
     where = Where(file=file, key="schema")
     if match is None:
         raise ResultFileError(
-            f"schema is {found!r}, expected {known!r}", "give a file written by drivetwin", where
+            f"schema is {repr(found)[:80]}, expected {known!r}",
+            "give a file written by drivetwin",
+            where,
         )
     if int(match[1]) > int(version):
         raise ResultFileError(

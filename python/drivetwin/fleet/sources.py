@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivetwin._util.csv_text import parse_csv_row, restore_cell
+from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.errors import InputError, Where
 from drivetwin.fleet.index import INDEX
 from drivetwin.logs.formats.detect import SUFFIXES
@@ -82,6 +83,7 @@ def _iterate_files(folder: Path) -> Iterator[Path]:
 
 
 def _read_list(path: Path) -> Iterator[Source]:
+    measure_regular_file(path, InputError, largest=LARGEST_RECORD)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             head = file.readline()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import platform
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -58,6 +58,9 @@ class Store:
         trace: TracebackType | None,
     ) -> None:
         try:
+            if self._lock is not None:
+                with suppress(OSError):  # what remains is deleted when the store is opened again
+                    self._delete_unfinished()
             self.index.close()
         finally:
             self._release_lock()
@@ -101,8 +104,13 @@ class Store:
         self.index.reset([log for log in single if not self.get_part_path(log).is_file()])
         self.index.commit()
         self._drop_rows()
-        for leftover in (self.folder / parts.INBOX).glob("*/*.partial"):
-            leftover.unlink(missing_ok=True)
+        self._delete_unfinished()
+
+    def _delete_unfinished(self) -> None:
+        """Delete the half-written files of workers that were killed."""
+        for folder in (parts.INBOX, REPORTS, TRACES):
+            for leftover in (self.folder / folder).rglob("*.partial"):
+                leftover.unlink(missing_ok=True)
 
     def _drop_rows(self) -> None:
         """Remove large parts that the index does not name."""

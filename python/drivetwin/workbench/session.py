@@ -25,10 +25,10 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
 from drivetwin.logs.formats.parser_limits import BASE_TIME, compute_parser_limits
+from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.identifying import Task, identify_all
-from drivetwin.workbench.locks import Lock
 from drivetwin.workbench.mapping import Entry, apply_entries
 from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.sample import write_sample

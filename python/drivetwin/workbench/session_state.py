@@ -14,8 +14,8 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.card import VehicleCard
+from drivetwin.vehicle.locks import Lock, apply_locks, check_lock, get_card_lock
 from drivetwin.workbench.identifying import Outcome, Refusal
-from drivetwin.workbench.locks import Lock, apply_locks, check_lock, get_card_lock
 from drivetwin.workbench.phases import Boundary, move_boundaries
 from drivetwin.workbench.sandboxed_parse import Opened
 

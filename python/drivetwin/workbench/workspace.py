@@ -21,8 +21,8 @@ from drivetwin.errors import RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.twin_conversion import build_twin_file, restore_twin
 from drivetwin.files.twin_file import TwinFile
+from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.identifying import Outcome
-from drivetwin.workbench.locks import Lock, LockKind
 from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.uploads import LIMITS

@@ -23,7 +23,8 @@ def test_every_value_has_its_unit_meaning_and_interval() -> None:
     assert isinstance(k_o, Scalar)
     assert (k_o.value, k_o.unit) == (1.76e5, "N*m/rad")
     assert (
-        k_o.text == "output shaft stiffness (eq. 8, 14); identified, 95 %: 1.725e+05 .. 1.795e+05"
+        k_o.text
+        == "output shaft stiffness (eq. 8, 14); identified, 95 %: 1.725e+05 .. 1.795e+05 N*m/rad"
     )
     weak = collect_parameters(twin())["c_o"]
     assert "; weak, 95 %" in weak.text

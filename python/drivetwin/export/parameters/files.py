@@ -9,7 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from drivetwin._util.atomic import write_text
-from drivetwin._util.regular_file import measure_regular_file
+from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters.cdfx import convert_for_cdfx, format_cdfx, parse_cdfx
 from drivetwin.export.parameters.content import ParameterSet
@@ -85,7 +85,7 @@ def _select_format(path: Path) -> ParameterFormat:
 
 def _read_decoded(path: Path) -> str:
     """Text in UTF-8 or, as older tools write, Latin-1."""
-    measure_regular_file(path, InputError)
+    measure_regular_file(path, InputError, largest=LARGEST_RECORD)
     data = path.read_bytes()
     if b"\0" in data:
         raise FileFormatError(

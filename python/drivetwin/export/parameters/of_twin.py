@@ -107,7 +107,8 @@ def _describe_estimate(estimate: Estimate) -> str:
     """Meaning, verdict and interval; that of a value of the card has no width and is left out."""
     text = f"{get_parameter_spec(estimate.id).meaning}; {estimate.verdict.value}"
     low, high = estimate.ci95_total or (0.0, 0.0)
-    return f"{text}, 95 %: {low:.5g} .. {high:.5g}" if low < high else text
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    return f"{text}, 95 %: {low:.5g} .. {high:.5g}{unit}" if low < high else text
 
 
 def _collect_load_terms(twin: Twin) -> Iterator[Scalar]:

@@ -33,7 +33,7 @@ from drivetwin.export.parameters.xml_text import (
 
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 _SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
-_INDEXED = re.compile(r"(.+)\[(\d+)\]")
+_INDEXED = re.compile(r"(.+)\[(\d{1,9})\]")
 
 
 def convert_for_ssv(parameters: ParameterSet) -> ParameterSet:

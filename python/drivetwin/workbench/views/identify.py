@@ -14,8 +14,8 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.parameters import build_findings_section, build_result_section
+from drivetwin.vehicle.locks import LockKind
 from drivetwin.workbench.identifying import Outcome
-from drivetwin.workbench.locks import LockKind
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState

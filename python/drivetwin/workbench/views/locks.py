@@ -15,7 +15,8 @@ from drivetwin.estimation.result.estimate import Z95
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.labels import get_parameter_label, get_parameter_name
 from drivetwin.report.sections.parameters import TONES
-from drivetwin.workbench.locks import Lock, LockKind, can_fix, parse_lock
+from drivetwin.vehicle.locks import Lock, LockKind, can_fix
+from drivetwin.workbench.locks import parse_lock
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui

@@ -14,8 +14,8 @@ from drivetwin.errors import MissingParameterError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.shifts.shift import make_shift_labels
+from drivetwin.vehicle.locks import can_fix
 from drivetwin.workbench.exports import Record
-from drivetwin.workbench.locks import can_fix
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import SessionState

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
-from drivetwin._util.regular_file import measure_regular_file
+from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError
 from drivetwin.logs.formats.frames import Message, Signal
@@ -30,7 +30,7 @@ def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:
     messages: list[Message] = []
     for path in paths:
         cantools = import_extra("cantools.database", "can", "decoding a bus log", path)
-        measure_regular_file(path, FileFormatError, "correct dbc under [bus]")
+        measure_regular_file(path, FileFormatError, "correct dbc under [bus]", LARGEST_RECORD)
         with handle_parser_errors("a DBC file", path):
             text = path.read_text(encoding="cp1252", errors="replace")
             content = cantools.load_string(text, "dbc", strict=False)

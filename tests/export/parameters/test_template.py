@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: MIT
+"""Templates: labels, units, axes and breakpoints of a calibration project, and back again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivetwin.cli import main
+from drivetwin.errors import InputError
+from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.files import (
+    CODECS,
+    ParameterFormat,
+    read_parameters,
+    write_parameters,
+)
+from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.export.parameters.template import (
+    AxisForm,
+    EntryForm,
+    Template,
+    apply_template,
+    read_template,
+    require_labels,
+    restore_entries,
+)
+from drivetwin.export.parameters.to_twin import update_twin
+from drivetwin.files.twin_conversion import save_twin
+from tests.export.parameters.sample import twin
+
+RPM = math.pi / 30.0
+EXAMPLE = """
+[parameters."P0.B3"]
+label = "Clt_pKissB3_C"
+unit = "bar"
+text = "kiss point of B3"
+
+[parameters.eta]
+label = "Gbx_etaDrv_C"
+unit = "%"
+
+[parameters.k_o]
+label = "Drv_cShaft_C"
+unit = "Nm/deg"
+in_si = 57.29577951308232
+
+[parameters."mu.B3"]
+label = "Clt_muB3_CUR"
+axis = { name = "Clt_nSlip", unit = "rpm", points = [0, 50, 100, 300, 900], beyond = "hold" }
+"""
+LABELS = ["Clt_pKissB3_C", "Gbx_etaDrv_C", "Drv_cShaft_C", "Clt_muB3_CUR"]
+FLAT = sorted(set(ParameterFormat) - {ParameterFormat.SSV})
+"""Formats with units as texts."""
+
+
+@pytest.fixture
+def template(tmp_path: Path) -> Template:
+    path = tmp_path / "project.toml"
+    path.write_text(EXAMPLE, encoding="utf-8")
+    return read_template(path)
+
+
+@pytest.mark.parametrize("kind", FLAT)
+def test_labels_units_and_breakpoints_are_those_of_the_template(
+    template: Template, tmp_path: Path, kind: ParameterFormat
+) -> None:
+    own = collect_parameters(twin())
+    content = apply_template(own, template)
+    require_labels(content, template, kind)
+    path = tmp_path / f"project.{kind}"
+    write_parameters(content, path, kind)
+    back = read_parameters(path)
+    assert sorted(one.name for one in back.entries) == sorted(LABELS)
+    pressure, curve, before = back["Clt_pKissB3_C"], back["Clt_muB3_CUR"], own["P0.B3"]
+    assert isinstance(pressure, Scalar)
+    assert isinstance(before, Scalar)
+    assert pressure.unit == "bar"
+    assert pressure.value == pytest.approx(1e-5 * before.value)
+    assert pressure.text == "kiss point of B3"
+    assert isinstance(curve, Curve)
+    assert curve.axis.points == (0.0, 50.0, 100.0, 300.0, 900.0)
+    assert (curve.axis.name, curve.axis.unit) == ("Clt_nSlip", "rpm")
+    law = own["mu.B3"]
+    assert isinstance(law, Curve)
+    expected = np.interp(np.array(curve.axis.points) * RPM, law.axis.points, law.values)
+    assert curve.values == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("kind", FLAT)
+def test_an_unedited_file_changes_nothing(
+    template: Template, tmp_path: Path, kind: ParameterFormat
+) -> None:
+    own = collect_parameters(twin())
+    path = tmp_path / f"project.{kind}"
+    write_parameters(apply_template(own, template), path, kind)
+    restored = restore_entries(read_parameters(path), own, template)
+    assert [one for one in restored.entries if own[one.name] != one] == []
+    assert update_twin(twin(), restored).changed == ()
+
+
+def test_edited_values_come_back_in_si(template: Template) -> None:
+    own = collect_parameters(twin())
+    content = apply_template(own, template)
+    curve = content["Clt_muB3_CUR"]
+    assert isinstance(curve, Curve)
+    edited = replace(
+        content,
+        scalars=(Scalar("Clt_pKissB3_C", 0.75, "bar"), Scalar("Gbx_etaDrv_C", 95.0, "%")),
+        curves=(replace(curve, values=tuple(1.1 * mu for mu in curve.values)),),
+    )
+    update = update_twin(twin(), restore_entries(edited, own, template))
+    assert set(update.changed) == {"P0.B3", "eta", "mu.B3"}
+    assert update.twin.get_value("P0.B3", default=0.0) == pytest.approx(0.75e5)
+    assert update.twin.get_value("eta", default=0.0) == pytest.approx(0.95)
+    friction = update.twin.friction["B3"]
+    assert friction.slip[-1] == pytest.approx(900.0 * RPM)
+    assert friction.mu == pytest.approx(1.1 * np.array(curve.values))
+
+
+def test_a_unit_other_than_the_templates_is_refused(template: Template) -> None:
+    own = collect_parameters(twin())
+    edited = ParameterSet("", (Scalar("Clt_pKissB3_C", 75.0, "kPa"),))
+    with pytest.raises(InputError, match="in kPa, not in bar"):
+        restore_entries(edited, own, template)
+
+
+def test_a_value_for_what_was_not_identified_is_converted() -> None:
+    own = collect_parameters(twin())
+    assert "te_delay" not in {one.name for one in own.entries}
+    template = Template({"te_delay": EntryForm(label="Eng_tDly_C", unit="ms")})
+    content = ParameterSet("", (Scalar("Eng_tDly_C", 20.0, "ms"),))
+    (restored,) = restore_entries(content, own, template).scalars
+    assert restored == Scalar("te_delay", 0.02, "s")
+    assert apply_template(own, template, ["te_delay"]).entries == ()
+
+
+def test_others_are_kept_if_asked_for(template: Template) -> None:
+    own = collect_parameters(twin())
+    content = apply_template(own, replace(template, keep_others=True))
+    assert len(content.entries) == len(own.entries)
+    assert restore_entries(content, own, template).entries == own.entries
+
+
+WRONG: dict[str, tuple[str, EntryForm]] = {
+    "no such parameter; did you mean 'eta'": ("etta", EntryForm(label="a")),
+    "no known unit of Pa, such as Pa": ("P0.B3", EntryForm(label="a", unit="rpm")),
+    "no known unit of N.m/rad": ("k_o", EntryForm(label="a", unit="Nm/deg")),
+    "none is named": ("eta", EntryForm(label="a", in_si=2.0)),
+    "a number has no axis": ("eta", EntryForm(label="a", axis=AxisForm(name="x"))),
+    "exceed the known range": ("mu.B3", EntryForm(label="a", axis=AxisForm(points=[0.0, 1e4]))),
+    "do not increase": ("mu.B3", EntryForm(label="a", axis=AxisForm(points=[1.0, 1.0]))),
+    "no known unit of rad/s": ("mu.B3", EntryForm(label="a", axis=AxisForm(unit="bar"))),
+}
+
+
+@pytest.mark.parametrize("says", WRONG)
+def test_what_does_not_fit_is_named(says: str) -> None:
+    name, form = WRONG[says]
+    with pytest.raises(InputError, match=says) as refused:
+        apply_template(collect_parameters(twin()), Template({name: form}))
+    assert refused.value.where.key == f"parameters.{name}"
+
+
+def test_all_faults_are_listed() -> None:
+    template = Template(dict(WRONG.values()))
+    with pytest.raises(InputError) as refused:
+        apply_template(collect_parameters(twin()), template)
+    assert f"{len(template.entries)} faults" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[parameters.eta]\n", '[parameters.eta]\nlabel = "a b"\n', '[parameters.eta]\nlabel = ""',
+     '[parameters.eta]\nlabel = "1a"\n', '[parameters.eta]\nlabel = "a"\nin_si = 0\nunit = "x"\n',
+     '[parameters.eta]\nlabel = "a"\nfactor = 2\n', '[parameters.eta]\nlabel = "a"\nin_si = nan\n',
+     '[parameters."mu.B3"]\nlabel = "a"\naxis = { points = [] }\n', "\x00", "[[parameters]]\n"],
+)  # fmt: skip
+def test_a_damaged_template_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "t.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_template(path)
+    assert refused.value.where.file == str(path)
+
+
+def test_ssv_has_si_units_only(template: Template) -> None:
+    content = apply_template(collect_parameters(twin()), template)
+    with pytest.raises(InputError, match="is not made of kg"):
+        CODECS[ParameterFormat.SSV].text(content)
+
+
+def test_a_label_that_a_format_cannot_hold_is_refused() -> None:
+    template = Template({"eta": EntryForm(label="Gbx.eta")})
+    content = apply_template(collect_parameters(twin()), template)
+    require_labels(content, template, ParameterFormat.DCM)
+    with pytest.raises(InputError, match=r"m files cannot hold the labels Gbx\.eta"):
+        require_labels(content, template, ParameterFormat.M)
+
+
+_NUMBERS = st.floats(-1e12, 1e12)
+_SIZES = st.floats(1e-6, 1e6)
+
+
+@st.composite
+def labelled(draw: st.DrawFn) -> tuple[ParameterSet, Template]:
+    """Numbers and curves, and a template that respells each of them."""
+    scalars, curves, forms = [], [], {}
+    for k in range(draw(st.integers(1, 4))):
+        scalars.append(Scalar(f"s.{k}", draw(_NUMBERS), "Pa"))
+        forms[f"s.{k}"] = EntryForm(label=f"L_{k}", unit="u", in_si=draw(_SIZES))
+    for k in range(draw(st.integers(0, 2))):
+        points = sorted(draw(st.sets(st.integers(-1000, 1000), min_size=2, max_size=9)))
+        values = tuple(draw(_NUMBERS) for _ in points)
+        curves.append(Curve(f"c.{k}", Axis("slip", tuple(map(float, points)), "rad/s"), values))
+        along = draw(_SIZES)
+        axis: dict[str, Any] = {"name": f"A_{k}", "unit": "v", "in_si": along, "beyond": "hold"}
+        if draw(st.booleans()):
+            axis["points"] = [points[0] / along, points[-1] / along]
+        forms[f"c.{k}"] = EntryForm(label=f"M_{k}", axis=AxisForm(**axis))
+    return ParameterSet("set", tuple(scalars), tuple(curves)), Template(forms)
+
+
+@pytest.mark.parametrize("kind", FLAT)
+@given(labelled(), st.floats(0.5, 2.0))
+@settings(max_examples=40)
+def test_round_trip(
+    kind: ParameterFormat, given_set: tuple[ParameterSet, Template], factor: float
+) -> None:
+    own, template = given_set
+    codec, written = CODECS[kind], apply_template(*given_set)
+    require_labels(written, template, kind)
+    back = codec.parse(codec.text(written), "file")
+    assert restore_entries(back, own, template).entries == own.entries
+    edited = replace(
+        back, scalars=tuple(replace(one, value=one.value * factor) for one in back.scalars)
+    )
+    restored = restore_entries(edited, own, template).scalars
+    for one, before in zip(restored, own.scalars, strict=True):
+        assert one.name == before.name
+        assert one.value == pytest.approx(factor * before.value, rel=1e-12)
+
+
+def test_export_and_simulate_by_a_template(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_twin(tmp_path / "twin.toml", twin())
+    (tmp_path / "t.toml").write_text(EXAMPLE, encoding="utf-8")
+    target = str(tmp_path / "project.dcm")
+    arguments = ["export", str(tmp_path / "twin.toml"), "--to", "dcm", "-o", target]
+    assert main([*arguments, "--template", str(tmp_path / "t.toml")]) == 0
+    text = Path(target).read_text(encoding="utf-8")
+    assert "FESTWERT Clt_pKissB3_C" in text
+    assert 'EINHEIT_W "bar"' in text
+    assert 'EINHEIT_X "rpm"' in text
+    capsys.readouterr()
+    (tmp_path / "t.toml").write_text('[parameters.etta]\nlabel = "a"\n', encoding="utf-8")
+    assert main([*arguments, "--template", str(tmp_path / "t.toml")]) == 2
+    assert "did you mean 'eta'" in capsys.readouterr().err

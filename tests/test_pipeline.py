@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""Fixed values, priors and bounds of `drivetwin.identify` reach the fit and are recorded."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import drivetwin
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.errors import InputError
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.findings import Code
+
+INTEGRAL = drivetwin.Method.INTEGRAL
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any, Any]:
+    """Log, card and shifts of a synthetic shift."""
+    path = tmp_path_factory.mktemp("pipeline") / "bench.csv"
+    write_run(path, run(load_scenario("paper_steps"), seed=1))
+    card = drivetwin.load_card(path.with_suffix(".card.toml"))
+    log = drivetwin.read_log(path, card)
+    return log, card, drivetwin.detect_shifts(log, card)
+
+
+def test_stated_values_are_used_and_recorded(data: tuple[Any, Any, Any], tmp_path: Path) -> None:
+    stated: dict[str, Any] = {
+        "fixed": {"eta": 0.93},
+        "priors": {"J_out": (0.9, 0.01)},
+        "bounds": {"k_o": (1.5e5, 1.6e5)},
+    }
+    result = drivetwin.identify(*data, INTEGRAL, **stated)
+    assert result.estimates["eta"].value == 0.93
+    assert result.estimates["eta"].verdict is Verdict.DESIGN
+    assert result.settings["stated"] == stated
+    assert any("eta = 0.93" in text and "fixed" in text for text in result.assumptions)
+    assert set(result.inputs) == {"bench.csv", "bench.card.toml"}
+    outside = [one for one in result.findings if one.code is Code.OUTSIDE_BOUNDS]
+    value = result.estimates["k_o"].value
+    assert value is not None
+    assert bool(outside) is not (1.5e5 <= value <= 1.6e5)
+    free = drivetwin.identify(*data, INTEGRAL)
+    loose, tight = (one.estimates["k_o"].std_total or 0.0 for one in (free, result))
+    assert tight < loose
+    assert "stated" not in free.settings
+    drivetwin.save_result(tmp_path / "result.json", result)
+    document = json.loads((tmp_path / "result.json").read_text("utf-8"))
+    assert document["settings"]["stated"]["fixed"] == {"eta": 0.93}
+    assert document["settings"]["stated"]["bounds"] == {"k_o": [1.5e5, 1.6e5]}
+
+
+def test_a_result_outside_its_bounds_is_reported(data: tuple[Any, Any, Any]) -> None:
+    result = drivetwin.identify(*data, INTEGRAL, bounds={"J_vehicle": (9000.0, 9100.0)})
+    (found,) = [one for one in result.findings if one.code is Code.OUTSIDE_BOUNDS]
+    assert found.subject == "J_vehicle"
+
+
+def test_wrong_names_are_listed(data: tuple[Any, Any, Any]) -> None:
+    with pytest.raises(InputError, match=r"2 of 2(.|\n)*J_2:(.|\n)*etaa:.*'eta'"):
+        drivetwin.identify(*data, fixed={"J_2": 0.1}, priors={"etaa": (0.97, 0.01)})
+
+
+def test_the_papers_method_takes_none(data: tuple[Any, Any, Any]) -> None:
+    with pytest.raises(InputError, match="paper's method takes no fixed values"):
+        drivetwin.identify(*data, drivetwin.Method.PAPER, fixed={"eta": 0.97})
