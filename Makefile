@@ -35,7 +35,7 @@ demo: native ## build, identify a synthetic shift with known truth, name the rep
 	$(bin)/drivetwin demo -o out/demo
 
 .PHONY: test
-test: lint-rust lint-python tidy deny test-rust test-python ## all checks and tests
+test: lint-rust lint-python tidy test-rust test-python ## all checks and tests
 
 .PHONY: lint-rust
 lint-rust: $(venv)/.dev ## rustfmt and clippy
@@ -57,7 +57,8 @@ tidy: $(venv)/.dev ## directions of imports, and the project's own rules (circle
 # What needs no network; `advisories` needs the RustSec database.
 deny_checks ?= bans licenses sources
 .PHONY: deny
-deny: $(venv)/.dev ## licences, sources and duplicates of the crates by deny.toml (deny_checks=advisories)
+deny: $(venv)/.base ## licences, sources and duplicates of the crates by deny.toml (deny_checks=advisories)
+	$(pip) install --quiet --group deny
 	PATH="$(CURDIR)/$(bin):$$PATH" cargo deny --locked check $(deny_checks)
 
 .PHONY: test-rust
@@ -96,7 +97,7 @@ golden: $(venv)/.dev native ## compare 72 identifications with stored results (f
 nightly: ## what takes hours: all suites, a fleet of 300, the wheel, short fuzzing of `identify`
 	$(MAKE) $(suites:%=test-%) fault_logs=1000
 	$(MAKE) fleet fleet_logs=300
-	$(MAKE) golden test-browser test-wheel docs
+	$(MAKE) golden test-browser test-wheel docs deny
 
 .PHONY: wheel
 wheel: $(venv)/.base ## the abi3 wheel, into dist/
