@@ -20,7 +20,7 @@ GROUND = "ground"
 
 
 class FieldKind(Enum):
-    """What a field contains."""
+    """Kind of the content of a field."""
 
     NODE = auto()
     INPUT = auto()
