@@ -136,6 +136,7 @@ QUESTIONS = (
     ("Gain N", b"0.027\n"),
     ("input gear", b"\n"),
     ("final drive", b"5.38\n"),
+    ("torque converter", b"\n"),
     ("inertia at the engine", b"5..40\n"),
     ("Mass of the vehicle", b"24000\n"),
     ("Radius of the wheels", b"0.5\n"),

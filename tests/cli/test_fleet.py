@@ -104,7 +104,7 @@ def test_estimates_are_told(fleet: Path, capsys: pytest.CaptureFixture[str]) -> 
     out = capsys.readouterr().out
     assert "mu.B3" in out
     assert "odomet" in out
-    assert "too few logs tell a value of their own" in out
+    assert "too few logs have an estimate of" in out
     assert main(["fleet", "estimate", store, "--parameter", "mu.X9", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"estimates": [], "untold": ["mu.X9"]}
 

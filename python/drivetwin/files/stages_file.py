@@ -35,7 +35,7 @@ class StagesRecord(Record):
     stages: dict[str, StageRecord]
 
 
-@dataclass
+@dataclass(eq=False)
 class StagesFile:
     """Store of finished stages in a file, which is written after each; `inputs` by name as texts.
 

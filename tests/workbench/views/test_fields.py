@@ -84,7 +84,9 @@ def _make_part(one: dict[str, str]) -> Any:
 
 def _make_outputs(output: str) -> Any:
     names = output.strip(".").split("...")
-    made = [dict(zip(("id", "property"), one.rsplit(".", 1), strict=True)) for one in names]
+    made = [
+        _make_part(dict(zip(("id", "property"), one.rsplit(".", 1), strict=True))) for one in names
+    ]
     return made if output.startswith("..") else made[0]
 
 

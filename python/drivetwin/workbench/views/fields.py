@@ -15,6 +15,7 @@ from functools import cache
 from typing import Annotated, Any, get_type_hints
 
 from dash import Dash, ctx
+from dash.exceptions import CallbackException
 from flask import Flask, Response, request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
@@ -74,8 +75,19 @@ def check_callback_requests(server: Flask, app: Dash) -> None:
             if not counts or not all(map(_is_property_name, called.changedPropIds)):
                 raise KeyError(called.output)
         except (ValidationError, KeyError):
-            return make_refusal(400, f"this request is not one of the page -> {_REMEDY}")
+            return _refuse()
         return None
+
+    @server.errorhandler(CallbackException)
+    def refuse_outputs(error: CallbackException) -> Response:
+        # The classes below it are faults of the callback itself.
+        if type(error) is not CallbackException:
+            raise error
+        return _refuse()
+
+
+def _refuse() -> Response:
+    return make_refusal(400, f"this request is not one of the page -> {_REMEDY}")
 
 
 def escape_callback_responses(server: Flask) -> None:
