@@ -49,7 +49,7 @@ class Bench:
         return page
 
 
-def _with_wrong_unit(log: Path) -> str:
+def _write_wrong_unit(log: Path) -> str:
     """Write `mbar` over the unit of the last pressure of a log; returns the column's name."""
     names, units, *rest = log.read_text().split("\n")
     columns, spelled = names.split(","), units.split(",")
@@ -68,7 +68,7 @@ def serve(folder: Path) -> Iterator[Bench]:
         card.write_bytes((ROOT / "examples" / "vehicles" / "truck_a.toml").read_bytes())
     else:
         log, card, _ = write_run(folder / "bench.csv", run(load_scenario("paper_steps"), seed=1))
-    wrong = _with_wrong_unit(log)
+    wrong = _write_wrong_unit(log)
     with serve_folder(folder) as address:
         yield Bench(address, folder, log.name, card.name, wrong)
 
@@ -79,9 +79,9 @@ def serve_folder(folder: Path) -> Iterator[str]:
     command = [sys.executable, "-m", "drivetwin", "app", "--port", "0", "--no-browser"]
     server = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
-    told = server.stdout.readline()
-    found = re.search(r"http://\S+/\?token=\S+", told)
-    assert found, told
+    printed = server.stdout.readline()
+    found = re.search(r"http://\S+/\?token=\S+", printed)
+    assert found, printed
     try:
         yield found.group()
     finally:

@@ -201,14 +201,14 @@ def test_a_typed_time_of_any_detail_counts(shown: Page, bench: Bench) -> None:
     expect(about).to_contain_text("Boundary 3 inertia phase starts is set by hand")
 
 
-@pytest.mark.parametrize(("answer", "told"), [(None, "does not answer"), (500, "internal error")])
-def test_a_server_that_fails_is_told(refusing: Page, answer: int | None, told: str) -> None:
+@pytest.mark.parametrize(("answer", "text"), [(None, "does not answer"), (500, "internal error")])
+def test_a_failing_server_is_reported(refusing: Page, answer: int | None, text: str) -> None:
     def fail(route: Route) -> None:
         route.abort() if answer is None else route.fulfill(status=answer)
 
     refusing.route("**/_dash-update-component*", fail)
     show_view(refusing, "shifts")
-    expect_message(refusing, told)
+    expect_message(refusing, text)
 
 
 @pytest.mark.parametrize(

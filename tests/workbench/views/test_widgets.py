@@ -52,23 +52,23 @@ def test_what_works_is_handed_on() -> None:
 def test_a_log_without_a_shift_is_no_success(
     shifts: int, says: str, bad: bool, identified: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told: list[tuple[str, bool]] = []
-    monkeypatch.setattr(widgets, "notify", lambda text, fault=False: told.append((text, fault)))
+    messages: list[tuple[str, bool]] = []
+    monkeypatch.setattr(widgets, "notify", lambda text, fault=False: messages.append((text, fault)))
     work = replace(identified.work, shifts=identified.work.shifts[:shifts])
     widgets.notify_opened_log("a.csv is open", work)
-    assert told == [(says, bad)]
+    assert messages == [(says, bad)]
 
 
 def test_a_fault_of_the_mapping_speaks_of_the_page(
     identified: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told: list[str] = []
-    monkeypatch.setattr(widgets, "notify", lambda text, **_: told.append(text))
+    messages: list[str] = []
+    monkeypatch.setattr(widgets, "notify", lambda text, **_: messages.append(text))
     fault = (
         "no channel -> name it in a channel mapping file (--channels) or in [channels] of the card"
     )
     opened = replace(identified.work.require_opened(), fault=fault)
     widgets.notify_opened_log("a.csv is open", replace(identified.work, opened=opened))
-    assert told == [
+    assert messages == [
         "The log cannot be read as mapped. no channel -> correct it in the step Channels"
     ]
