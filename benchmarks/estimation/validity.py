@@ -17,7 +17,6 @@ from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.effects.drum_inertia import REFERENCE_TORQUE
-from drivetwin.estimation.likelihood.effects.input_shaft_mode import FREQUENCIES_HZ
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.pipeline import identify
@@ -26,6 +25,8 @@ from drivetwin.vehicle.effects import EffectId
 
 FAR = 4.0
 """Error in standard deviations from which a value is called far off."""
+MODE_HZ = (28.0, 110.0)
+"""Range of the frequency of an input-shaft mode [Hz]."""
 EVIDENCE = 5.0
 """Log evidence from which a cause counts as named."""
 
@@ -50,8 +51,7 @@ def draw_size(seed: int, effect: EffectId, factor: float) -> float:
     """Draw the size of an effect from its prior, times `factor`; of a mode its frequency [Hz]."""
     rng = np.random.default_rng([seed, 36])
     if effect is EffectId.INPUT_SHAFT_MODE:
-        low, high = np.log(FREQUENCIES_HZ[0]), np.log(FREQUENCIES_HZ[-1])
-        return float(np.exp(rng.uniform(low, high)))
+        return float(np.exp(rng.uniform(*np.log(MODE_HZ))))
     size = factor * EFFECTS[effect].std
     return size if EFFECTS[effect].random else size * float(abs(rng.standard_normal()))
 

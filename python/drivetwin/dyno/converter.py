@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from drivetwin.dyno.shift_path import build_path, get_side_nodes
+from drivetwin.simulation.shift_path import build_path, get_side_nodes
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import (
     DualClutch,

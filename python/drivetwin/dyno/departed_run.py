@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin.dyno.acting_inputs import build_acting_inputs
-from drivetwin.dyno.departed_driveline import DepartedDriveline
+from drivetwin.simulation.departed_driveline import DepartedDriveline
 from drivetwin.dyno.departure import compute_departure
 from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects
 from drivetwin.dyno.nominal import NominalRun, compute_friction_work

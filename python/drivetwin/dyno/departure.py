@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Physical values of the parts by which a vehicle departs from the dual-clutch model."""
+"""Departure of a scenario's vehicle from the dual-clutch model, from the sizes of its effects."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.nominal import NominalRun
 from drivetwin.dyno.random_walk import WalkStream, draw_walk
+from drivetwin.simulation.departure import Departure, InputShaft, ShaftTable, TyreSlip
 from drivetwin.simulation.dual_clutch import (
-    FloatArray,
     FrictionTable,
     RoadLoad,
     ShiftElement,
@@ -30,52 +30,6 @@ _WAVES = 2.0
 """Periods of the wave of μ over the slips of an element."""
 _SLIP_RANGE, _SLIP_STEPS = 1.25, 250
 """Range of a table of μ over the largest slip of the nominal run, and number of its pieces."""
-
-
-@dataclass(frozen=True)
-class InputShaft:
-    """Shaft in the middle of J1: stiffness [N m/rad] and damping [N m s/rad]."""
-
-    stiffness: float
-    damping: float
-
-
-@dataclass(frozen=True)
-class TyreSlip:
-    """Torque at the wheel over slip [N m], and the inertia before the tyre [kg m^2]."""
-
-    slip_stiffness: float
-    rim_inertia: float
-
-
-@dataclass(frozen=True, eq=False)
-class ShaftTable:
-    """Twists (n,) [rad] and torques (n,) [N m] of a progressive shaft."""
-
-    twist: FloatArray
-    torque: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Departure:
-    """Values of the added parts; None or 0 where a part is absent.
-
-    `input_drag` and `brake_drag` [N m] oppose the motion of gearbox input and wheel, `efficiency`
-    is the step of η from gear to gear, `gap` [rad] the play of the output shaft, `walk` [N m] the
-    part of the load that varies slowly, against the motion. `elements` have their own drums and
-    laws of friction.
-    """
-
-    elements: tuple[ShiftElement, ...]
-    load: RoadLoad
-    walk: Signal | None
-    efficiency: float
-    input_drag: float
-    brake_drag: float
-    input_shaft: InputShaft | None
-    tyre: TyreSlip | None
-    gap: float
-    shaft_table: ShaftTable | None
 
 
 def compute_departure(nominal: NominalRun, effects: Effects, seed: int) -> Departure:

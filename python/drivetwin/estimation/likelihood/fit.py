@@ -13,6 +13,20 @@ from drivetwin.estimation.likelihood.budget import limit_evaluations
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
+from drivetwin.vehicle.effects import EffectId
+
+
+@dataclass(frozen=True, eq=False)
+class PlantEvidence:
+    """Evidence of the part that the plant of a fit has beside the dual clutch.
+
+    `nats` is the log evidence against the dual clutch alone, `moves` (p,) are those of the unknowns
+    from its minimum.
+    """
+
+    effect: EffectId
+    nats: float
+    moves: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +35,8 @@ class LikelihoodFit:
 
     `mean` is the minimum, or the average over minima of similar likelihood (sampling_mode.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
-    the expansion of Q there. The covariance is that of `compute_covariance`.
+    the expansion of Q there. The covariance is that of `compute_covariance`. `plant` is the evidence
+    of the part that the plant has beside the dual clutch, its unknown the last one.
     """
 
     problem: LikelihoodObjective
@@ -31,6 +46,7 @@ class LikelihoodFit:
     normal: NormalEquations
     chi2: float
     iterations: int
+    plant: PlantEvidence | None = None
 
     @cached_property
     def deviance(self) -> float:

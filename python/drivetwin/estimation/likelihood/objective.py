@@ -22,9 +22,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, SimulationError
 from drivetwin.estimation.likelihood.budget import EXPANSION, RUN, WEIGHTING, charge
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
+from drivetwin.estimation.likelihood.extension import Extension
 from drivetwin.estimation.likelihood.noise.linear_response import (
     LinearResponse,
     build_output_row,
@@ -45,6 +46,7 @@ from drivetwin.simulation.dual_clutch import (
     simulate,
     simulate_sensitivities,
 )
+from drivetwin.vehicle.spec import PriorValue
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ class ObjectiveSettings:
     """Residual from which a run counts as failed [standard deviations]."""
     square_rtol: float = 1e-6
     """Tolerance for a negative sum of squares, over the squares in it [ratio]."""
+    difference: float = 0.03
+    """Root mean square of the change of the residual, in standard deviations, at which derivatives
+    of an extended plant are taken [-]."""
+    log_difference: float = 1e-3
+    """Change of the logarithm of the size of an extension for its derivative [-]."""
 
 
 OBJECTIVE = ObjectiveSettings()
@@ -86,16 +93,27 @@ class ShiftTerm:
     def simulate(self, point: ParameterVector) -> Trajectory | None:
         """Simulate the part at `point`; None if the simulation fails or does not reach the end."""
         try:
-            found = simulate(
-                self.structure.build_model(point),
-                self.get_acting_torque(point),
-                self.get_pressures(),
-                self.structure.build_start(point),
-                self.record.time,
-            )
-        except InputError:
+            found = self.simulate_on(point, self.record.time)
+        except (InputError, SimulationError):
             return None
         return found if self._is_complete(found) else None
+
+    def simulate_on(self, point: ParameterVector, time: FloatArray) -> Trajectory:
+        """Simulate the part on `time` (n,) [s]; a failed run returns its status.
+
+        Raises InputError or SimulationError for an impossible description.
+        """
+        model, start = self.structure.build_model(point), self.structure.build_start(point)
+        torque, pressures = self.get_acting_torque(point), self.get_pressures()
+        extension = self.structure.extension
+        if extension is None:
+            return simulate(model, torque, pressures, start, time)
+        size = point[extension.unknown]
+        return extension.simulate(model, size, (torque, pressures), start, time)
+
+    def drop_extension(self) -> ShiftTerm:
+        """Return the part with the dual clutch alone as its plant."""
+        return replace(self, structure=replace(self.structure, extension=None))
 
     def _is_complete(self, run: Trajectory) -> bool:
         """Return whether a run reached its end with residuals that can be squared."""
@@ -109,6 +127,8 @@ class ShiftTerm:
     def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
         `point`."""
+        if self.structure.extension is not None:
+            return self._difference(point)
         names, matrix = self.structure.compute_jacobian(point)
         model = self.structure.build_model(point)
         try:
@@ -135,6 +155,40 @@ class ShiftTerm:
         if not np.all(np.isfinite(slopes)):
             return None
         return self.compute_residual(found.run), slopes
+
+    def _difference(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
+        """Linearise an extended plant by differences, with steps from the slopes of the dual clutch.
+
+        Unknowns of the engine torque keep those slopes: they are formed without its noise.
+        """
+        run, plain = self.simulate(point), self.drop_extension().linearise(point)
+        if run is None or plain is None:
+            return None
+        residual, slopes = self.compute_residual(run), plain[1]
+        answer = np.sqrt(np.mean((slopes / self.record.sigma[:, None]) ** 2, axis=0))
+        steps = OBJECTIVE.difference / np.where(answer > 0.0, answer, np.inf)
+        steps[[name in self._compute_torque_changes(point) for name in point.names]] = 0.0
+        assert self.structure.extension is not None, "only extended plants are differenced"
+        steps[point.names.index(self.structure.extension.unknown)] = OBJECTIVE.log_difference
+        for k in np.flatnonzero(steps):
+            change = self._compute_change(point, int(k), steps[k], residual)
+            if change is None:
+                return None
+            slopes[:, k] = change
+        return residual, slopes
+
+    def _compute_change(
+        self, point: ParameterVector, index: int, step: float, residual: FloatArray
+    ) -> FloatArray | None:
+        """Compute the change (n,) of the simulated samples per unit of one unknown; backwards where
+        the run forwards fails, None where both fail."""
+        for one in (step, -step):
+            values = point.values.copy()
+            values[index] += one
+            run = self.simulate(point.replace_values(values))
+            if run is not None:
+                return (residual - self.compute_residual(run)) / one
+        return None
 
     def _compute_torque_changes(self, point: ParameterVector) -> dict[str, FloatArray]:
         """Compute the change (N-1,) of the acting engine torque per unit of its own unknowns.
@@ -275,6 +329,20 @@ class LikelihoodObjective:
         """Names of the signals that are of another kind than read, as in `Record.kinds`."""
         return frozenset[str]().union(*(part.record.kinds for part in self.parts))
 
+    def extend(self, extension: Extension, prior: PriorValue) -> LikelihoodObjective:
+        """Add a part to the plant of all shifts; `prior` is that of the logarithm of its size.
+
+        Its unknown is the last one.
+        """
+        structures = [replace(part.structure, extension=extension) for part in self.parts]
+        parts = [
+            replace(part, structure=one) for part, one in zip(self.parts, structures, strict=True)
+        ]
+        lower, upper = np.append(self.lower, -np.inf), np.append(self.upper, np.inf)
+        return LikelihoodObjective(
+            tuple(parts), self.prior.append(prior.value, prior.std), lower, upper
+        )
+
     def select_modes(self, names: Collection[str]) -> LikelihoodObjective:
         """Set the sampling modes of all signals to those of `names`; all must be as read."""
         parts = [
@@ -322,8 +390,9 @@ class LikelihoodObjective:
 
     def normal(self, point: ParameterVector) -> NormalEquations | None:
         """Compute the expansion of Q at `point`; None if a simulation fails."""
-        charge(EXPANSION)
         size = len(point.names)
+        extended = any(part.structure.extension is not None for part in self.parts)
+        charge(EXPANSION + size * RUN if extended else EXPANSION)
         cost, gradient = (
             self.prior.compute_prior_cost(point.values),
             self.prior.compute_gradient(point.values),

@@ -19,6 +19,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftElementKinematics
+from drivetwin.estimation.likelihood.extension import Extension
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
@@ -76,7 +77,7 @@ class ShiftModel:
     T_v/i_f holds where the load grows with the speed. A `tie` takes the place of the unknown J_e.
     `log` is the number of the log among several, 0 where it is the only one. `departure` is how
     the load of this shift departs from that of its log: a factor by unknown; empty where it does
-    not.
+    not. An `extension` is a part that the plant has beside the dual clutch.
     """
 
     driveline: KnownDriveline
@@ -87,6 +88,7 @@ class ShiftModel:
     tie: Tie | None = None
     log: int = 0
     departure: Mapping[str, float] = field(default_factory=dict)
+    extension: Extension | None = None
 
     @property
     def elements(self) -> tuple[ShiftElementKinematics, ShiftElementKinematics]:

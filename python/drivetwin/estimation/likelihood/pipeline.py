@@ -10,6 +10,7 @@ import numpy as np
 
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.plant_refit import select_plant
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
@@ -108,6 +109,7 @@ def estimate_likelihood(
     guess = _compute_guess(signals, drivelines, shifts, design)
     best, notes = select_model(signals, drivelines, design.loss_law, guess)
     priors = EffectPriors(design.effects, design.sensors)
+    best = select_plant(best, priors)
     told = build_estimates(best, signals, drivelines, found.friction, priors)
     findings = (*told.findings, *notes, *_find_disagreements(told, found))
     return replace(told, findings=findings), best

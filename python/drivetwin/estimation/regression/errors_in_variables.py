@@ -62,6 +62,12 @@ class Prior:
             mean[index], precision[index, index] = value, std**-2
         return cls(mean, precision)
 
+    def append(self, value: float, std: float) -> Prior:
+        """Copy the prior with one more parameter, independent of the others."""
+        precision = np.pad(self.precision, (0, 1))
+        precision[-1, -1] = std**-2
+        return Prior(np.append(self.mean, value), precision)
+
     def fix_parameter(self, index: int, value: float) -> Prior:
         """Copy the prior with one parameter fixed at `value`."""
         mean, precision = self.mean.copy(), self.precision.copy()

@@ -18,7 +18,6 @@ from drivetwin.estimation.result.cause import Cause, Group
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
-from drivetwin.vehicle.effects import EffectId
 
 
 @dataclass(frozen=True)
@@ -50,30 +49,30 @@ def find_cause(correction: Correction) -> Cause | None:
     similar = {
         other
         for other, one in ranked[1:]
-        if _compute_cosine(best, one) > CAUSES.equivalent or _is_same_kind(group, other)
+        if _compute_cosine(best, one) > CAUSES.equivalent
     }
     named = [one for one in similar if correction.evidence[one].nats > 0.0]
     rest = [one.nats for other, one in ranked[1:] if other not in similar]
     assert group.effect is not None, "tolerances of sensors are no candidates"
     effect = EFFECTS[group.effect]
-    size, std = _estimate_size(effect, correction.step.columns.stds[group], best)
+    size, std = _estimate_size(effect, correction.step.columns.stds.get(group, 1.0), best)
     return Cause(
         group,
         best.nats,
         size,
         std,
-        tuple(one for one, _ in ranked if one in named and not _is_same_kind(group, one)),
+        tuple(one for one, _ in ranked if one in named),
         max(rest, default=0.0),
     )
 
 
-def _is_same_kind(one: Group, other: Group) -> bool:
-    """Return whether two groups are one effect at neighbouring frequencies."""
-    return one.effect is other.effect is EffectId.INPUT_SHAFT_MODE
-
-
 def _compute_cosine(one: GroupEvidence, other: GroupEvidence) -> float:
-    """Compute the cosine between the fitted effects of two groups in the weighted samples."""
+    """Compute the cosine between the fitted effects of two groups in the weighted samples.
+
+    A part of the plant has no columns and is told from all others by its own fit.
+    """
+    if not (one.columns and other.columns):
+        return 0.0
     product = float(one.answer[list(other.columns)] @ other.amounts)
     scale = np.sqrt(one.power * other.power)
     return float(abs(product) / scale) if scale > 0.0 else 0.0

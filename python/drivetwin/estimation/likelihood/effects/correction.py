@@ -21,12 +21,12 @@ from drivetwin.estimation.likelihood.effects.joint_step import (
     WeightedColumns,
     compute_evidence,
     scale_by_evidence,
-    select_one_mode,
     take_joint_step,
     weight_columns,
 )
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
+    PlantEvidence,
     compute_covariance,
     invert_information,
 )
@@ -99,8 +99,9 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
         return None
     sums = weight_columns(fit.problem, fit.normal, columns)
     evidence = compute_evidence(sums, fit.normal.information, fit.chi2)
-    sums = select_one_mode(sums, evidence)
     sums = scale_by_evidence(sums, fit.normal.information, fit.chi2)
+    if fit.plant is not None:
+        evidence |= _describe_plant(fit, fit.plant, sums.pull.size)
     shown = {one for one, each in evidence.items() if each.nats > CORRECTION.evidence}
     base = _Expansion(fit.problem, fit.normal, fit.point, sums)
     step = base.take_step(shown)
@@ -118,6 +119,17 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
         change = base.point.values + step.moves - fit.point.values - total
         total, last = total + change, change
     return _conclude(fit, base, shown, last, evidence)
+
+
+def _describe_plant(
+    fit: LikelihoodFit, plant: PlantEvidence, columns: int
+) -> dict[Group, GroupEvidence]:
+    """Describe the part that the plant has as a group without columns; its amount is its size."""
+    size = float(np.exp(fit.point.values[-1]))
+    std = size * float(np.sqrt(fit.covariance[-1, -1]))
+    amounts, stds = np.array([size]), np.array([std])
+    answer = np.zeros(columns)
+    return {Group(plant.effect): GroupEvidence(plant.nats, amounts, stds, (), answer, plant.moves)}
 
 
 def keep_fit(fit: LikelihoodFit) -> Correction:

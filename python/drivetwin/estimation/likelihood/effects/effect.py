@@ -40,7 +40,8 @@ class Effect:
     `std` is the default standard deviation of its normal prior about zero in `unit`, `source` the
     reason for it. `meaning` completes "the log shows ..."; `remedy` is advice where it is found.
     A `random` effect is a sample of a random process: no single value of it can be stated.
-    The columns grow with the `power` of the size. A `curved` effect is not proportional to its
+    Without `build` no column describes it: it is tried in the plant alone, and `std` is its usual
+    size. The columns grow with the `power` of the size. A `curved` effect is not proportional to its
     size: a second step forms its column at the size found by the first.
     """
 
@@ -50,7 +51,7 @@ class Effect:
     std: float
     source: str
     remedy: str
-    build: Builder
+    build: Builder | None = None
     random: bool = False
     power: float = 1.0
     curved: bool = False

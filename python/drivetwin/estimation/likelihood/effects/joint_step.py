@@ -29,7 +29,6 @@ from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.objective import NormalEquations
 from drivetwin.estimation.result.cause import Group
-from drivetwin.vehicle.effects import EffectId
 
 
 @dataclass(frozen=True)
@@ -252,16 +251,6 @@ def _join_tolerances(
         gradient=np.concatenate([sums.gradient, -sums.pull[sensors]]),
     )
     return joined, np.block([[information, cross], [cross.T, own]])
-
-
-def select_one_mode(
-    sums: WeightedColumns, evidence: Mapping[Group, GroupEvidence]
-) -> WeightedColumns:
-    """Keep the input-shaft mode of greatest evidence alone: only one of them exists."""
-    modes = [one for one in evidence if one.effect is EffectId.INPUT_SHAFT_MODE]
-    best = max(modes, key=lambda one: evidence[one].nats, default=None)
-    others = {one for one in modes if one != best}
-    return sums.select([k for k, one in enumerate(sums.columns.groups) if one not in others])
 
 
 def take_joint_step(

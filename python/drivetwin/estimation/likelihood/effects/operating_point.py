@@ -14,7 +14,7 @@ from drivetwin.estimation.likelihood.noise.linear_response import LinearResponse
 from drivetwin.estimation.likelihood.objective import ShiftTerm
 from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.simulation.dual_clutch import DualClutch, Trajectory, simulate
+from drivetwin.simulation.dual_clutch import DualClutch, Trajectory
 
 MIN_SPACING_S = 1e-6
 """Distance [s] from a grid point within which an event gets no point of its own."""
@@ -123,13 +123,7 @@ def evaluate_operating_point(part: ShiftTerm, point: ParameterVector) -> Operati
     if events.size:
         beside = np.min(np.abs(grid[:, None] - events), axis=0) > MIN_SPACING_S
         time = np.unique(np.concatenate([grid, events[beside]]))
-        run = simulate(
-            model,
-            part.get_acting_torque(point),
-            part.get_pressures(),
-            part.structure.build_start(point),
-            time,
-        )
+        run = part.simulate_on(point, time)
     response = linearise_run(model, run, part.record)
     if run.status != "completed" or not response.finite:
         return None

@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from drivetwin.dyno.departed_start import compute_quasi_steady_state
-from drivetwin.dyno.departure import Departure
-from drivetwin.dyno.shift_path import build_path, get_side_nodes
+from drivetwin.simulation.departed_start import QuasiSteadyState, compute_quasi_steady_state
+from drivetwin.simulation.departure import Departure
+from drivetwin.simulation.shift_path import build_path, get_side_nodes
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
@@ -42,21 +42,25 @@ class DepartedDriveline:
         pressures: Mapping[str, Signal],
         start: State,
         time: FloatArray,
+        state: QuasiSteadyState | None = None,
     ) -> Trajectory:
-        """Run the network on `time` (n,) [s] from quasi-steady acceleration.
+        """Run the network on `time` (n,) [s].
 
-        `engine_torque` and `pressures` are the acting ones. Of `start` the engine speed and the
-        locked element hold. A failed run returns its status.
+        `engine_torque` and `pressures` are the acting ones. Of `start` the speeds and the locked
+        element hold; `state` has the rest, by default that of quasi-steady acceleration. A failed
+        run returns its status.
         Raises InputError where the description is inconsistent.
         """
         walk = self.departure.walk
         walks = {} if walk is None else {_WALK: Signal(walk.time, -walk.values)}
-        torque = float(np.interp(time[0], engine_torque.arrival, engine_torque.values))
+        if state is None:
+            torque = float(np.interp(time[0], engine_torque.arrival, engine_torque.values))
+            state = compute_quasi_steady_state(self.model, self.departure, start, torque)
         names = [each.name for each in self.model.elements]
         run = simulate(
             self._build_elements(),
             {**pressures, **walks, _TORQUE: engine_torque},
-            self._build_start(start, torque),
+            self._build_start(start, state),
             time,
             _list_outputs(names),
         )
@@ -144,8 +148,7 @@ class DepartedDriveline:
             parts.append(build_element("torque", _WALK, node=body, input=_WALK))
         return parts
 
-    def _build_start(self, start: State, engine_torque: float) -> Start:
-        state = compute_quasi_steady_state(self.model, self.departure, start, engine_torque)
+    def _build_start(self, start: State, state: QuasiSteadyState) -> Start:
         engine, output = start.engine_speed, start.output_speed
         inlet = engine / self.model.i_in
         speeds = {_ENGINE: engine, _INPUT: inlet, _OUTPUT: output}

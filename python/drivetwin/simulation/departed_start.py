@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.dyno.departure import Departure
+from drivetwin.simulation.departure import Departure
 from drivetwin.simulation.dual_clutch import DualClutch, State
 
 
