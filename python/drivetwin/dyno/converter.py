@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from drivetwin.simulation.shift_path import build_path, get_side_nodes
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
@@ -19,6 +18,7 @@ from drivetwin.simulation.dual_clutch import (
     Trajectory,
 )
 from drivetwin.simulation.network import Element, Output, Start, build_element, simulate
+from drivetwin.simulation.shift_path import build_path, get_side_nodes
 
 _CRANK, _TURBINE, _INPUT, _OUTPUT = "crankshaft", "turbine", "input", "output"
 _AXLE, _WHEEL, _SHAFT = "axle", "wheel", "output shaft"

@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin.dyno.acting_inputs import build_acting_inputs
-from drivetwin.simulation.departed_driveline import DepartedDriveline
 from drivetwin.dyno.departure import compute_departure
 from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects
 from drivetwin.dyno.nominal import NominalRun, compute_friction_work
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import InputError, SimulationError, Where
+from drivetwin.simulation.departed_driveline import DepartedDriveline
 from drivetwin.simulation.dual_clutch import FloatArray, Trajectory
 from drivetwin.vehicle.effects import EffectId
 

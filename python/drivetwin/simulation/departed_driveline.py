@@ -10,7 +10,6 @@ import numpy as np
 
 from drivetwin.simulation.departed_start import QuasiSteadyState, compute_quasi_steady_state
 from drivetwin.simulation.departure import Departure
-from drivetwin.simulation.shift_path import build_path, get_side_nodes
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
@@ -19,6 +18,7 @@ from drivetwin.simulation.dual_clutch import (
     Trajectory,
 )
 from drivetwin.simulation.network import Element, Output, Start, build_element, simulate
+from drivetwin.simulation.shift_path import build_path, get_side_nodes
 
 _CRANK, _ENGINE, _INPUT, _OUTPUT = "crankshaft", "engine", "input", "output"
 _AXLE, _WHEEL, _VEHICLE = "axle", "wheel", "vehicle"

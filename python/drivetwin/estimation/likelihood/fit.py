@@ -35,8 +35,8 @@ class LikelihoodFit:
 
     `mean` is the minimum, or the average over minima of similar likelihood (sampling_mode.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
-    the expansion of Q there. The covariance is that of `compute_covariance`. `plant` is the evidence
-    of the part that the plant has beside the dual clutch, its unknown the last one.
+    the expansion of Q there. The covariance is that of `compute_covariance`. `plant` describes the
+    part that the plant has beside the dual clutch; its unknown is the last one.
     """
 
     problem: LikelihoodObjective

@@ -157,9 +157,10 @@ class ShiftTerm:
         return self.compute_residual(found.run), slopes
 
     def _difference(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
-        """Linearise an extended plant by differences, with steps from the slopes of the dual clutch.
+        """Linearise an extended plant by differences.
 
-        Unknowns of the engine torque keep those slopes: they are formed without its noise.
+        The steps are from the slopes of the dual clutch. Unknowns of the engine torque keep those
+        slopes: they are formed without its noise.
         """
         run, plain = self.simulate(point), self.drop_extension().linearise(point)
         if run is None or plain is None:
@@ -342,6 +343,12 @@ class LikelihoodObjective:
         return LikelihoodObjective(
             tuple(parts), self.prior.append(prior.value, prior.std), lower, upper
         )
+
+    def drop_extension(self) -> LikelihoodObjective:
+        """Return the problem of the dual clutch alone, without the last unknown."""
+        prior = Prior(self.prior.mean[:-1], self.prior.precision[:-1, :-1])
+        parts = tuple(part.drop_extension() for part in self.parts)
+        return LikelihoodObjective(parts, prior, self.lower[:-1], self.upper[:-1])
 
     def select_modes(self, names: Collection[str]) -> LikelihoodObjective:
         """Set the sampling modes of all signals to those of `names`; all must be as read."""

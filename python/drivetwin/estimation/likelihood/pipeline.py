@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.plant_refit import select_plant
+from drivetwin.estimation.likelihood.effects.plant_refit import build_size_prior, select_plant
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
@@ -18,11 +19,16 @@ from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque impor
     estimate_without_torque,
 )
 from drivetwin.estimation.likelihood.parametrization import LOAD_DEVIATION, build_load_deviations
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.selection.backlash_search import fit_with_backlash
+from drivetwin.estimation.likelihood.selection.sampling_mode import report_modes
 from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.effects import EffectId
 
 
 @dataclass(frozen=True)
@@ -55,8 +61,8 @@ def estimate_without_linear(
     reach a plausible minimum.
     """
     guess = _compute_own_guess(signals, drivelines, design)
-    best, notes = select_model(signals, drivelines, design.loss_law, guess)
     priors = EffectPriors(design.effects, design.sensors)
+    best, notes = _fit(signals, drivelines, design.loss_law, guess, priors)
     told = build_estimates(best, signals, drivelines, {}, priors)
     return replace(told, findings=(*told.findings, *notes)), best
 
@@ -107,12 +113,48 @@ def estimate_likelihood(
     """
     found, shifts = linear
     guess = _compute_guess(signals, drivelines, shifts, design)
-    best, notes = select_model(signals, drivelines, design.loss_law, guess)
     priors = EffectPriors(design.effects, design.sensors)
-    best = select_plant(best, priors)
+    best, notes = _fit(signals, drivelines, design.loss_law, guess, priors)
     told = build_estimates(best, signals, drivelines, found.friction, priors)
     findings = (*told.findings, *notes, *_find_disagreements(told, found))
     return replace(told, findings=findings), best
+
+
+def _fit(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[KnownDriveline],
+    loss_law: LossLaw,
+    guess: Mapping[str, float],
+    priors: EffectPriors,
+) -> tuple[LikelihoodFit, tuple[Finding, ...]]:
+    """Fit the dual clutch, or a plant with a part beside it that the log supports.
+
+    Raises IdentificationError where no plant reaches a plausible minimum.
+    """
+    try:
+        best, notes = select_model(signals, drivelines, loss_law, guess)
+    except IdentificationError:
+        found = _fit_with_backlash(signals, drivelines, loss_law, guess, priors)
+        if found is None:
+            raise
+        return found, tuple(report_modes(found.problem.kinds))
+    return select_plant(best, priors), notes
+
+
+def _fit_with_backlash(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[KnownDriveline],
+    loss_law: LossLaw,
+    guess: Mapping[str, float],
+    priors: EffectPriors,
+) -> LikelihoodFit | None:
+    """Fit a plant with backlash and a constant load; None where it is off or does not hold."""
+    if priors.get_prior(EffectId.BACKLASH, drivelines[0]).std == 0.0:
+        return None
+    constant = {name: value for name, value in guess.items() if name != AERO}
+    problem, start = build_problem(signals, drivelines, loss_law, constant, hilly=len(signals) > 1)
+    prior = build_size_prior(EffectId.BACKLASH, priors, drivelines[0])
+    return fit_with_backlash(problem, start, [s.shift for s in signals], prior)
 
 
 def _find_disagreements(told: EstimateSet, linear: EstimateSet) -> list[Finding]:

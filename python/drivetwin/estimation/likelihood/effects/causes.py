@@ -14,7 +14,7 @@ from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.effect import Effect
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS, describe_group
-from drivetwin.estimation.result.cause import Cause, Group
+from drivetwin.estimation.result.cause import Cause
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
@@ -46,11 +46,7 @@ def find_cause(correction: Correction) -> Cause | None:
     if not ranked or ranked[0][1].nats < CAUSES.least_evidence:
         return None
     group, best = ranked[0]
-    similar = {
-        other
-        for other, one in ranked[1:]
-        if _compute_cosine(best, one) > CAUSES.equivalent
-    }
+    similar = {other for other, one in ranked[1:] if _compute_cosine(best, one) > CAUSES.equivalent}
     named = [one for one in similar if correction.evidence[one].nats > 0.0]
     rest = [one.nats for other, one in ranked[1:] if other not in similar]
     assert group.effect is not None, "tolerances of sensors are no candidates"

@@ -283,7 +283,7 @@ def _build_random(
     for name, effect in EFFECTS.items():
         prior = priors.get_prior(name, at.part.structure.driveline)
         in_plant = extension is not None and extension.effect is name
-        if prior.std > 0.0 and effect.build is not None and not in_plant:
+        if prior.std > 0.0 and not in_plant:
             for one in effect.build(at, sizes.get(name, 1.0) * prior.std):
                 yield Group(name, one.subject), one
     for one in build_sensor_columns(at, priors.sensors):
@@ -294,7 +294,7 @@ def _build_known(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Dis
     """Yield the disturbances of effects with a stated value, of that size."""
     for name, effect in EFFECTS.items():
         value = priors.get_prior(name, at.part.structure.driveline).value
-        if value and effect.build is not None:
+        if value:
             for one in effect.build(at, abs(value)):
                 yield one, float(np.sign(value))
 

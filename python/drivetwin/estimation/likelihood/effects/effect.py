@@ -40,8 +40,7 @@ class Effect:
     `std` is the default standard deviation of its normal prior about zero in `unit`, `source` the
     reason for it. `meaning` completes "the log shows ..."; `remedy` is advice where it is found.
     A `random` effect is a sample of a random process: no single value of it can be stated.
-    Without `build` no column describes it: it is tried in the plant alone, and `std` is its usual
-    size. The columns grow with the `power` of the size. A `curved` effect is not proportional to its
+    The columns grow with the `power` of the size. A `curved` effect is not proportional to its
     size: a second step forms its column at the size found by the first.
     """
 
@@ -51,7 +50,7 @@ class Effect:
     std: float
     source: str
     remedy: str
-    build: Builder | None = None
+    build: Builder
     random: bool = False
     power: float = 1.0
     curved: bool = False

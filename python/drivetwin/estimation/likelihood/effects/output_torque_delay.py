@@ -13,8 +13,8 @@ from drivetwin.vehicle.effects import EffectId
 
 def build(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Delay the simulated output torque; the speeds are the reference clock."""
-    rate = np.gradient(at.run.shaft_torque, at.run.time)
-    return [Disturbance(outputs={OUTPUT_TORQUE: -std * rate})]
+    time, torque = at.run.time, at.run.shaft_torque
+    return [Disturbance(outputs={OUTPUT_TORQUE: np.interp(time - std, time, torque) - torque})]
 
 
 EFFECT = Effect(
@@ -25,4 +25,5 @@ EFFECT = Effect(
     "typical range of anti-aliasing filters and telemetry of torque sensors, 1 to 5 ms",
     "set channels.output_torque.time_shift_s in the channel mapping and compare",
     build,
+    curved=True,
 )

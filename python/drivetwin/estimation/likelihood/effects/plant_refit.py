@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
@@ -106,9 +107,9 @@ def _iterate_refits(
         if priors.get_prior(effect, driveline).std > 0.0:
             prior = build_size_prior(effect, priors, driveline)
             start = prior.value + (0.0 if amount is None else float(np.log(amount)))
-            found = _refit(fit, effect, prior, start)
-            if found is not None:
-                yield found
+            refit = _refit(fit, effect, prior, start)
+            if refit is not None:
+                yield refit
 
 
 def build_size_prior(
@@ -145,7 +146,12 @@ def _refit(
     if found is None or not found.converged:
         return None
     nats = compare_plants(fit.normal, found.normal, fit.chi2, prior)
-    return _build_fit(fit, found, PlantEvidence(effect, nats, found.point.values - values))
+    return _build_fit(fit, found, PlantEvidence(effect, nats, _compute_moves(fit, found.point)))
+
+
+def _compute_moves(fit: LikelihoodFit, point: ParameterVector) -> FloatArray:
+    """Compute the moves (p,) of the unknowns by the part; none of its own size."""
+    return np.append(point.values[:-1] - fit.point.values, 0.0)
 
 
 def compare_plants(

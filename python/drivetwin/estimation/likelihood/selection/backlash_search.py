@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""Search with backlash in the plant, for a log on which the dual clutch reaches no minimum.
+
+Crossing the gap moves the whole oscillation of the shaft. Pedal steps before the shift show the gap
+alone, so the lower gear is fitted first, from several sizes and with the usual sampling modes; from
+the best of these the search goes on by stages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
+from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
+from drivetwin.estimation.likelihood.effects.plant_refit import compare_plants, extend_problem
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.optimize.staged_start import (
+    find_staged_start,
+    fit_lower_gear_only,
+)
+from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS, refit_best_mode
+from drivetwin.estimation.optimize.gauss_newton import minimise
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.spec import PriorValue
+
+
+@dataclass(frozen=True)
+class BacklashSettings:
+    """Settings of the search with backlash."""
+
+    reversal: float = 0.03
+    """Torque on either side of zero, over the largest, from which it counts as reversed: the
+    rounding of its sign [-]."""
+    sizes: tuple[float, ...] = (0.02, 0.06)
+    """Sizes of the starts: on either side of the usual one, half a gap times k_o over the largest
+    torque [-]."""
+    max_work: float = 5000.0
+    """Work of the whole search [passes]."""
+
+
+BACKLASH = BacklashSettings()
+MODES = (frozenset[str](), frozenset(SPEEDS), frozenset((*SPEEDS, OUTPUT_TORQUE)))
+"""Sampling modes that are tried: as read, speeds as means, all outputs as means."""
+
+
+def fit_with_backlash(
+    problem: LikelihoodObjective,
+    start: ParameterVector,
+    shifts: Sequence[Shift],
+    prior: PriorValue,
+) -> LikelihoodFit | None:
+    """Fit with backlash in the plant; None without a reversal of the torque or a minimum.
+
+    `problem` is that of the dual clutch with signals as read, `prior` that of the logarithm of the
+    size.
+    """
+    if not _is_reversed(problem):
+        return None
+    extended, point = extend_problem(problem, start, EffectId.BACKLASH, prior)
+    try:
+        with limit_evaluations(BACKLASH.max_work):
+            found = _search(extended, point, shifts)
+    except BudgetExceeded:
+        return None
+    return None if found is None else replace(found, plant=_compare(found, prior))
+
+
+def _is_reversed(problem: LikelihoodObjective) -> bool:
+    """Return whether the measured output torque goes to either side of zero."""
+    outputs = [out for part in problem.parts for out in part.record.outputs]
+    torques = [out.values for out in outputs if out.name == OUTPUT_TORQUE]
+    if not torques:
+        return False
+    low, high = min(map(np.min, torques)), max(map(np.max, torques))
+    least = BACKLASH.reversal * max(abs(low), abs(high))
+    return bool(low < -least and high > least)
+
+
+def _search(
+    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> LikelihoodFit | None:
+    """Search from the best fit of the lower gear; None where it does not reach a minimum."""
+    trials = []
+    for modes in MODES:
+        of_modes = problem.select_modes(modes)
+        for size in BACKLASH.sizes:
+            values = np.append(start.values[:-1], np.log(size))
+            gear = fit_lower_gear_only(of_modes, start.replace_values(values), shifts)
+            if gear is not None:
+                weighted = gear.problem.update_weighting(gear.point)
+                trials.append((weighted.cost(gear.point), of_modes, gear.point))
+    if not trials:
+        return None
+    _, of_modes, point = min(trials, key=lambda one: one[0])
+    near = find_staged_start(of_modes, point, shifts)
+    found = None if near is None else fit_local(of_modes, near.point)
+    return None if found is None else refit_best_mode(problem, found)
+
+
+def _compare(found: LikelihoodFit, prior: PriorValue) -> PlantEvidence:
+    """Compare a fit with the dual clutch, sought from the same unknowns with the same weighting."""
+    start = ParameterVector(found.point.names[:-1], found.point.values[:-1])
+    other = minimise(found.problem.drop_extension(), start)
+    if other is None:
+        return PlantEvidence(EffectId.BACKLASH, np.inf, np.zeros_like(found.point.values))
+    nats = compare_plants(other.normal, found.normal, found.chi2, prior)
+    moves = np.append(start.values - other.point.values, 0.0)
+    return PlantEvidence(EffectId.BACKLASH, nats, moves)
