@@ -77,7 +77,10 @@ def study_log(seed: int, effect: EffectId | None, factor: float = 1.0) -> StudyL
         found = identify(made.log, made.card, detect_shifts(made.log, made.card))
     except DrivetwinError as error:
         return StudyLog(seed, name, 0.0, {}, {}, (), 0.0, False, error.what)
-    return judge(seed, name, size, found, made.recorded.truth.parameters)
+    truth = dict(made.recorded.truth.parameters)
+    if effect is EffectId.TORQUE_LAG:  # the delay of a torque that acts late is the mean one
+        truth["te_delay"] -= size
+    return judge(seed, name, size, found, truth)
 
 
 def judge(

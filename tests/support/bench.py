@@ -9,6 +9,7 @@ import numpy as np
 
 from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.dyno.dyno import DynoRun, run
+from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import (
@@ -44,12 +45,18 @@ class Bench:
     run: DynoRun
 
 
-def record_bench(scenario: Scenario, seed: int, know: Knowledge, noise: float = 1.0) -> Bench:
-    """Record the scenario with the noise of `seed`.
+def record_bench(
+    scenario: Scenario,
+    seed: int,
+    know: Knowledge,
+    noise: float = 1.0,
+    effects: Effects | None = None,
+) -> Bench:
+    """Record the scenario with the noise of `seed`, and with `effects` that no card knows.
 
     Where the card knows a value only roughly, the card's value is drawn about the truth.
     """
-    made = run(scenario, seed, noise=noise)
+    made = run(scenario, seed, noise=noise, effects=effects)
     rng = np.random.default_rng([seed, 1])
     model = scenario.model
     J_out = model.J_out * (1.0 + know.J_out * rng.standard_normal())

@@ -15,7 +15,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.simulation.departed_driveline import DepartedDriveline
 from drivetwin.simulation.departed_start import compute_quasi_steady_state
-from drivetwin.simulation.departure import Departure, InputShaft, TyreSlip
+from drivetwin.simulation.departure import Departure, InputShaft
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
 from drivetwin.vehicle.effects import EffectId
 
@@ -23,16 +23,14 @@ MODE_DAMPING = 0.06
 """Damping ratio of the input shaft's mode, usual for a torsional damper."""
 ENGINE_SHARE = 0.5
 """Share of J1 in front of the input shaft."""
-RIM_SHARE = 0.02
-"""Share of the vehicle's inertia that turns in front of the tyres."""
 
 
 @dataclass(frozen=True)
 class Extension:
     """Part that a plant has beside the dual clutch.
 
-    `full_scale` is the largest magnitude of the measured output torque [N m]: sizes of backlash and
-    tyre slip refer to it.
+    `full_scale` is the largest magnitude of the measured output torque [N m]: the size of backlash
+    refers to it.
     """
 
     effect: EffectId
@@ -74,12 +72,6 @@ def _build_input_shaft(model: DualClutch, frequency: float, _: float) -> Departu
     return replace(_build_none(model), input_shaft=InputShaft(inertia * omega**2, damping))
 
 
-def _build_tyre(model: DualClutch, slip: float, full_scale: float) -> Departure:
-    """Put a tyre before the vehicle that slips by `slip` at the largest shaft torque."""
-    tyre = TyreSlip(model.i_f * full_scale / slip, RIM_SHARE * model.J_v)
-    return replace(_build_none(model), tyre=tyre)
-
-
 def _build_gap(model: DualClutch, share: float, full_scale: float) -> Departure:
     """Give the output shaft a gap; half of it times the stiffness is `share` of the largest
     torque."""
@@ -92,6 +84,5 @@ def _build_none(model: DualClutch) -> Departure:
 
 _BUILDERS: Mapping[EffectId, Callable[[DualClutch, float, float], Departure]] = {
     EffectId.INPUT_SHAFT_MODE: _build_input_shaft,
-    EffectId.TYRE_SLIP: _build_tyre,
     EffectId.BACKLASH: _build_gap,
 }

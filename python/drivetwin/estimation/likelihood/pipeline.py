@@ -149,7 +149,8 @@ def _fit_with_backlash(
     priors: EffectPriors,
 ) -> LikelihoodFit | None:
     """Fit a plant with backlash and a constant load; None where it is off or does not hold."""
-    if priors.get_prior(EffectId.BACKLASH, drivelines[0]).std == 0.0:
+    stated = priors.get_prior(EffectId.BACKLASH, drivelines[0])
+    if not (stated.std or stated.value):
         return None
     constant = {name: value for name, value in guess.items() if name != AERO}
     problem, start = build_problem(signals, drivelines, loss_law, constant, hilly=len(signals) > 1)

@@ -53,6 +53,9 @@ class PlantSettings:
     """Prior standard deviation of the logarithm of a mode's frequency: 0.4 to 2.7 times the usual
     one hold 95 % [-]."""
 
+    least_spread: float = 1e-3
+    """Least prior standard deviation of the logarithm of a size that is stated exactly [-]."""
+
 
 PLANT = PlantSettings()
 BY_EVIDENCE = (EffectId.BACKLASH,)
@@ -62,7 +65,8 @@ BY_EVIDENCE = (EffectId.BACKLASH,)
 def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     """Choose the plant that the log supports; `fit` is that of the dual clutch.
 
-    A part is kept where its evidence is enough and no other effect has more. Otherwise the
+    A part is kept where the card states its size, or where its evidence is enough and no other
+    effect has more. Otherwise the
     covariance grows by the move that the part would cause, times its odds.
     """
     if not fit.problem.parts[0].scale_known or fit.plant is not None:
@@ -77,9 +81,10 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     if best is None or best.plant is None:
         return fit
     own = best.plant.effect
+    stated = priors.get_prior(own, fit.problem.parts[0].structure.driveline).value
     rivals = [one.nats for group, one in evidence.items() if group.effect not in (None, own)]
     most = max([0.0, *rivals])
-    if best.plant.nats > max(PLANT.evidence, most):
+    if stated or best.plant.nats > max(PLANT.evidence, most):
         return best
     return _widen(fit, [one for one in refits if one.plant is not None], most)
 
@@ -104,7 +109,8 @@ def _iterate_refits(
         if (found := evidence.get(Group(effect))) is not None and found.nats > PLANT.evidence
     }
     for effect, amount in tried.items():
-        if priors.get_prior(effect, driveline).std > 0.0:
+        stated = priors.get_prior(effect, driveline)
+        if stated.std > 0.0 or stated.value:
             prior = build_size_prior(effect, priors, driveline)
             start = prior.value + (0.0 if amount is None else float(np.log(amount)))
             refit = _refit(fit, effect, prior, start)
@@ -115,9 +121,14 @@ def _iterate_refits(
 def build_size_prior(
     effect: EffectId, priors: EffectPriors, driveline: KnownDriveline
 ) -> PriorValue:
-    """Build the prior of the logarithm of a size about the stated one."""
+    """Build the prior of the logarithm of a size: about its stated value, else about its usual
+    one."""
+    prior = priors.get_prior(effect, driveline)
+    if prior.value:
+        size = abs(prior.value)
+        return PriorValue(float(np.log(size)), max(prior.std / size, PLANT.least_spread))
     spread = PLANT.mode_spread if effect is EffectId.INPUT_SHAFT_MODE else SIZES.spread
-    return PriorValue(float(np.log(priors.get_prior(effect, driveline).std)), spread)
+    return PriorValue(float(np.log(prior.std)), spread)
 
 
 def extend_problem(

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+"""Choice of the plant by logs with a mode of the input side, and without."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.plant_refit import PLANT, select_plant
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
+from drivetwin.vehicle.effects import EffectId, EffectPrior
+from tests.estimation.likelihood.fixtures import ROUGH, fitted, problem
+from tests.support.bench import Bench, record_bench
+from tests.support.shared_results import shared
+
+MODE = EffectId.INPUT_SHAFT_MODE
+FREQUENCY = 40.0
+
+
+@shared
+def swinging() -> tuple[Bench, LikelihoodFit]:
+    """A vehicle whose engine swings on the input shaft, and its fit by the dual clutch."""
+    scenario = load_scenario(ScenarioName.THROTTLE_STEPS)
+    made = record_bench(scenario, 0, ROUGH, effects={MODE: FREQUENCY})
+    posed, start = problem(made)
+    return made, fit_multistart(posed, start, [made.signals.shift])
+
+
+def _count_deviations(fit: LikelihoodFit, name: str, truth: float) -> float:
+    std = np.sqrt(fit.covariance[fit.point.names.index(name), fit.point.names.index(name)])
+    return float(abs(fit.mean[name] - truth) / std)
+
+
+def test_a_mode_of_the_input_side_is_found_and_the_stiffness_is_true() -> None:
+    made, plain = swinging()
+    found = select_plant(plain, EffectPriors())
+    assert found.plant is not None
+    assert found.plant.effect is MODE
+    assert found.plant.nats > PLANT.evidence
+    assert abs(np.exp(found.point.values[-1]) / FREQUENCY - 1.0) < 0.05
+    truth = made.run.scenario.model.k_o
+    assert _count_deviations(plain, "k_o", truth) > 4.0
+    assert _count_deviations(found, "k_o", truth) < 3.0
+
+
+def test_a_log_without_a_mode_keeps_the_dual_clutch_and_widens() -> None:
+    plain = fitted()
+    found = select_plant(plain, EffectPriors())
+    assert found.plant is None
+    assert np.array_equal(found.point.values, plain.point.values)
+    std = np.sqrt(np.diag(plain.covariance))
+    added = (found.covariance - plain.covariance) / np.outer(std, std)
+    assert np.linalg.eigvalsh(added)[0] > -1e-9
+    assert np.max(added) > 0.0
+
+
+def test_a_mode_that_is_off_is_not_tried() -> None:
+    _, plain = swinging()
+    assert select_plant(plain, EffectPriors({MODE: EffectPrior(0.0)})) is plain
