@@ -14,6 +14,7 @@ from benchmarks.estimation.study import build_guess, read_fit
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.selection.select_model import select_model
 from tests.support.bench import Bench, Knowledge, record_bench
@@ -72,7 +73,7 @@ def draw_start(truth: Mapping[str, float], bench: Bench, seed: int, off: float) 
 
 def _fit(bench: Bench, guess: Mapping[str, float]) -> LikelihoodFit:
     law = bench.run.scenario.model.loss_law
-    return select_model([bench.signals], [bench.driveline], law, guess)[0]
+    return select_model([bench.signals], [bench.driveline], law, guess, EffectPriors())[0]
 
 
 def _is_same(one: LikelihoodFit, other: LikelihoodFit, bench: Bench) -> bool:

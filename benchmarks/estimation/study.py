@@ -15,6 +15,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
@@ -94,7 +95,7 @@ def fit_likelihood(bench: Bench, linear: IntegralShift) -> LikelihoodFit:
     """Fit by the likelihood method, started from the linear fit, as `identify` does."""
     law = bench.run.scenario.model.loss_law
     guess = estimate_initial_values([linear], [bench.driveline])
-    return select_model([bench.signals], [bench.driveline], law, guess)[0]
+    return select_model([bench.signals], [bench.driveline], law, guess, EffectPriors())[0]
 
 
 def build_truth(bench: Bench) -> dict[str, float]:

@@ -15,6 +15,7 @@ from drivetwin.estimation.likelihood.budget import (
     charge,
     limit_evaluations,
 )
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local, refine
 from drivetwin.estimation.likelihood.optimize.staged_start import find_staged_start
@@ -27,7 +28,7 @@ from tests.estimation.likelihood.fixtures import bench, fitted, problem, truth_o
 def _chosen(seed: int = 0) -> LikelihoodFit:
     made = bench(seed)
     law = made.run.scenario.model.loss_law
-    return select_model([made.signals], [made.driveline], law, truth_of(made))[0]
+    return select_model([made.signals], [made.driveline], law, truth_of(made), EffectPriors())[0]
 
 
 def test_work_is_counted_within_its_block_alone() -> None:

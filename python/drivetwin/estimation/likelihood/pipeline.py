@@ -132,7 +132,7 @@ def _fit(
     Raises IdentificationError where no plant reaches a plausible minimum.
     """
     try:
-        best, notes = select_model(signals, drivelines, loss_law, guess)
+        best, notes = select_model(signals, drivelines, loss_law, guess, priors)
     except IdentificationError:
         found = _fit_with_backlash(signals, drivelines, loss_law, guess, priors)
         if found is None:

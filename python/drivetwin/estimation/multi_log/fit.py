@@ -70,17 +70,18 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
     design = logs[0].design
     signals = [replace(s, log=k) for k, log in enumerate(fitted, 1) for s in log.signals]
     drivelines = [driveline for log in fitted for driveline in log.drivelines]
+    priors = EffectPriors(design.effects, merge_tolerances(logs))
     with scale_progress(ALONE, 0.95, "all logs together"):
         try:
             _require_agreement(alone)
-            fit, notes = select_model(signals, drivelines, design.loss_law, compute_start(alone))
+            guess = compute_start(alone)
+            fit, notes = select_model(signals, drivelines, design.loss_law, guess, priors)
         except IdentificationError as fault:
             raise IdentificationError(
                 f"each of {len(logs)} logs can be explained, but not all by one set of parameters: "
                 f"alone they tell {'; '.join(find_largest_differences(alone)) or fault.what}",
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
-    priors = EffectPriors(design.effects, merge_tolerances(logs))
     told = build_estimates(fit, signals, drivelines, pool_curves(alone), priors)
     tested = check_consistency(fit, signals, told.friction)
     shares = tuple(

@@ -43,7 +43,7 @@ def _sent(scenario: Scenario, rate: float, means: bool) -> Scenario:
 
 def _chosen(made: Bench) -> tuple[LikelihoodFit, tuple[Finding, ...]]:
     law = made.run.scenario.model.loss_law
-    return select_model([made.signals], [made.driveline], law, truth_of(made))
+    return select_model([made.signals], [made.driveline], law, truth_of(made), EffectPriors())
 
 
 def _deviation(fit: LikelihoodFit, name: str, truth: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.priors import build_problem
@@ -42,7 +43,9 @@ def test_five_kilopascals_above_p0_noise_does_not_end_the_search() -> None:
     made = record_bench(_lingering(5e3), 1, ROUGH)
     design = {f"{one.name}.P0": one.P0.value for one in made.driveline.couplings.values()}
     guess = truth_of(made) | design
-    fit, _ = select_model([made.signals], [made.driveline], made.run.scenario.model.loss_law, guess)
+    fit, _ = select_model(
+        [made.signals], [made.driveline], made.run.scenario.model.loss_law, guess, EffectPriors()
+    )
     assert fit.chi2 < MULTI_START.accept_chi2
     assert abs(_deviation(fit, made)) < 3.0
 

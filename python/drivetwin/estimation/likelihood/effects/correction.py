@@ -15,12 +15,11 @@ from drivetwin.estimation.likelihood.effects.columns import (
     EffectPriors,
     build_columns,
 )
+from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import (
     GroupEvidence,
     JointStep,
     WeightedColumns,
-    compute_evidence,
-    scale_by_evidence,
     take_joint_step,
     weight_columns,
 )
@@ -39,9 +38,6 @@ from drivetwin.estimation.result.cause import Group
 class CorrectionSettings:
     """Settings of the correction for effects."""
 
-    evidence: float = 3.0
-    """Log evidence from which an effect moves the values: odds of 20. Effects with less widen the
-    intervals, and the values stay those that simulate best without them."""
     linear_moves: float = 0.5
     """Largest move of an unknown, in its new standard deviations, up to which one step is taken:
     the error of a linear step is of second order in it."""
@@ -94,15 +90,12 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     leaves the range in which the columns are linear, they are formed anew where it ends, and
     another step is taken from there.
     """
-    columns = build_columns(fit.problem, fit.point, priors)
-    if columns is None:
+    found = expand_effects(fit, priors)
+    if found is None:
         return None
-    sums = weight_columns(fit.problem, fit.normal, columns)
-    evidence = compute_evidence(sums, fit.normal.information, fit.chi2)
-    sums = scale_by_evidence(sums, fit.normal.information, fit.chi2)
+    sums, shown, evidence = found.sums, found.shown, dict(found.evidence)
     if fit.plant is not None:
         evidence |= _describe_plant(fit, fit.plant, sums.pull.size)
-    shown = {one for one, each in evidence.items() if each.nats > CORRECTION.evidence}
     base = _Expansion(fit.problem, fit.normal, fit.point, sums)
     step = base.take_step(shown)
     size, total = step.moves.size, step.moves

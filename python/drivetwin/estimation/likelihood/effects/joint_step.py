@@ -74,6 +74,12 @@ class WeightedColumns:
             weighted=tuple(one * scale for one in self.weighted),
         )
 
+    def join(self, normal: NormalEquations) -> tuple[FloatArray, FloatArray]:
+        """Return gradient (p+q,) and information (p+q, p+q) of unknowns and amounts together."""
+        own = self.own + np.eye(self.pull.size)
+        information = np.block([[normal.information, self.cross], [self.cross.T, own]])
+        return np.concatenate([self.gradient, -self.pull]), information
+
     def select(self, picked: list[int]) -> WeightedColumns:
         """Return the sums of some of the columns."""
         return replace(
@@ -257,11 +263,10 @@ def take_joint_step(
     problem: LikelihoodObjective, normal: NormalEquations, sums: WeightedColumns
 ) -> JointStep:
     """Step from the expansion `normal` in the unknowns and the amounts of the effects."""
-    size, count = normal.gradient.size, sums.pull.size
-    matrix = np.block([[normal.information, sums.cross], [sums.cross.T, sums.own + np.eye(count)]])
+    size = normal.gradient.size
+    gradient, matrix = sums.join(normal)
     inverse = invert_information(matrix)
-    right = np.concatenate([-sums.gradient, sums.pull])
-    step = inverse @ right
+    step = -inverse @ gradient
     moves, amounts = step[:size], step[size:]
     residuals = tuple(
         residual - known - slopes @ moves - z @ amounts

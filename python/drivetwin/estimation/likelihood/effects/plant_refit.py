@@ -20,13 +20,9 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
-from drivetwin.estimation.likelihood.effects.columns import EffectPriors, build_columns
-from drivetwin.estimation.likelihood.effects.joint_step import (
-    SIZES,
-    GroupEvidence,
-    compute_evidence,
-    weight_columns,
-)
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.expansion import expand_effects
+from drivetwin.estimation.likelihood.effects.joint_step import SIZES, GroupEvidence
 from drivetwin.estimation.likelihood.extension import Extension
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
@@ -71,11 +67,10 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     """
     if not fit.problem.parts[0].scale_known or fit.plant is not None:
         return fit
-    columns = build_columns(fit.problem, fit.point, priors)
-    if columns is None:
+    expansion = expand_effects(fit, priors)
+    if expansion is None:
         return fit
-    sums = weight_columns(fit.problem, fit.normal, columns)
-    evidence = compute_evidence(sums, fit.normal.information, fit.chi2)
+    evidence = expansion.evidence
     refits = list(_iterate_refits(fit, evidence, priors))
     best = max(refits, key=get_nats, default=None)
     if best is None or best.plant is None:

@@ -34,6 +34,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
 from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
+from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
@@ -160,8 +161,22 @@ def refit_slow_outputs(problem: LikelihoodObjective, best: LikelihoodFit) -> Lik
         return other
 
 
+def refit_mode_beside(
+    problem: LikelihoodObjective, best: LikelihoodFit, effects: WeightedColumns
+) -> LikelihoodFit:
+    """Fit with the sampling modes that are likeliest beside effects that the log shows.
+
+    What an effect does may look like half a sample. `problem` has signals as read.
+    """
+    choices = _choices(best.problem, best.point, best.normal, effects)
+    kinds = _flipped(best.problem.kinds, choices.flips[int(np.argmin(choices.left))])
+    if kinds == best.problem.kinds:
+        return best
+    return _nearby(problem.select_modes(kinds), best, best.point) or best
+
+
 def average_modes(
-    problem: LikelihoodObjective, best: LikelihoodFit
+    problem: LikelihoodObjective, best: LikelihoodFit, effects: WeightedColumns | None = None
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """The fit with mean and covariance over all kinds, weighted by their likelihood, and findings
     on kinds that the log hardly tells.
@@ -169,9 +184,11 @@ def average_modes(
     The minima of two kinds may lie six standard deviations apart and one sample in twenty thousand
     decide between them; an interval about one of them would be wrong as often as that is the wrong
     one (Burnham and Anderson 2002). `problem` has signals as read. By the expansion none gets more
-    weight than the kinds of the fit; those that would matter are fitted.
+    weight than the kinds of the fit; those that would matter are fitted. With `effects` that the
+    log shows the expansion has them too, and nothing is fitted: a fit would lack them.
     """
-    choices = _fitted(problem, best, _choices(best.problem, best.point, best.normal))
+    choices = _choices(best.problem, best.point, best.normal, effects)
+    choices = _fitted(problem, best, choices) if effects is None else choices.centre()
     weight = _weights(choices, best)
     step = weight @ choices.steps
     apart = choices.steps - step
@@ -233,9 +250,8 @@ def _fitted(problem: LikelihoodObjective, best: LikelihoodFit, choices: _Choices
     Of its many kinks Q may end some lower by another search alone, so the first kinds are searched
     again from where those went that seem as likely.
     """
-    left = np.maximum(choices.left - choices.left[0], 0.0)
-    steps = choices.steps - choices.steps[0]
-    seen = replace(choices, left=left, steps=steps)
+    seen = choices.centre()
+    left, steps = seen.left, seen.steps
     far = np.max(np.abs(steps) / np.sqrt(np.diag(best.covariance)), axis=1) > MATTERS
     for k in np.flatnonzero(far & (_weights(seen, best) > UNLIKELY)):
         kinds = _flipped(best.problem.kinds, choices.flips[k])
@@ -327,22 +343,37 @@ class _Choices:
     left: FloatArray
     steps: FloatArray
 
+    def centre(self) -> _Choices:
+        """Return the choices as seen from the first; none gets more weight than that."""
+        left = np.maximum(self.left - self.left[0], 0.0)
+        return replace(self, left=left, steps=self.steps - self.steps[0])
+
 
 def _choices(
-    problem: LikelihoodObjective, point: ParameterVector, normal: NormalEquations
+    problem: LikelihoodObjective,
+    point: ParameterVector,
+    normal: NormalEquations,
+    effects: WeightedColumns | None = None,
 ) -> _Choices:
-    """Expand Q at `point` over all choices by `normal`, with the weighting there."""
-    score = compute_column_products(
-        problem, normal, [_changes(part, point) for part in problem.parts]
-    )
+    """Expand Q at `point` over all choices by `normal`, with the weighting there.
+
+    With `effects` their amounts are further unknowns, of unit prior variance.
+    """
+    changes = [_changes(part, point) for part in problem.parts]
+    score = compute_column_products(problem, normal, changes)
+    gradient, information, cross = normal.gradient, normal.information, score.cross
+    if effects is not None:
+        gradient, information = effects.join(normal)
+        answers = sum(w.T @ one for w, one in zip(effects.weighted, changes, strict=True))
+        cross = np.vstack([cross, np.asarray(answers)])
     shown = {*_shown(problem), TORQUE}
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
-    gradients = normal.gradient + flips @ score.cross.T
-    steps = np.array([solve_step(normal.information, gradient) for gradient in gradients])
+    gradients = gradient + flips @ cross.T
+    steps = np.array([solve_step(information, one) for one in gradients])
     price = np.array([_price(problem, _flipped(problem.kinds, row)) for row in flips])
     followed = np.sum(gradients * steps, axis=1)
     before = np.sum((flips @ score.own) * flips, axis=1) - 2.0 * flips @ score.pull
-    return _Choices(flips, before + followed + price, steps)
+    return _Choices(flips, before + followed + price, steps[:, : point.values.size])
 
 
 def _changes(part: ShiftTerm, point: ParameterVector) -> FloatArray:

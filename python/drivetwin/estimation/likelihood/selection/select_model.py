@@ -19,6 +19,8 @@ from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.multistart import (
@@ -33,6 +35,7 @@ from drivetwin.estimation.likelihood.selection.per_shift_load import fit_common_
 from drivetwin.estimation.likelihood.selection.sampling_mode import (
     average_modes,
     refit_best_mode,
+    refit_mode_beside,
     refit_slow_outputs,
     report_modes,
     select_sampling_mode,
@@ -73,8 +76,11 @@ def select_model(
     drivelines: Sequence[KnownDriveline],
     loss_law: LossLaw,
     guess: Mapping[str, float],
+    priors: EffectPriors,
 ) -> tuple[LikelihoodFit, tuple[Finding, ...]]:
     """Fit the variant that the log supports; return the decisions as findings.
+
+    Sampling modes are chosen beside the effects that the log shows, with their `priors`.
 
     Raises IdentificationError where no variant converges.
     """
@@ -105,10 +111,23 @@ def select_model(
         scale_progress(0.85, 1.0, "kinds of signals"),
         limit_evaluations(min(SELECTION.max_sampling_mode_work, search.left)),
     ):
-        best, doubts = average_modes(problem, best)
+        best, doubts = _average_modes(problem, best, priors)
     with limit_evaluations(SELECTION.max_sampling_mode_work):
         best, either = widen_over_modes(problem, best)
     return best, (*notes, *report_modes(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
+
+
+def _average_modes(
+    problem: LikelihoodObjective, best: LikelihoodFit, priors: EffectPriors
+) -> tuple[LikelihoodFit, list[Finding]]:
+    """Average over sampling modes, with the effects that the log shows as further unknowns."""
+    found = expand_effects(best, priors)
+    if found is None or not any(group.effect for group in found.shown):
+        return average_modes(problem, best)
+    other = refit_mode_beside(problem, best, found.sums)
+    if other is not best:
+        best, found = other, expand_effects(other, priors)
+    return average_modes(problem, best, None if found is None else found.sums)
 
 
 def _restrict(

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.effects.correction import CORRECTION, Correction
+from drivetwin.estimation.likelihood.effects.correction import Correction
+from drivetwin.estimation.likelihood.effects.expansion import SHOWN
 from drivetwin.estimation.likelihood.effects.friction_shape import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
@@ -83,7 +84,7 @@ def _add_shapes(
     total = told.joint_covariance[np.ix_(both, both)]
     change = shapes @ told.step.amounts[columns]
     variance = np.einsum("pn,pq,qn->n", rows, total, rows)
-    if told.evidence[group].nats > CORRECTION.evidence:
+    if told.evidence[group].nats > SHOWN:
         return change, variance
     return np.zeros(slip.size), variance + change**2
 
