@@ -20,7 +20,10 @@ from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque impor
 )
 from drivetwin.estimation.likelihood.parametrization import LOAD_DEVIATION, build_load_deviations
 from drivetwin.estimation.likelihood.priors import build_problem
-from drivetwin.estimation.likelihood.selection.backlash_search import fit_with_backlash
+from drivetwin.estimation.likelihood.selection.lower_gear_search import (
+    fit_from_lower_gear,
+    fit_with_backlash,
+)
 from drivetwin.estimation.likelihood.selection.sampling_mode import report_modes
 from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
@@ -134,28 +137,31 @@ def _fit(
     try:
         best, notes = select_model(signals, drivelines, loss_law, guess, priors)
     except IdentificationError:
-        found = _fit_with_backlash(signals, drivelines, loss_law, guess, priors)
+        found = _search_again(signals, drivelines, loss_law, guess, priors)
         if found is None:
             raise
-        return found, tuple(report_modes(found.problem.kinds))
+        best, notes = found, tuple(report_modes(found.problem.kinds))
     return select_plant(best, priors), notes
 
 
-def _fit_with_backlash(
+def _search_again(
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[KnownDriveline],
     loss_law: LossLaw,
     guess: Mapping[str, float],
     priors: EffectPriors,
 ) -> LikelihoodFit | None:
-    """Fit a plant with backlash and a constant load; None where it is off or does not hold."""
-    stated = priors.get_prior(EffectId.BACKLASH, drivelines[0])
-    if not (stated.std or stated.value):
-        return None
+    """Fit with a constant load from the lower gear, with backlash where that fails; None where no
+    plant reaches a minimum."""
     constant = {name: value for name, value in guess.items() if name != AERO}
     problem, start = build_problem(signals, drivelines, loss_law, constant, hilly=len(signals) > 1)
+    shifts = [s.shift for s in signals]
+    found = fit_from_lower_gear(problem, start, shifts)
+    stated = priors.get_prior(EffectId.BACKLASH, drivelines[0])
+    if found is not None or not (stated.std or stated.value):
+        return found
     prior = build_size_prior(EffectId.BACKLASH, priors, drivelines[0])
-    return fit_with_backlash(problem, start, [s.shift for s in signals], prior)
+    return fit_with_backlash(problem, start, shifts, prior)
 
 
 def _find_disagreements(told: EstimateSet, linear: EstimateSet) -> list[Finding]:

@@ -25,7 +25,8 @@ class CauseSettings:
     """Settings of the naming of causes."""
 
     least_evidence: float = 5.0
-    """Log evidence from which a cause is named: odds of 150 to 1 against chance."""
+    """Log evidence beyond that of one cause among all from which it is named: odds of 150 to 1
+    against chance, where each of N causes has the prior odds 1/N."""
     equivalent: float = 0.9
     """Cosine between the fitted effects of two causes, the unknowns adjusted, from which the log
     cannot tell them apart."""
@@ -43,7 +44,7 @@ def find_cause(correction: Correction) -> Cause | None:
         ((group, one) for group, one in correction.evidence.items() if group.effect is not None),
         key=lambda pair: -pair[1].nats,
     )
-    if not ranked or ranked[0][1].nats < CAUSES.least_evidence:
+    if not ranked or ranked[0][1].nats < CAUSES.least_evidence + np.log(len(ranked)):
         return None
     group, best = ranked[0]
     similar = {other for other, one in ranked[1:] if _compute_cosine(best, one) > CAUSES.equivalent}

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Search with backlash in the plant, for a log on which the dual clutch reaches no minimum.
+"""Search from fits of the lower gear, for a log on which the usual search reaches no minimum.
 
-Crossing the gap moves the whole oscillation of the shaft. Pedal steps before the shift show the gap
-alone, so the lower gear is fitted first, from several sizes and with the usual sampling modes; from
-the best of these the search goes on by stages.
+The lower gear alone shows inertia, load and shaft whatever the friction, so it is fitted first with
+each of the usual sampling modes; from the best of these the search goes on by stages. Where the
+dual clutch reaches no minimum so either, backlash is put into the plant: crossing the gap moves the
+whole oscillation of the shaft, and pedal steps before the shift show it alone.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ from drivetwin.vehicle.spec import PriorValue
 
 
 @dataclass(frozen=True)
-class BacklashSettings:
-    """Settings of the search with backlash."""
+class LowerGearSettings:
+    """Settings of the search from the lower gear."""
 
     reversal: float = 0.03
     """Torque on either side of zero, over the largest, from which it counts as reversed: the
@@ -42,12 +43,21 @@ class BacklashSettings:
     """Sizes of the starts: on either side of the usual one, half a gap times k_o over the largest
     torque [-]."""
     max_work: float = 5000.0
-    """Work of the whole search [passes]."""
+    """Work of the search with one plant: it takes 600 for the dual clutch and 2500 with backlash
+    [passes]."""
 
 
-BACKLASH = BacklashSettings()
+LOWER_GEAR = LowerGearSettings()
 MODES = (frozenset[str](), frozenset(SPEEDS), frozenset((*SPEEDS, OUTPUT_TORQUE)))
 """Sampling modes that are tried: as read, speeds as means, all outputs as means."""
+
+
+def fit_from_lower_gear(
+    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> LikelihoodFit | None:
+    """Fit the dual clutch; None where no sampling mode leads to a minimum. `problem` has signals as
+    read."""
+    return _search(problem, [start], shifts)
 
 
 def fit_with_backlash(
@@ -64,11 +74,8 @@ def fit_with_backlash(
     if not _is_reversed(problem):
         return None
     extended, point = extend_problem(problem, start, EffectId.BACKLASH, prior)
-    try:
-        with limit_evaluations(BACKLASH.max_work):
-            found = _search(extended, point, shifts)
-    except BudgetExceeded:
-        return None
+    sizes = [np.append(start.values, np.log(size)) for size in LOWER_GEAR.sizes]
+    found = _search(extended, [point.replace_values(one) for one in sizes], shifts)
     return None if found is None else replace(found, plant=_compare(found, prior))
 
 
@@ -79,29 +86,45 @@ def _is_reversed(problem: LikelihoodObjective) -> bool:
     if not torques:
         return False
     low, high = min(map(np.min, torques)), max(map(np.max, torques))
-    least = BACKLASH.reversal * max(abs(low), abs(high))
+    least = LOWER_GEAR.reversal * max(abs(low), abs(high))
     return bool(low < -least and high > least)
 
 
 def _search(
-    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+    problem: LikelihoodObjective, starts: Sequence[ParameterVector], shifts: Sequence[Shift]
 ) -> LikelihoodFit | None:
-    """Search from the best fit of the lower gear; None where it does not reach a minimum."""
-    trials = []
+    """Search from the fits of the lower gear, the best first; None where none leads to a minimum or
+    the work runs out."""
+    try:
+        with limit_evaluations(LOWER_GEAR.max_work):
+            for of_modes, point in _fit_lower_gears(problem, starts, shifts):
+                near = find_staged_start(of_modes, point, shifts)
+                found = None if near is None else fit_local(of_modes, near.point)
+                if found is not None:
+                    return refit_best_mode(problem, found)
+    except BudgetExceeded:
+        pass
+    return None
+
+
+def _fit_lower_gears(
+    problem: LikelihoodObjective, starts: Sequence[ParameterVector], shifts: Sequence[Shift]
+) -> list[tuple[LikelihoodObjective, ParameterVector]]:
+    """Fit the lower gear with each sampling mode, from the best of the `starts`; best modes
+    first."""
+    found = []
     for modes in MODES:
         of_modes = problem.select_modes(modes)
-        for size in BACKLASH.sizes:
-            values = np.append(start.values[:-1], np.log(size))
-            gear = fit_lower_gear_only(of_modes, start.replace_values(values), shifts)
-            if gear is not None:
-                weighted = gear.problem.update_weighting(gear.point)
-                trials.append((weighted.cost(gear.point), of_modes, gear.point))
-    if not trials:
-        return None
-    _, of_modes, point = min(trials, key=lambda one: one[0])
-    near = find_staged_start(of_modes, point, shifts)
-    found = None if near is None else fit_local(of_modes, near.point)
-    return None if found is None else refit_best_mode(problem, found)
+        fits = [fit_lower_gear_only(of_modes, one, shifts) for one in starts]
+        costs = [
+            (gear.problem.update_weighting(gear.point).cost(gear.point), gear.point)
+            for gear in fits
+            if gear is not None
+        ]
+        if costs:
+            cost, point = min(costs, key=lambda one: one[0])
+            found.append((cost, of_modes, point))
+    return [(modes, point) for _, modes, point in sorted(found, key=lambda one: one[0])]
 
 
 def _compare(found: LikelihoodFit, prior: PriorValue) -> PlantEvidence:
