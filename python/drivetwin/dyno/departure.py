@@ -90,7 +90,7 @@ def _compute_input_shaft(inertia: float, frequency: float) -> InputShaft | None:
     if frequency == 0.0:
         return None
     omega = 2.0 * np.pi * frequency
-    return InputShaft(inertia * omega**2, 2.0 * _MODE_DAMPING * omega * inertia)
+    return InputShaft(inertia * omega**2, 2.0 * _MODE_DAMPING * omega * inertia, inertia)
 
 
 def _compute_tyre(nominal: NominalRun, slip: float) -> TyreSlip | None:

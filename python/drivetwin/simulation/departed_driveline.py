@@ -96,18 +96,20 @@ class DepartedDriveline:
         ]
 
     def _build_engine(self) -> list[Element]:
-        """J1 with the engine torque, in halves on either side of an input shaft."""
+        """J1 with the engine torque, in two parts on either side of an input shaft."""
         J1, shaft = self.model.J1, self.departure.input_shaft
         if shaft is None:
             return [
                 build_element("torque", _TORQUE, node=_ENGINE, input=_TORQUE),
                 build_element("inertia", "J1", node=_ENGINE, inertia=J1),
             ]
+        front, behind = shaft.inertia, J1 - shaft.inertia
+        fields = {"stiffness": shaft.stiffness, "damping": shaft.damping}
         return [
             build_element("torque", _TORQUE, node=_CRANK, input=_TORQUE),
-            build_element("inertia", "J1 at the engine", node=_CRANK, inertia=0.5 * J1),
-            build_element("spring_damper", _INPUT_SHAFT, a=_CRANK, b=_ENGINE, **asdict(shaft)),
-            build_element("inertia", "J1 at the gearbox", node=_ENGINE, inertia=0.5 * J1),
+            build_element("inertia", "J1 at the engine", node=_CRANK, inertia=front),
+            build_element("spring_damper", _INPUT_SHAFT, a=_CRANK, b=_ENGINE, **fields),
+            build_element("inertia", "J1 at the gearbox", node=_ENGINE, inertia=behind),
         ]
 
     def _build_gear(self, name: str) -> list[Element]:

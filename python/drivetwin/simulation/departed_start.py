@@ -37,7 +37,7 @@ def compute_quasi_steady_state(
     rate = (model.i_f * torque - loaded.load.evaluate(wheel)) / model.J_v
     return QuasiSteadyState(
         _compute_twist(model, departure, torque),
-        _compute_input_twist(model, departure, engine_torque, ratio * model.i_f * rate),
+        _compute_input_twist(departure, engine_torque, ratio * model.i_f * rate),
         _compute_vehicle_speed(departure, wheel, model.i_f * torque - braking, rate),
     )
 
@@ -49,13 +49,12 @@ def _compute_twist(model: DualClutch, departure: Departure, torque: float) -> fl
     return torque / model.k_o + 0.5 * departure.gap * float(np.sign(torque))
 
 
-def _compute_input_twist(
-    model: DualClutch, departure: Departure, engine_torque: float, rate: float
-) -> float:
+def _compute_input_twist(departure: Departure, engine_torque: float, rate: float) -> float:
     """Twist [rad] of the input shaft while the engine accelerates by `rate` [rad/s²]."""
     if departure.input_shaft is None:
         return 0.0
-    return (engine_torque - 0.5 * model.J1 * rate) / departure.input_shaft.stiffness
+    shaft = departure.input_shaft
+    return (engine_torque - shaft.inertia * rate) / shaft.stiffness
 
 
 def _compute_vehicle_speed(departure: Departure, wheel: float, torque: float, rate: float) -> float:

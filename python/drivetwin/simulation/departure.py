@@ -10,10 +10,11 @@ from drivetwin.simulation.dual_clutch import FloatArray, RoadLoad, ShiftElement,
 
 @dataclass(frozen=True)
 class InputShaft:
-    """Shaft in the middle of J1: stiffness [N m/rad] and damping [N m s/rad]."""
+    """Shaft inside J1: stiffness [N m/rad], damping [N m s/rad], inertia in front [kg m^2]."""
 
     stiffness: float
     damping: float
+    inertia: float
 
 
 @dataclass(frozen=True)

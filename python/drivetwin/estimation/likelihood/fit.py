@@ -21,12 +21,13 @@ class PlantEvidence:
     """Evidence of the part that the plant of a fit has beside the dual clutch.
 
     `nats` is the log evidence against the dual clutch alone, `moves` (p,) are those of the unknowns
-    from its minimum.
+    from its minimum, `index` is that of the logarithm of the size among them.
     """
 
     effect: EffectId
     nats: float
     moves: FloatArray
+    index: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,7 @@ class LikelihoodFit:
     `mean` is the minimum, or the average over minima of similar likelihood (sampling_mode.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
     the expansion of Q there. The covariance is that of `compute_covariance`. `plant` describes the
-    part that the plant has beside the dual clutch; its unknown is the last one.
+    part that the plant has beside the dual clutch; its unknowns come last, that of the size first.
     """
 
     problem: LikelihoodObjective

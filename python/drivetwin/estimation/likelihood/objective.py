@@ -60,8 +60,11 @@ class ObjectiveSettings:
     difference: float = 0.03
     """Root mean square of the change of the residual, in standard deviations, at which derivatives
     of an extended plant are taken [-]."""
-    log_difference: float = 1e-3
-    """Change of the logarithm of the size of an extension for its derivative [-]."""
+    own_reach: float = 3.0
+    """Distance from their prior within which unknowns of an extension are sought, in its standard
+    deviations: a share of an inertia stays between 0 and 1 [-]."""
+    own_difference: float = 1e-3
+    """Change of an unknown of an extension, a logarithm or a share, for its derivative [-]."""
 
 
 OBJECTIVE = ObjectiveSettings()
@@ -108,8 +111,8 @@ class ShiftTerm:
         extension = self.structure.extension
         if extension is None:
             return simulate(model, torque, pressures, start, time)
-        size = point[extension.unknown]
-        return extension.simulate(model, size, (torque, pressures), start, time)
+        values = np.array([point[name] for name in extension.unknowns])
+        return extension.simulate(model, values, (torque, pressures), start, time)
 
     def drop_extension(self) -> ShiftTerm:
         """Return the part with the dual clutch alone as its plant."""
@@ -170,7 +173,8 @@ class ShiftTerm:
         steps = OBJECTIVE.difference / np.where(answer > 0.0, answer, np.inf)
         steps[[name in self._compute_torque_changes(point) for name in point.names]] = 0.0
         assert self.structure.extension is not None, "only extended plants are differenced"
-        steps[point.names.index(self.structure.extension.unknown)] = OBJECTIVE.log_difference
+        own = self.structure.extension.unknowns
+        steps[[point.names.index(name) for name in own]] = OBJECTIVE.own_difference
         for k in np.flatnonzero(steps):
             change = self._compute_change(point, int(k), steps[k], residual)
             if change is None:
@@ -330,25 +334,31 @@ class LikelihoodObjective:
         """Names of the signals that are of another kind than read, as in `Record.kinds`."""
         return frozenset[str]().union(*(part.record.kinds for part in self.parts))
 
-    def extend(self, extension: Extension, prior: PriorValue) -> LikelihoodObjective:
-        """Add a part to the plant of all shifts; `prior` is that of the logarithm of its size.
+    def extend(self, extension: Extension, priors: Sequence[PriorValue]) -> LikelihoodObjective:
+        """Add a part to the plant of all shifts, with the `priors` of its unknowns.
 
-        Its unknown is the last one.
+        These come last. They stay within some standard deviations of their prior.
         """
         structures = [replace(part.structure, extension=extension) for part in self.parts]
         parts = [
             replace(part, structure=one) for part, one in zip(self.parts, structures, strict=True)
         ]
-        lower, upper = np.append(self.lower, -np.inf), np.append(self.upper, np.inf)
-        return LikelihoodObjective(
-            tuple(parts), self.prior.append(prior.value, prior.std), lower, upper
-        )
+        prior = self.prior
+        for one in priors:
+            prior = prior.append(one.value, one.std)
+        reach = [OBJECTIVE.own_reach * one.std for one in priors]
+        own = [one.value for one in priors]
+        lower = np.append(self.lower, np.subtract(own, reach))
+        upper = np.append(self.upper, np.add(own, reach))
+        return LikelihoodObjective(tuple(parts), prior, lower, upper)
 
     def drop_extension(self) -> LikelihoodObjective:
-        """Return the problem of the dual clutch alone, without the last unknown."""
-        prior = Prior(self.prior.mean[:-1], self.prior.precision[:-1, :-1])
+        """Return the problem of the dual clutch alone, without the unknowns of the part."""
+        extension = self.parts[0].structure.extension
+        count = self.lower.size - (0 if extension is None else len(extension.unknowns))
+        prior = Prior(self.prior.mean[:count], self.prior.precision[:count, :count])
         parts = tuple(part.drop_extension() for part in self.parts)
-        return LikelihoodObjective(parts, prior, self.lower[:-1], self.upper[:-1])
+        return LikelihoodObjective(parts, prior, self.lower[:count], self.upper[:count])
 
     def select_modes(self, names: Collection[str]) -> LikelihoodObjective:
         """Set the sampling modes of all signals to those of `names`; all must be as read."""

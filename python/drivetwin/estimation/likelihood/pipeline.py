@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.plant_refit import build_size_prior, select_plant
+from drivetwin.estimation.likelihood.effects.plant_refit import build_plant_priors, select_plant
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
@@ -160,8 +160,8 @@ def _search_again(
     stated = priors.get_prior(EffectId.BACKLASH, drivelines[0])
     if found is not None or not (stated.std or stated.value):
         return found
-    prior = build_size_prior(EffectId.BACKLASH, priors, drivelines[0])
-    return fit_with_backlash(problem, start, shifts, prior)
+    own = build_plant_priors(EffectId.BACKLASH, priors, drivelines[0])
+    return fit_with_backlash(problem, start, shifts, own)
 
 
 def _find_disagreements(told: EstimateSet, linear: EstimateSet) -> list[Finding]:

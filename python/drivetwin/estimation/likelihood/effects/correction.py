@@ -118,8 +118,8 @@ def _describe_plant(
     fit: LikelihoodFit, plant: PlantEvidence, columns: int
 ) -> dict[Group, GroupEvidence]:
     """Describe the part that the plant has as a group without columns; its amount is its size."""
-    size = float(np.exp(fit.point.values[-1]))
-    std = size * float(np.sqrt(fit.covariance[-1, -1]))
+    size = float(np.exp(fit.point.values[plant.index]))
+    std = size * float(np.sqrt(fit.covariance[plant.index, plant.index]))
     amounts, stds = np.array([size]), np.array([std])
     answer = np.zeros(columns)
     return {Group(plant.effect): GroupEvidence(plant.nats, amounts, stds, (), answer, plant.moves)}

@@ -4,26 +4,32 @@
 Where an effect changes the motion much, no column at the minimum of the dual clutch describes it:
 a mode of the input side is absorbed by k_o before it shows. Such an effect is put into the plant
 and the fit repeated. With F the information of the unknowns at each minimum of Q, and s the prior
-standard deviation of the logarithm of the size, Laplace's evidence for it is
+standard deviations of the unknowns of the part, Laplace's evidence for it is
 
-    ln B = ½·(Q - Q′)/max(χ², 1) + ½·(log|F| - log|F′|) - log s
+    ln B = ½·(Q - Q′)/max(χ², 1) + ½·(log|F| - log|F′|) - Σ log s
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import SIZES, GroupEvidence
-from drivetwin.estimation.likelihood.extension import Extension
+from drivetwin.estimation.likelihood.extension import (
+    DAMPING,
+    SHARE,
+    SIZE,
+    UNKNOWNS,
+    Extension,
+)
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
     PlantEvidence,
@@ -33,7 +39,7 @@ from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import Group
-from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue
 
 
@@ -49,11 +55,38 @@ class PlantSettings:
     """Prior standard deviation of the logarithm of a mode's frequency: 0.4 to 2.7 times the usual
     one hold 95 % [-]."""
 
+    share: float = 0.5
+    """Usual share of J1 in front of an input shaft: flywheel and crankshaft against pump, converter
+    or primary masses [-]."""
+    share_std: float = 0.12
+    """Prior standard deviation of that share [-]."""
+    damping: float = 0.05
+    """Usual damping ratio of the mode [-]."""
+    damping_spread: float = 0.5
+    """Prior standard deviation of its logarithm: 2 to 13 % hold 95 % [-]."""
     least_spread: float = 1e-3
     """Least prior standard deviation of the logarithm of a size that is stated exactly [-]."""
 
 
 PLANT = PlantSettings()
+
+
+class Minimum(Protocol):
+    """Minimum of Q: a fit, or the result of a search."""
+
+    @property
+    def problem(self) -> LikelihoodObjective:
+        """Problem that was minimised."""
+
+    @property
+    def point(self) -> ParameterVector:
+        """Unknowns at the minimum."""
+
+    @property
+    def normal(self) -> NormalEquations:
+        """Expansion of Q there."""
+
+
 BY_EVIDENCE = (EffectId.BACKLASH,)
 """Effects that are tried in the plant where their columns show them."""
 
@@ -106,19 +139,25 @@ def _iterate_refits(
     for effect, amount in tried.items():
         stated = priors.get_prior(effect, driveline)
         if stated.std > 0.0 or stated.value:
-            prior = build_size_prior(effect, priors, driveline)
-            start = prior.value + (0.0 if amount is None else float(np.log(amount)))
-            refit = _refit(fit, effect, prior, start)
+            own = build_plant_priors(effect, priors, driveline)
+            start = own[0].value + (0.0 if amount is None else float(np.log(amount)))
+            refit = _refit(fit, effect, own, start)
             if refit is not None:
                 yield refit
 
 
-def build_size_prior(
+def build_plant_priors(
     effect: EffectId, priors: EffectPriors, driveline: KnownDriveline
-) -> PriorValue:
-    """Build the prior of the logarithm of a size: about its stated value, else about its usual
-    one."""
-    prior = priors.get_prior(effect, driveline)
+) -> tuple[PriorValue, ...]:
+    """Build the priors of the unknowns of a part; the size is about its stated value, else about
+    its usual one."""
+    own = {SIZE: _build_size_prior(effect, priors.get_prior(effect, driveline))}
+    own[SHARE] = PriorValue(PLANT.share, PLANT.share_std)
+    own[DAMPING] = PriorValue(float(np.log(PLANT.damping)), PLANT.damping_spread)
+    return tuple(own[key] for key in UNKNOWNS[effect])
+
+
+def _build_size_prior(effect: EffectId, prior: EffectPrior) -> PriorValue:
     if prior.value:
         size = abs(prior.value)
         return PriorValue(float(np.log(size)), max(prior.std / size, PLANT.least_spread))
@@ -127,23 +166,30 @@ def build_size_prior(
 
 
 def extend_problem(
-    problem: LikelihoodObjective, point: ParameterVector, effect: EffectId, prior: PriorValue
+    problem: LikelihoodObjective,
+    point: ParameterVector,
+    effect: EffectId,
+    priors: Sequence[PriorValue],
 ) -> tuple[LikelihoodObjective, ParameterVector]:
-    """Add an effect to the plant; the point has the logarithm of its size as the last unknown."""
+    """Add an effect to the plant; its unknowns come last, at the means of their `priors`."""
     outputs = [out for part in problem.parts for out in part.record.outputs]
     full = max(float(np.max(np.abs(o.values))) for o in outputs if o.name == OUTPUT_TORQUE)
     extension = Extension(effect, full)
-    values = np.append(point.values, prior.value)
-    extended = ParameterVector((*point.names, extension.unknown), values)
-    return problem.extend(extension, prior), extended
+    values = np.append(point.values, [one.value for one in priors])
+    extended = ParameterVector((*point.names, *extension.unknowns), values)
+    return problem.extend(extension, priors), extended
 
 
 def _refit(
-    fit: LikelihoodFit, effect: EffectId, prior: PriorValue, start: float
+    fit: LikelihoodFit, effect: EffectId, priors: Sequence[PriorValue], start: float
 ) -> LikelihoodFit | None:
-    """Fit with an effect in the plant, with the weighting of `fit`; None without a minimum."""
-    problem, point = extend_problem(fit.problem, fit.point, effect, prior)
-    values = np.append(fit.point.values, start)
+    """Fit with an effect in the plant, with the weighting of `fit`; None without a minimum.
+
+    `start` is the logarithm of the size.
+    """
+    problem, point = extend_problem(fit.problem, fit.point, effect, priors)
+    values, index = point.values.copy(), fit.point.values.size
+    values[index] = start
     try:
         with limit_evaluations(PLANT.max_work):
             found = minimise(problem, point.replace_values(values))
@@ -151,25 +197,30 @@ def _refit(
         return None
     if found is None or not found.converged:
         return None
-    nats = compare_plants(fit.normal, found.normal, fit.chi2, prior)
-    return _build_fit(fit, found, PlantEvidence(effect, nats, _compute_moves(fit, found.point)))
-
-
-def _compute_moves(fit: LikelihoodFit, point: ParameterVector) -> FloatArray:
-    """Compute the moves (p,) of the unknowns by the part; none of its own size."""
-    return np.append(point.values[:-1] - fit.point.values, 0.0)
+    return _build_fit(fit, found, compare_plants(fit, found, fit.chi2, priors))
 
 
 def compare_plants(
-    plain: NormalEquations, extended: NormalEquations, chi2: float, prior: PriorValue
-) -> float:
-    """Compute the log evidence of an extended plant against the dual clutch.
+    plain: Minimum, extended: Minimum, chi2: float, priors: Sequence[PriorValue]
+) -> PlantEvidence:
+    """Compare the minimum of an extended plant with that of the dual clutch.
 
-    Both expansions have the same weighting, so Q alone counts.
+    Both have the same weighting, so Q alone counts. `chi2` is the residual power per sample,
+    `priors` are those of the unknowns of the part.
     """
-    fall = plain.cost - extended.cost
-    volume = _compute_log_determinant(plain) - _compute_log_determinant(extended)
-    return 0.5 * fall / max(chi2, 1.0) + 0.5 * volume - float(np.log(prior.std))
+    extension = extended.problem.parts[0].structure.extension
+    assert extension is not None, "the plant has a part"
+    fall = plain.normal.cost - extended.normal.cost
+    volume = _compute_log_determinant(plain.normal) - _compute_log_determinant(extended.normal)
+    spread = float(np.sum(np.log([one.std for one in priors])))
+    index = plain.point.values.size
+    moves = extended.point.values[:index] - plain.point.values
+    return PlantEvidence(
+        extension.effect,
+        0.5 * fall / max(chi2, 1.0) + 0.5 * volume - spread,
+        np.append(moves, np.zeros(len(priors))),
+        index,
+    )
 
 
 def _compute_log_determinant(normal: NormalEquations) -> float:
@@ -182,13 +233,13 @@ def _build_fit(
     """Build the fit of an extended plant; it has the average over sampling modes of `fit`."""
     problem, point, normal = found.problem, found.point, found.normal
     chi2 = (normal.cost - problem.prior.compute_prior_cost(point.values)) / problem.size
-    own = fit.covariance - fit.noise_covariance
-    values = point.values + np.append(fit.mean.values - fit.point.values, 0.0)
+    own, count = fit.covariance - fit.noise_covariance, point.values.size - plant.index
+    values = point.values + np.append(fit.mean.values - fit.point.values, np.zeros(count))
     return LikelihoodFit(
         problem,
         point,
         point.replace_values(np.clip(values, problem.lower, problem.upper)),
-        compute_covariance(problem, normal, chi2) + np.pad(own, (0, 1)),
+        compute_covariance(problem, normal, chi2) + np.pad(own, (0, count)),
         normal,
         chi2,
         found.iterations,
@@ -208,6 +259,6 @@ def _widen(fit: LikelihoodFit, refits: list[LikelihoodFit], most: float) -> Like
             continue
         against = np.logaddexp(0.0, most)
         weight = float(np.exp(-np.logaddexp(0.0, against - one.plant.nats)))
-        far = one.plant.moves[:-1]
+        far = one.plant.moves[: one.plant.index]
         covariance = covariance + weight * np.outer(far, far)
     return replace(fit, covariance=covariance)

@@ -64,19 +64,19 @@ def fit_with_backlash(
     problem: LikelihoodObjective,
     start: ParameterVector,
     shifts: Sequence[Shift],
-    prior: PriorValue,
+    priors: Sequence[PriorValue],
 ) -> LikelihoodFit | None:
     """Fit with backlash in the plant; None without a reversal of the torque or a minimum.
 
-    `problem` is that of the dual clutch with signals as read, `prior` that of the logarithm of the
-    size.
+    `problem` is that of the dual clutch with signals as read, `priors` are those of the unknowns
+    of the gap.
     """
     if not _is_reversed(problem):
         return None
-    extended, point = extend_problem(problem, start, EffectId.BACKLASH, prior)
+    extended, point = extend_problem(problem, start, EffectId.BACKLASH, priors)
     sizes = [np.append(start.values, np.log(size)) for size in LOWER_GEAR.sizes]
     found = _search(extended, [point.replace_values(one) for one in sizes], shifts)
-    return None if found is None else replace(found, plant=_compare(found, prior))
+    return None if found is None else replace(found, plant=_compare(found, priors))
 
 
 def _is_reversed(problem: LikelihoodObjective) -> bool:
@@ -127,12 +127,13 @@ def _fit_lower_gears(
     return [(modes, point) for _, modes, point in sorted(found, key=lambda one: one[0])]
 
 
-def _compare(found: LikelihoodFit, prior: PriorValue) -> PlantEvidence:
+def _compare(found: LikelihoodFit, priors: Sequence[PriorValue]) -> PlantEvidence:
     """Compare a fit with the dual clutch, sought from the same unknowns with the same weighting."""
-    start = ParameterVector(found.point.names[:-1], found.point.values[:-1])
-    other = minimise(found.problem.drop_extension(), start)
+    plain = found.problem.drop_extension()
+    count = plain.lower.size
+    start = ParameterVector(found.point.names[:count], found.point.values[:count])
+    other = minimise(plain, start)
     if other is None:
-        return PlantEvidence(EffectId.BACKLASH, np.inf, np.zeros_like(found.point.values))
-    nats = compare_plants(other.normal, found.normal, found.chi2, prior)
-    moves = np.append(start.values - other.point.values, 0.0)
-    return PlantEvidence(EffectId.BACKLASH, nats, moves)
+        nothing = np.zeros_like(found.point.values)
+        return PlantEvidence(EffectId.BACKLASH, np.inf, nothing, count)
+    return compare_plants(other, found, found.chi2, priors)
