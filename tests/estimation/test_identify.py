@@ -196,9 +196,9 @@ def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
     def fail(*_: object, **__: object) -> None:
         raise IdentificationError("the simulation went astray", "nothing")
 
-    monkeypatch.setattr(
-        "drivetwin.estimation.likelihood.selection.select_model.fit_multistart", fail
-    )
+    selection = "drivetwin.estimation.likelihood.selection"
+    monkeypatch.setattr(f"{selection}.select_model.fit_multistart", fail)
+    monkeypatch.setattr(f"{selection}.lower_gear_search.fit_local", lambda *_: None)
     found = identify(*recording("truck_a"), Method.LIKELIHOOD)
     assert found.method is Method.INTEGRAL
     assert any("went astray" in text for text in render(found.findings))
