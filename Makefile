@@ -133,6 +133,7 @@ bench: $(venv)/.dev ## measure what has a stated limit
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.calibration_points
 	$(bin)/python -m benchmarks.export_step # writes docs/export-cost.md
 	$(bin)/python -m benchmarks.speed # writes docs/benchmarks.md
+	$(bin)/python -m benchmarks.stiff # writes docs/stiffness.md
 
 .PHONY: fuzz
 fuzz: $(venv)/.dev native ## 20,000 damaged files through each reader, for an hour or two

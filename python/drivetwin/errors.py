@@ -100,6 +100,10 @@ class ReductionError(InputError):
     """A shift of a gearbox has no dual-clutch form, or none that can be simulated."""
 
 
+class NoFixedRatioError(InputError):
+    """A gear leaves more than one speed free, as a power split does; no card describes it."""
+
+
 class ResultFileError(InputError):
     """A twin or result file cannot be read or has an unknown schema."""
 

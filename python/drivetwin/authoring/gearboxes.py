@@ -92,9 +92,11 @@ def reduce_gears(name: str, gears: tuple[str, ...]) -> tuple[GearboxElement, ...
                 "ratios and elements yourself with --ratios and --element",
             ) from fault
         for gear, ratios in ((low, shift.off_going), (high, shift.on_coming)):
-            if ratios.element in box.dogs:
+            if ratios.element in (*box.dogs, *box.freewheels):
+                kind = box.elements[ratios.element].kind.value
                 raise CardError(
-                    f"{name}: gear {gear} is engaged by {ratios.element}, a dog that never slips",
+                    f"{name}: gear {gear} is engaged by {ratios.element}, a {kind}, which no "
+                    "pressure lets slip",
                     "state ratios and the clutch yourself with --ratios and --element; "
                     "examples/vehicles/manual.toml is such a card",
                 )

@@ -29,9 +29,10 @@ def build_driveline_elements(gearbox: Gearbox, powertrain: Powertrain) -> list[E
     """Return the elements; inputs are PEDAL, BRAKE and the pressures by element.
 
     Raises CardError where the gearbox card has no [drive], InputError where it has dogs, which
-    cannot launch or shift under power.
+    cannot launch or shift under power, a converter or freewheels.
     """
     drive = gearbox.require_drive()
+    gearbox.require_pressed_alone("a drive")
     dogs = [e.name for e in gearbox.elements.values() if e.kind is ElementKind.DOG]
     if dogs:
         raise InputError(

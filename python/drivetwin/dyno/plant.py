@@ -130,8 +130,10 @@ def _list_outputs(gearbox: Gearbox, elements: tuple[str, ...]) -> list[Output]:
 def build_plant(gearbox: Gearbox, gears: tuple[str, ...]) -> Plant:
     """Prepare a gearbox for up-shifts through `gears`, all with the same elements in common.
 
-    Raises ReductionError for a shift that is not one element off and one on.
+    Raises ReductionError for a shift that is not one element off and one on, InputError for a card
+    with a converter or freewheels.
     """
+    gearbox.require_pressed_alone("the dynamometer")
     shifts = [reduce(gearbox, old, new) for old, new in pairwise(gears)]
     ratios = {each.element: each for s in shifts for each in (s.off_going, s.on_coming)}
     return Plant(gearbox, gears, ratios, shifts[0].common)

@@ -66,4 +66,5 @@ def build_gearbox(document: Mapping[str, Any]) -> Gearbox:
         inertias=dict(file.inertia_kgm2),
         source=file.source,
         drive=None if file.drive is None else file.drive.to_spec(),
+        converter=None if file.converter is None else file.converter.to_stage(),
     )

@@ -9,7 +9,7 @@ from typing import Any
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import Fault, validate_schema
 from drivetwin.gearbox.schema import GearboxFile
-from drivetwin.gearbox.spec import GROUND
+from drivetwin.gearbox.spec import CONVERTER, GROUND
 
 
 def find_gearbox_faults(document: Mapping[str, Any]) -> list[Fault]:
@@ -24,10 +24,13 @@ def find_gearbox_faults(document: Mapping[str, Any]) -> list[Fault]:
 def _check_names(file: GearboxFile) -> Iterator[Fault]:
     """Sets, pairs and elements share one name space: torques are reported by these names."""
     seen: dict[str, str] = {}
-    for table, names in (("sets", file.sets), ("pairs", file.pairs), ("elements", file.elements)):
+    tables = (("sets", file.sets), ("pairs", file.pairs), ("elements", file.elements))
+    for table, names in tables:
         for name in names:
             if name in seen:
                 yield Fault(f"{table}.{name}", f"the name is already that of {seen[name]}.{name}")
+            elif name == CONVERTER and file.converter is not None:
+                yield Fault(f"{table}.{name}", "the name is that of the torque converter")
             seen[name] = table
 
 
@@ -38,6 +41,7 @@ def _check_ends(file: GearboxFile) -> Iterator[Fault]:
     for key, member in (("input", file.input), ("output", file.output)):
         if member == GROUND:
             yield Fault(key, "the ground does not turn; name a shaft")
+    yield from _check_converter(file)
     for name, each in file.sets.items():
         if len({each.sun, each.ring, each.carrier}) < 3:
             yield Fault(f"sets.{name}", "sun, ring and carrier must be three members, or it locks")
@@ -46,12 +50,28 @@ def _check_ends(file: GearboxFile) -> Iterator[Fault]:
             yield Fault(f"pairs.{name}", "both wheels are on the same member")
 
 
+def _check_converter(file: GearboxFile) -> Iterator[Fault]:
+    """The turbine is the input, the pump a member of its own."""
+    if file.converter is None:
+        return
+    if file.converter.turbine != file.input:
+        text = (
+            f"the turbine must be the input, {file.input!r}, from which ratios are counted; build "
+            "a gearbox with a converter elsewhere as a network with drivetwin.Model"
+        )
+        yield Fault("converter.turbine", text)
+    if file.converter.pump in (file.input, file.output, GROUND):
+        yield Fault("converter.pump", "the pump must be a member of its own, that of the engine")
+
+
 def _check_members(file: GearboxFile) -> Iterator[Fault]:
     """Every member of an end, an element or an inertia must belong to a set or a gear pair."""
     geared = {m for each in file.sets.values() for m in (each.sun, each.ring, each.carrier)}
     geared |= {m for pair in file.pairs.values() for m in (pair.a, pair.b)}
     joined = {m for element in file.elements.values() for m in element.members}
-    known = geared | joined
+    ends = {file.input, file.output, GROUND}
+    ends |= set() if file.converter is None else {file.converter.pump}
+    known = geared | joined | (ends - {file.input, file.output, GROUND})
     for key, member in (("input", file.input), ("output", file.output)):
         if member not in known:
             yield Fault(key, f"no set, pair or element has a member {member!r}"
@@ -66,7 +86,7 @@ def _check_members(file: GearboxFile) -> Iterator[Fault]:
         if element.members[0] == element.members[-1] and len(element.members) == 2:
             yield Fault(f"elements.{name}.members", "both sides are the same member")
         for member in element.members:
-            if member not in geared | {file.input, file.output, GROUND} and (
+            if member not in geared | ends and (
                 sum(member in other.members for other in file.elements.values()) < 2
             ):
                 text = f"{member!r} belongs to nothing else{suggest_spelling(member, geared)}"

@@ -96,7 +96,8 @@ def build_whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbo
     zero = Signal(torque.time, np.zeros_like(torque.time))
     inputs = {ENGINE_TORQUE: torque} | {name: pressures.get(name, zero) for name in names}
     output, wheel, twist = _start(reduction, maneuver, reduction.M12)
-    friction = [name for name in reduction.common if name in names]
+    held = (*names, *gearbox.freewheels)
+    friction = [name for name in reduction.common if name in held]
     # Dogs of the new gear turn some of what idles in the old one; what idles even so stands still.
     engaged = (reduction.off_going.element, *reduction.common)
     old = replace(gearbox.get_gear(reduction.from_gear), elements=engaged)
@@ -127,7 +128,8 @@ def _simulate_whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: Floa
 
 def _build_surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
     """Engine, shaft, final drive, vehicle and load around the gearbox."""
-    drive, engine, output = maneuver.drive, reduction.gearbox.input, reduction.gearbox.output
+    drive, output = maneuver.drive, reduction.gearbox.output
+    engine = reduction.gearbox.engine_member
     load = maneuver.load * drive.i_f
     return [
         build_element(

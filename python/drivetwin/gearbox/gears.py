@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivetwin._native import gear_statics as native_gear_statics
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, NoFixedRatioError
 from drivetwin.gearbox.network import as_json
-from drivetwin.gearbox.spec import Gearbox
+from drivetwin.gearbox.spec import GROUND, POWER_SPLIT_REMEDY, Gearbox
 
 
 @dataclass(frozen=True)
@@ -60,18 +61,20 @@ def describe_ratio_differences(gearbox: Gearbox, ratios: Mapping[str, float]) ->
 
 
 def solve_gear(gearbox: Gearbox, gear: str) -> GearStatics:
-    """Solve one gear. Raises InputError where its elements do not make one ratio."""
+    """Solve one gear.
+
+    Raises NoFixedRatioError if its elements leave more than one speed free, InputError if they
+    make no ratio otherwise or a freewheel works against its direction.
+    """
     entry = gearbox.get_gear(gear)
     try:
         speeds, torques, (power, torque) = native_gear_statics(
             as_json(gearbox), list(entry.elements), gearbox.input, gearbox.output
         )
     except ValueError as error:
-        raise InputError(
-            f"gear {gear} of {gearbox.name}: {error}", "correct the gear's elements in the card"
-        ) from error
+        raise _describe_refusal(gearbox, gear, error) from error
     by_member = dict(speeds)
-    return GearStatics(
+    statics = GearStatics(
         gear=gear,
         elements=entry.elements,
         ratio=1.0 / (by_member[gearbox.output] or float("nan")),
@@ -80,3 +83,43 @@ def solve_gear(gearbox: Gearbox, gear: str) -> GearStatics:
         power_error=power,
         torque_error=torque,
     )
+    _check_freewheels(gearbox, statics)
+    return statics
+
+
+_FREE_SPEEDS = re.compile(r"(\d+) free speeds remain where 1 must")
+
+
+def _describe_refusal(gearbox: Gearbox, gear: str, error: ValueError) -> InputError:
+    """Return the error of a gear that makes no ratio; the core's text counts the free speeds."""
+    what, remedy = (
+        f"gear {gear} of {gearbox.name}: {error}",
+        "correct the gear's elements in the card",
+    )
+    counted = _FREE_SPEEDS.search(str(error))
+    if counted and int(counted[1]) > 1:
+        return NoFixedRatioError(what, f"{remedy}, or {POWER_SPLIT_REMEDY}")
+    return InputError(what, remedy)
+
+
+_ROUND_OFF = 1e-9
+"""Torque or speed per unit at the input that counts as none."""
+
+
+def _check_freewheels(gearbox: Gearbox, statics: GearStatics) -> None:
+    """Refuse a gear in which a freewheel drives backwards or overruns forwards."""
+    for name in gearbox.freewheels:
+        element = gearbox.elements[name]
+        a, b = (0.0 if end == GROUND else statics.speeds[end] for end in (element.a, element.b))
+        if name in statics.elements:
+            pushed = statics.get_torque(name, element.b) - statics.get_torque(name, element.a)
+            fault = f"would have to take torque from {element.b}" if pushed < -_ROUND_OFF else ""
+        else:
+            slip = 0.0 if a is None or b is None else a - b
+            fault = f"would block {element.a} against {element.b}" if slip > _ROUND_OFF else ""
+        if fault:
+            raise InputError(
+                f"gear {statics.gear} of {gearbox.name}: the freewheel {name} {fault}",
+                f"swap the members of elements.{name}: the first drives the second forward; a "
+                "single member cannot turn backwards",
+            )

@@ -14,6 +14,7 @@ import numpy as np
 
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox.drive import Drive
+from drivetwin.gearbox.gears import solve_gear
 from drivetwin.gearbox.reduction import Reduction
 from drivetwin.gearbox.spec import Capacity
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
@@ -88,9 +89,10 @@ class Maneuver:
 def plan(reduction: Reduction, drive: Drive) -> Maneuver:
     """Plan the reference shift.
 
-    Raises ReductionError where it cannot be: an element without capacity, or gears of opposite
-    sense.
+    Raises ReductionError where it cannot be: an element without capacity, an open converter, or
+    gears of opposite sense.
     """
+    _require_lock_up(reduction)
     old, new = reduction.off_going, reduction.on_coming
     step = new.ratio / old.ratio
     if step <= 0.0 or abs(step - 1.0) < 1e-6:
@@ -99,6 +101,12 @@ def plan(reduction: Reduction, drive: Drive) -> Maneuver:
             "choose two gears of the same sense and of different ratios",
         )
     upshift = step < 1.0
+    freewheels = [name for name in reduction.common if name in reduction.gearbox.freewheels]
+    if freewheels and not upshift:
+        raise ReductionError(
+            f"the freewheel {freewheels[0]} opens in a coasting down-shift",
+            "choose an up-shift, or gears that a clutch or brake holds instead",
+        )
     torque = drive.engine_torque if upshift else drive.overrun_torque
     inertia = drive.engine_inertia + reduction.M11
     vehicle = reduction.M22 + drive.vehicle_inertia / drive.i_f**2
@@ -125,6 +133,19 @@ def plan(reduction: Reduction, drive: Drive) -> Maneuver:
         release=LEAD_IN + drive.torque_phase,
         lock=LEAD_IN + drive.torque_phase + phase,
     )
+
+
+def _require_lock_up(reduction: Reduction) -> None:
+    """Raise ReductionError if the converter is open in one of the two gears."""
+    gearbox = reduction.gearbox
+    for gear in (reduction.from_gear, reduction.to_gear):
+        if solve_gear(gearbox, gear).speeds[gearbox.engine_member] is None:
+            raise ReductionError(
+                f"the converter of {gearbox.name} is open in gear {gear}: the engine does not turn "
+                "with the input",
+                "list a lock-up clutch between pump and turbine in the elements of both gears, or "
+                "simulate the network of drivetwin.gearbox.build_network_elements",
+            )
 
 
 def build_signals(reduction: Reduction, maneuver: Maneuver) -> tuple[Signal, Mapping[str, Signal]]:

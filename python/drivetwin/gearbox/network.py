@@ -7,9 +7,9 @@ import json
 from collections.abc import Collection, Iterator
 from dataclasses import asdict
 
-from drivetwin.gearbox.spec import Capacity, ElementKind, Gearbox, ShiftMember
+from drivetwin.gearbox.spec import CONVERTER, Capacity, ElementKind, Gearbox, ShiftMember
 from drivetwin.simulation.dual_clutch import FrictionTable
-from drivetwin.simulation.network import Element
+from drivetwin.simulation.network import Element, build_element
 
 _NO_CAPACITY = Capacity(gain=0.0, P0=0.0, peak=1.0, friction=FrictionTable((0.0,), (0.0,)))
 
@@ -19,12 +19,13 @@ def build_network_elements(
 ) -> tuple[Element, ...]:
     """Return the gearbox as elements of the core, its members as nodes.
 
-    Every friction element has a pressure input [Pa] of its own name. Dogs that are in
-    `engaged_dogs` become rigid and the others are left out; without it, all stay as elements
-    without capacity, for the study of gears.
+    Every clutch and brake has a pressure input [Pa] of its own name, freewheels have none. Dogs
+    that are in `engaged_dogs` become rigid and the others are left out; without it, all stay as
+    elements without capacity, for the study of gears.
     """
     return (
         *_build_gearing(gearbox),
+        *_build_converter(gearbox),
         *(
             _build_inertia(member, inertia)
             for member, inertia in gearbox.inertias.items()
@@ -59,11 +60,21 @@ def _build_gearing(gearbox: Gearbox) -> list[Element]:
     return [*sets, *pairs]
 
 
+def _build_converter(gearbox: Gearbox) -> list[Element]:
+    stage = gearbox.converter
+    if stage is None:
+        return []
+    ends = {"pump": stage.pump, "turbine": gearbox.input}
+    return [build_element("torque_converter", CONVERTER, **ends, map=asdict(stage.map))]
+
+
 def _build_shift_elements(
     gearbox: Gearbox, engaged_dogs: Collection[str] | None
 ) -> Iterator[Element]:
     for element in gearbox.elements.values():
-        if engaged_dogs is None or element.kind is not ElementKind.DOG:
+        if element.kind is ElementKind.FREEWHEEL:
+            yield build_element("one_way_clutch", element.name, a=element.a, b=element.b)
+        elif engaged_dogs is None or element.kind is not ElementKind.DOG:
             yield _build_friction(element)
         elif element.name in engaged_dogs:
             yield _build_rigid_coupling(element)

@@ -5,14 +5,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from drivetwin._util.toml import StrictModel
 from drivetwin.channels.units import BAR, RPM
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.spec import (
     GROUND,
+    POWER_SPLIT_REMEDY,
     Capacity,
+    ConverterStage,
     ElementKind,
     GearEntry,
     GearPair,
@@ -20,6 +22,7 @@ from drivetwin.gearbox.spec import (
     ShiftMember,
 )
 from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.vehicle.converter import ConverterTable
 
 Name = Annotated[str, Field(min_length=1)]
 Teeth = Annotated[int, Field(ge=1)]
@@ -115,9 +118,12 @@ class FrictionEntry(StrictModel):
 
 
 class ElementTable(StrictModel):
-    """`[elements.<name>]`: a clutch or dog between two members, a brake on one."""
+    """`[elements.<name>]`: a clutch or dog between two members, a brake on one, a freewheel.
 
-    kind: Literal["clutch", "brake", "dog"]
+    The first member of a freewheel drives the second forward; a single one cannot turn backwards.
+    """
+
+    kind: Literal["clutch", "brake", "dog", "freewheel"]
     members: list[Name] = Field(min_length=1, max_length=2)
     surfaces: int | None = Field(default=None, ge=1)
     derating: float = Field(default=1.0, gt=0, le=1)
@@ -136,6 +142,11 @@ class ElementTable(StrictModel):
         geometry = (self.surfaces, self.area_m2, self.radius_m)
         if self.kind == "dog" and any(part is not None for part in geometry):
             raise ValueError("a dog never slips under load and has no surfaces, area or radius")
+        if self.kind == "freewheel" and any(part is not None for part in geometry):
+            raise ValueError(
+                "a freewheel has no surfaces, area or radius; a clutch beside it is an element of "
+                "its own"
+            )
         if None in geometry and any(part is not None for part in geometry):
             raise ValueError("surfaces, area_m2 and radius_m belong together")
         return self
@@ -143,6 +154,8 @@ class ElementTable(StrictModel):
     def to_spec(self, name: str, friction: FrictionEntry | None) -> ShiftMember:
         """Return the element in SI; `friction` is the card's common law."""
         members = [*self.members, GROUND]
+        if self.kind == "freewheel" and len(self.members) == 1:
+            members.reverse()
         law = self.friction or friction
         capacity = None
         if self.surfaces and self.area_m2 and self.radius_m and law is not None:
@@ -214,6 +227,17 @@ class DriveTable(StrictModel):
         )
 
 
+class ConverterStageTable(ConverterTable):
+    """`[converter]`: the map of a torque converter and its members; the turbine is the input."""
+
+    pump: Name
+    turbine: Name
+
+    def to_stage(self) -> ConverterStage:
+        """Return the converter in SI."""
+        return ConverterStage(self.pump, self.to_spec())
+
+
 class GearboxFile(StrictModel):
     """A gearbox card."""
 
@@ -228,3 +252,11 @@ class GearboxFile(StrictModel):
     inertia_kgm2: dict[str, Annotated[float, Field(ge=0)]] = Field(default_factory=dict)
     friction: FrictionEntry | None = None
     drive: DriveTable | None = None
+    converter: ConverterStageTable | None = None
+
+    @field_validator("input", "output", mode="before")
+    @classmethod
+    def _refuse_power_split(cls, member: object) -> object:
+        if isinstance(member, list):
+            raise ValueError(f"a card has one input and one output; {POWER_SPLIT_REMEDY}")
+        return member

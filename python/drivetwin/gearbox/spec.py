@@ -12,21 +12,30 @@ import numpy as np
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import CardError, InputError, ReductionError
 from drivetwin.gearbox.drive import Drive
+from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 
 GROUND = "ground"
 """The member that does not turn: the housing."""
+CONVERTER = "converter"
+"""Name of the converter among the elements of the network."""
+POWER_SPLIT_REMEDY = (
+    "build a power split, which has no fixed ratio, as a network with drivetwin.Model "
+    "(docs/howto/build-a-model.md)"
+)
 
 
 class ElementKind(StrEnum):
     """Type of a shift element.
 
     `DOG` stands for dog clutches and synchronisers: engaged without slip, never under load.
+    `FREEWHEEL` engages by itself: its side `a` drives `b` forward and cannot overrun it.
     """
 
     CLUTCH = "clutch"
     BRAKE = "brake"
     DOG = "dog"
+    FREEWHEEL = "freewheel"
 
 
 @dataclass(frozen=True)
@@ -73,9 +82,9 @@ class Capacity:
 
 @dataclass(frozen=True)
 class ShiftMember:
-    """A shift element between members `a` and `b` (`ground` for a brake).
+    """A shift element between members `a` and `b` (`ground` is `b` of a brake).
 
-    `capacity` is None where the card states no geometry, as for dogs.
+    `capacity` is None where the card states no geometry, as for dogs and freewheels.
     """
 
     name: str
@@ -103,11 +112,20 @@ class GearEntry:
 
 
 @dataclass(frozen=True)
+class ConverterStage:
+    """A torque converter between the member `pump` and the input of the gearbox."""
+
+    pump: str
+    map: Converter
+
+
+@dataclass(frozen=True)
 class Gearbox:
     """A gearbox between the members `input` and `output`.
 
     Members rigidly connected carry one name. `inertias` [kg m^2] by member; `source` names where
-    the numbers come from; `drive` is the engine and vehicle that shifts are studied in.
+    the numbers come from; `drive` is the engine and vehicle that shifts are studied in. With a
+    `converter` the engine is on its pump, and ratios are counted from the turbine, the input.
     """
 
     name: str
@@ -120,6 +138,7 @@ class Gearbox:
     inertias: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
     drive: Drive | None = None
+    converter: ConverterStage | None = None
 
     def require_drive(self) -> Drive:
         """Return the drive; raises CardError where the card has none."""
@@ -144,7 +163,7 @@ class Gearbox:
     def get_capacity(self, element: str) -> Capacity:
         """Return the torque capacity of an element.
 
-        Raises ReductionError for a dog and where the card states no capacity.
+        Raises ReductionError for a dog, a freewheel and where the card states no capacity.
         """
         capacity = self.elements[element].capacity
         if element in self.dogs:
@@ -152,6 +171,13 @@ class Gearbox:
                 f"element {element} of {self.name} is a dog: it states no capacity and never slips "
                 "under load",
                 "choose a shift between clutches and brakes",
+            )
+        if element in self.freewheels:
+            raise ReductionError(
+                f"element {element} of {self.name} is a freewheel: no pressure engages or releases "
+                "it",
+                "choose a shift between clutches and brakes, or simulate the network of "
+                "drivetwin.gearbox.build_network_elements",
             )
         if capacity is None:
             raise ReductionError(
@@ -163,4 +189,28 @@ class Gearbox:
     @property
     def dogs(self) -> tuple[str, ...]:
         """Names of the dog clutches."""
-        return tuple(e.name for e in self.elements.values() if e.kind is ElementKind.DOG)
+        return self._list_elements(ElementKind.DOG)
+
+    @property
+    def freewheels(self) -> tuple[str, ...]:
+        """Names of the freewheels."""
+        return self._list_elements(ElementKind.FREEWHEEL)
+
+    def _list_elements(self, kind: ElementKind) -> tuple[str, ...]:
+        return tuple(e.name for e in self.elements.values() if e.kind is kind)
+
+    @property
+    def engine_member(self) -> str:
+        """Member that the engine drives: the pump of the converter, or else the input."""
+        return self.input if self.converter is None else self.converter.pump
+
+    def require_pressed_alone(self, purpose: str) -> None:
+        """Raise InputError if the card has a converter or freewheels, which `purpose` lacks."""
+        parts = [f"the freewheel {name}" for name in self.freewheels]
+        parts += [] if self.converter is None else ["a converter"]
+        if parts:
+            raise InputError(
+                f"{self.name} has {', '.join(parts)}: {purpose} knows clutches and brakes alone",
+                "leave these out of the card, or build the whole driveline as a network with "
+                "drivetwin.gearbox.build_network_elements and drivetwin.Model",
+            )

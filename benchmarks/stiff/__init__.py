@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Stiff linear drivelines against implicit integrators, in one run."""
