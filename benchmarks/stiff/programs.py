@@ -7,6 +7,7 @@ import importlib
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -77,7 +78,7 @@ def _prepare_scipy(
 
     def run() -> FloatArray | None:
         jacobian = (lambda _time, _state: A) if method == "LSODA" else A
-        options = {"rtol": tolerance, "atol": tolerance, "jac": jacobian}
+        options: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "jac": jacobian}
         done = solve_ivp(rates, span, start, method, TIME, **options)
         return done.y[: len(problem.heavy)].T if done.success else None
 
