@@ -7,7 +7,7 @@ import importlib
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -19,6 +19,8 @@ from drivetwin.simulation.network import Output, simulate
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 """Relative and absolute tolerances of the other programs."""
 _STEPS = 1_000_000
+Method = Literal["LSODA", "Radau"]
+_METHODS: tuple[Method, ...] = ("LSODA", "Radau")
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,7 @@ def list_entries(problem: Problem) -> list[Entry]:
     entries = [Entry(problem, "drivetwin", "called from Python", _prepare_core(problem))]
     for tolerance in TOLERANCES:
         setting = f"rtol {tolerance:g}"
-        for method in ("LSODA", "Radau"):
+        for method in _METHODS:
             run = _prepare_scipy(problem, method, tolerance)
             entries.append(Entry(problem, f"SciPy {method}", setting, run))
         if has_sundials():
@@ -68,7 +70,7 @@ def _interpolate(time: float) -> float:
 
 
 def _prepare_scipy(
-    problem: Problem, method: str, tolerance: float
+    problem: Problem, method: Method, tolerance: float
 ) -> Callable[[], FloatArray | None]:
     A, b = problem.build_system()
     span, start = (0.0, float(TIME[-1])), np.zeros(len(A))
