@@ -3,32 +3,32 @@
 
 from __future__ import annotations
 
-import gc
-
 import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.time_steps import compute_median_step, is_time_axis, remember_for_stamps
+from drivetwin._util.time_steps import (
+    compute_median_step,
+    is_time_axis,
+    remember_for_arrays,
+)
 
 
-def test_a_result_is_kept_as_long_as_the_stamps() -> None:
-    calls: list[int] = []
+def test_a_result_is_kept_as_long_as_all_arrays() -> None:
+    """An array in the place of one that is gone is not taken for it."""
+    calls: list[float] = []
 
-    @remember_for_stamps
-    def count(time: FloatArray) -> int:
-        calls.append(time.size)
-        return time.size
+    @remember_for_arrays
+    def add(time: FloatArray, values: FloatArray) -> float:
+        calls.append(float(time[0] + values[0]))
+        return calls[-1]
 
-    for size in (20_000, 30_000):
-        time = np.arange(float(size))
-        assert count(time) == count(time) == size
-        del time
-        gc.collect()
-    assert calls == [20_000, 30_000]
-    short = np.arange(3.0)
-    assert count(short) == count(short) == 3
-    assert calls[2:] == [3, 3]
+    time = np.zeros(5)
+    for value in range(50):
+        values = np.full(5, float(value))
+        assert add(time, values) == add(time, values) == value
+        del values
+    assert calls == list(range(50))
 
 
 def test_the_median_step_is_that_of_the_array() -> None:

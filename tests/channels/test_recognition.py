@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drivetwin.channels.name_table import normalise_name
 from drivetwin.channels.read_options import Column
@@ -143,3 +145,19 @@ def test_hints_name_the_reason() -> None:
     assert found[0] == "Actual_Eng_Percent_Torque"
     assert "reference torque" in found[1]
     assert find_hints(some, "gear") == {}
+
+
+def test_a_file_of_many_columns_is_searched_as_a_small_one() -> None:
+    """Names that no role can have are left out before the search."""
+    others = columns([f"{word}{k}" for k in range(500) for word in ("Signal", "mot", "c0_x", "tc")])
+    found = infer_candidates([*others, *columns(["EngTrq", "log.SpdIn", "PrsBrk02"])], ELEMENTS)
+    assert found == {
+        "engine_torque": columns(["EngTrq"]),
+        "input_speed": columns(["log.SpdIn"]),
+        "pressure.B2": columns(["PrsBrk02"]),
+    }
+
+
+@given(st.lists(st.sampled_from(["tc", "t", "act", "c", "9"]), min_size=1, max_size=40))
+def test_long_rows_of_short_words_are_read_in_no_time(words: list[str]) -> None:
+    infer_candidates(columns(["".join(words) + "?" + "q"]), ELEMENTS)

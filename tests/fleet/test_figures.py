@@ -38,6 +38,7 @@ def one() -> JointEstimate:
 
 def test_every_log_is_drawn_and_the_line_goes_through_the_reference(one: JointEstimate) -> None:
     figure = plot_drift(one)
+    assert len(figure.to_plotly().data) == len(figure.data)
     traces = {trace.name: trace for trace in figure.data}
     assert list(traces["log"].x) == [0.0, 50.0]
     assert list(traces["unit that changed, from there"].x) == [150.0]

@@ -58,6 +58,8 @@ def test_energy_closes_from_the_written_columns(motion: DriveRun) -> None:
 
 def test_figures_show_display_units_and_all_elements(motion: DriveRun) -> None:
     whole = plot_motion(motion)
+    for figure in (whole, plot_energy(motion)):
+        assert len(figure.to_plotly().data) == len(figure.data)
     assert {"engine", "speed ratio", "lock-up", "direct"} <= {trace.name for trace in whole.data}
     engine = next(trace for trace in whole.data if trace.name == "engine")
     assert max(engine.y) == pytest.approx(motion.engine_speed.max() * 30.0 / np.pi, rel=1e-6)

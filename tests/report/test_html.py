@@ -87,6 +87,16 @@ def test_figures_are_json_with_units_on_their_axes(page: str) -> None:
     assert any("[rpm]" in title for title in titles)
 
 
+def test_plotly_knows_every_entry_of_the_figures(found: Identification) -> None:
+    """The page has what plotly.js is not told to be wrong; its Python library refuses it."""
+    blocks = [one for section in build_report_sections(found, log()) for one in section.blocks]
+    figures = [one.figure for one in blocks if isinstance(one, FigureBlock)]
+    for figure in figures:
+        drawn = figure.to_plotly()
+        assert len(drawn.data) == len(figure.data)
+        assert drawn.layout.height == figure.layout.height
+
+
 def test_equal_inputs_give_equal_text(page: str, found: Identification) -> None:
     assert render_report(found, log()) == page
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import plotly.graph_objects as go
 import pytest
 from rich.text import Text
 
@@ -38,6 +37,7 @@ from drivetwin.export.subject import Subject
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 from drivetwin.logs.write import write_log
+from drivetwin.report.figure import Figure
 from drivetwin.report.html import render_page
 from drivetwin.report.notebook import Summary, Table
 from drivetwin.report.sections.blocks import Cell, FigureBlock, NotesBlock, Section, TableBlock
@@ -202,7 +202,7 @@ def test_modelica(text: str) -> None:
 
 @hostile
 def test_html(text: str) -> None:
-    figure = go.Figure(layout={"title": {"text": text}})
+    figure = Figure(layout={"title": {"text": text}})
     blocks = (
         NotesBlock(text, (text,)),
         TableBlock(text, (Cell(text),), ((Cell(text),),)),

@@ -1,55 +1,53 @@
 # SPDX-License-Identifier: MIT
-"""Properties of stamps, computed once for the channels of a table that share them."""
+"""Properties of stamps and records that are computed once, and kept as long as their arrays."""
 
 from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
 from functools import wraps
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 
-_LEAST = 10_000
-"""Samples from which a result is worth to be kept."""
-
 LONGEST_SPAN = 1e10
 """Longest time [s] that a record may span: 300 years, more than any clock of a logger shows."""
 
+P = ParamSpec("P")
 Result = TypeVar("Result")
 
 
-def remember_for_stamps(function: Callable[[FloatArray], Result]) -> Callable[[FloatArray], Result]:
-    """Keep the result of a function of long stamps as long as their array exists.
+def remember_for_arrays(function: Callable[P, Result]) -> Callable[P, Result]:
+    """Keep the result of a function of arrays as long as these exist.
 
-    Nobody may change the array.
+    Nobody may change the arrays, and the result must not refer to them. Arrays are passed by
+    position.
     """
-    known: dict[int, tuple[weakref.ref[FloatArray], Result]] = {}
+    known: dict[tuple[int, ...], tuple[tuple[weakref.ref[object], ...], Result]] = {}
 
     @wraps(function)
-    def remembered(time: FloatArray) -> Result:
-        if time.size < _LEAST:
-            return function(time)
-        key = id(time)
+    def remembered(*arrays: P.args, **none: P.kwargs) -> Result:
+        key = tuple(map(id, arrays))
         found = known.get(key)
-        if found is not None and found[0]() is time:
+        if found is not None:
             return found[1]
-        result = function(time)
-        known[key] = (weakref.ref(time, lambda _: known.pop(key, None)), result)
+        result = function(*arrays, **none)
+        references = tuple(weakref.ref(one, lambda _: known.pop(key, None)) for one in arrays)
+        known[key] = references, result
         return result
 
     return remembered
 
 
-@remember_for_stamps
+@remember_for_arrays
 def compute_median_step(time: FloatArray) -> float:
     """Return the median distance [s] of the stamps `time` (n,), n > 1."""
     return float(np.median(np.diff(time)))
 
 
-@remember_for_stamps
+@remember_for_arrays
 def is_time_axis(time: FloatArray) -> bool:
     """Return whether the stamps `time` (n,) [s] span a time that a record can have.
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import find_true_runs
-from drivetwin._util.time_steps import is_time_axis
+from drivetwin._util.time_steps import is_time_axis, remember_for_arrays
 from drivetwin.channels.knot_fit import (
     ROUND_OFF,
     Interpolant,
@@ -115,6 +115,7 @@ _DEVIATION = 0.4
 """Distance of samples from their line, over the bends that rounding makes: one step."""
 
 
+@remember_for_arrays
 def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     """Find the measured samples of a channel that was filled up.
 

@@ -8,6 +8,7 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 from pydantic import Field
@@ -39,12 +40,13 @@ class NameTable:
     """Words by kind, regular expression of the names of each role, and its hints.
 
     All are in the form of `normalise_name`. `hints` are reasons by name: names of quantities that
-    are related to the role but not the same.
+    are related to the role but not the same. `vocabulary` are all words and whole names.
     """
 
     words: Mapping[str, tuple[str, ...]]
     patterns: Mapping[str, str]
     hints: Mapping[str, Mapping[str, str]]
+    vocabulary: frozenset[str]
 
     def make_alternatives(self, kind: str, least: int = 1) -> str:
         """Return the expression of the words of a kind that have at least `least` letters."""
@@ -72,6 +74,12 @@ def load_name_table() -> NameTable:
             role: {normalise_name(hint.name): hint.why for hint in one.hints}
             for role, one in file.roles.items()
         },
+        vocabulary=frozenset(
+            chain(
+                *words.values(),
+                (normalise_name(name) for one in file.roles.values() for name in one.names),
+            )
+        ),
     )
 
 

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from itertools import chain
 
 from drivetwin.channels.name_table import NameTable, load_name_table, normalise_name
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
@@ -38,11 +39,18 @@ def infer_candidates(
             for element, kind in elements.items()
         },
     }
-    wholes = [normalise_name(column.name) for column in columns]
-    parts = [normalise_name(re.split(r"[./]", column.name)[-1]) for column in columns]
-    added = {role: "|".join(map(normalise_name, some)) for role, some in (names or {}).items()}
+    own = {role: [*map(normalise_name, some)] for role, some in (names or {}).items()}
+    words = _Vocabulary({*table.vocabulary, *_list_element_words(elements), *chain(*own.values())})
+    wholes = [(column, normalise_name(column.name)) for column in columns]
+    parts = [
+        (column, normalise_name(re.split(r"[./]", column.name)[-1]))
+        for column in columns
+        if "." in column.name or "/" in column.name
+    ]
+    spelled = [[one for one in some if words.can_spell(one[1])] for some in (wholes, parts)]
+    added = {role: "|".join(some) for role, some in own.items()}
     found = {
-        role: _select_first_match(columns, (wholes, parts), filter(None, (added.get(role), *some)))
+        role: _select_first_match(spelled, filter(None, (added.get(role), *some)))
         for role, some in forms.items()
     }
     return {
@@ -72,20 +80,49 @@ def _drop_secondary(candidates: list[Column]) -> list[Column]:
 
 
 def _select_first_match(
-    columns: Sequence[Column], spellings: Iterable[Sequence[str]], forms: Iterable[str]
+    spellings: Iterable[Sequence[tuple[Column, str]]], forms: Iterable[str]
 ) -> list[Column]:
     """Return the columns that match the first pattern of `forms` that matches any column.
 
-    Of the `spellings` of all columns the second, the last part of a name like `log.EngTrq`, counts
+    Of the `spellings` of the columns the second, the last part of a name like `log.EngTrq`, counts
     only where no whole name matches.
     """
     patterns = [re.compile(form) for form in forms]
     for texts in spellings:
         for form in patterns:
-            matches = zip(columns, texts, strict=True)
-            if found := [column for column, text in matches if form.fullmatch(text)]:
+            if found := [column for column, text in texts if form.fullmatch(text)]:
                 return found
     return []
+
+
+class _Vocabulary:
+    """Words that the names of all roles consist of; most columns of a large file have others."""
+
+    def __init__(self, words: Set[str]) -> None:
+        self._words = words
+        self._lengths = sorted({len(word) for word in words if word})
+
+    def can_spell(self, text: str) -> bool:
+        """Return True if the text is a row of words."""
+        reached, ends = 0, [0]
+        while reached < len(ends):
+            start = ends[reached]
+            reached += 1
+            if start == len(text):
+                return True
+            for length in self._lengths:
+                end = start + length
+                if end <= len(text) and end not in ends and text[start:end] in self._words:
+                    ends.append(end)
+        return False
+
+
+def _list_element_words(elements: Iterable[str]) -> Iterator[str]:
+    """List the words of elements in names of pressures: labels and numbers."""
+    yield "0"
+    for element in elements:
+        label = normalise_name(element)
+        yield from (label, re.sub(r"\D", "", label))
 
 
 def _list_forms(pattern: str, table: NameTable) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.rich_display import DisplayMixin
-from drivetwin._util.time_steps import compute_median_step
+from drivetwin._util.time_steps import compute_median_step, remember_for_arrays
 from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.pressure_roles import make_pressure_role
@@ -30,6 +30,7 @@ step is this quantile: the median may be the short one of two that alternate, as
 message."""
 
 
+@remember_for_arrays
 def compute_gap_limit(time: FloatArray) -> float:
     """Return the longest pause [s] between samples at `time` (n,) that is not a gap."""
     if time.size < 2:

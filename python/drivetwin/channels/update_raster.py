@@ -19,7 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.time_steps import compute_median_step, is_time_axis, remember_for_stamps
+from drivetwin._util.time_steps import (
+    compute_median_step,
+    is_time_axis,
+    remember_for_arrays,
+)
 
 MIN_CHANGES = 10
 """Fewer changes of value cannot prove a raster."""
@@ -95,6 +99,7 @@ def find_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | None:
     return raster
 
 
+@remember_for_arrays
 def _find_stamp_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | None:
     """Find the raster by the stamps; None if there is none."""
     changes = time[1:][_find_changes(time, values)]
@@ -120,7 +125,7 @@ def _find_stamp_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | N
     return best
 
 
-@remember_for_stamps
+@remember_for_arrays
 def _mean_step(time: FloatArray) -> float:
     """Compute the mean sample interval [s] without pauses: jitter of stamps moves a median."""
     steps = np.diff(time)
@@ -132,7 +137,7 @@ def _find_changes(time: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
     return np.asarray((values[1:] != values[:-1]) & _follow_at_once(time))
 
 
-@remember_for_stamps
+@remember_for_arrays
 def _follow_at_once(time: FloatArray) -> NDArray[np.bool_]:
     """Mark samples (n-1,), without the first one, that do not come after a pause."""
     return np.asarray(np.diff(time) <= _PAUSE * compute_median_step(time))
@@ -232,6 +237,7 @@ def _match_updates(
     return samples, count[there][which]
 
 
+@remember_for_arrays
 def find_updates(
     time: FloatArray, values: FloatArray
 ) -> tuple[FloatArray, NDArray[np.intp]] | None:
@@ -299,6 +305,7 @@ _LARGER = 0.2
 goes stair by stair where it does not change with each sample."""
 
 
+@remember_for_arrays
 def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None:
     """Estimate the period [s] at which repeated values are updated.
 

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
     from drivetwin.channels.mapping import Mapped
     from drivetwin.logs.raw import Recording
-    from drivetwin.logs.survey import Survey
+    from drivetwin.logs.survey import Column, Survey
     from drivetwin.vehicle.card import VehicleCard
 
 
@@ -95,7 +97,7 @@ def inspect(
         remarks = {"findings": dump_findings(seen.findings), "refusal": error}
         print_json(found.to_document() | remarks)
         return
-    print_table(_build_table([column.to_document() for column in found.columns], log.name))
+    _print_columns(found.columns, log.name)
     for text in found.notes:
         print_paragraph(text)
     if found.unitless:
@@ -187,22 +189,41 @@ def _read_as_mapped_log(
     return found.findings, refusal, "identify refuses"
 
 
-def _build_table(columns: list[dict[str, Any]], source: str) -> Table:
+_MOST_ROWS = 1000
+"""Columns without a role that the table lists at most."""
+
+
+def _select_shown(columns: Sequence[Column]) -> list[Column]:
+    """Return the columns of the table: all with a role, and the first ones without."""
+    free = (k for k, column in enumerate(columns) if not column.roles)
+    last = next(islice(free, _MOST_ROWS, None), len(columns))
+    return [column for k, column in enumerate(columns) if k < last or column.roles]
+
+
+def _print_columns(columns: Sequence[Column], source: str) -> None:
+    shown = _select_shown(columns)
+    print_table(_build_table(shown, source))
+    if len(shown) < len(columns):
+        more = len(columns) - len(shown)
+        print_paragraph(f"{more} more columns, all without a role: --json lists them")
+
+
+def _build_table(columns: Sequence[Column], source: str) -> Table:
     table = make_table(
         f"Columns of {source}", "column", "group", "unit", "Hz", "min", "max", "gaps", "role",
         right=("Hz", "min", "max", "gaps"),
     )  # fmt: skip
     for column in columns:
-        low, high = column["range"] or (None, None)
+        low, high = column.range or (None, None)
         table.add_row(
-            column["name"],
-            column["group"],
-            column["unit"] or "none",
-            _format_cell(column["rate"]),
+            column.name,
+            column.group,
+            column.unit or "none",
+            _format_cell(column.rate),
             _format_cell(low),
             _format_cell(high),
-            str(column["gaps"]),
-            ", ".join(column["roles"]) or "-",
+            str(column.gaps),
+            ", ".join(column.roles) or "-",
         )
     return table
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from drivetwin._util.display_units import get_display_unit
@@ -13,6 +12,7 @@ from drivetwin.fleet.mixed_model.mixed import FloatArray
 from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, UnitValue
 from drivetwin.fleet.readings import format_reading, to_datetime
 from drivetwin.fleet.rules import is_date
+from drivetwin.report.figure import Figure
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, make_axis, make_layout
 
@@ -20,7 +20,7 @@ _MOST_POINTS = 4000
 _BAND = "rgba(213,94,0,0.18)"
 
 
-def plot_drift(one: JointEstimate) -> go.Figure:
+def plot_drift(one: JointEstimate) -> Figure:
     """Every log over the first field, with the shared line, its 95 % band, changes and outliers.
 
     Of very many logs every n-th is drawn.
@@ -31,7 +31,7 @@ def plot_drift(one: JointEstimate) -> go.Figure:
     after = _mask_after_change(one) & ~out
     stride = -(-points.value.size // _MOST_POINTS)
     kept = np.arange(0, points.value.size, stride)
-    figure = go.Figure()
+    figure = Figure()
     for name, picked, colour, symbol in (
         ("log", kept[~(out | after)[kept]], MEASURED, "circle"),
         ("unit that changed, from there", kept[after[kept]], SECOND, "circle"),
@@ -52,7 +52,7 @@ def plot_drift(one: JointEstimate) -> go.Figure:
     for change in one.changes:
         place = _convert_readings(drift.field, np.array([0.5 * (change.before + change.after)]))[0]
         figure.add_vline(x=place, line={"color": SECOND, "width": 1.5, "dash": "dash"})
-    figure.update_layout(
+    figure.set_layout(
         make_layout(
             380,
             xaxis=make_axis(drift.field),
@@ -73,7 +73,7 @@ def _mask_after_change(one: JointEstimate) -> NDArray[np.bool_]:
     return found
 
 
-def _add_line(figure: go.Figure, one: JointEstimate, drift: Drift) -> None:
+def _add_line(figure: Figure, one: JointEstimate, drift: Drift) -> None:
     """The shared line through the reference, and the band of its level and slope together."""
     display = get_display_unit(one.si_unit)
     ends = np.linspace(np.min(one.points.reading), np.max(one.points.reading), 41)
@@ -101,11 +101,11 @@ def _add_line(figure: go.Figure, one: JointEstimate, drift: Drift) -> None:
     )
 
 
-def plot_units(one: JointEstimate) -> go.Figure:
+def plot_units(one: JointEstimate) -> Figure:
     """Plot the sorted deviations of the units with 95 % intervals; highlight the outliers."""
     display = get_display_unit(one.si_unit)
     units = sorted(one.units, key=lambda unit: unit.deviation)
-    figure = go.Figure()
+    figure = Figure()
     for odd, colour, name in ((False, MEASURED, "unit"), (True, ACCENT, "beyond chance")):
         picked = [(k, unit) for k, unit in enumerate(units) if unit.odd is odd]
         if not picked:
@@ -127,7 +127,7 @@ def plot_units(one: JointEstimate) -> go.Figure:
         )
     few = len(units) <= 80
     ticks = [format_unit(one, unit) for unit in units] if few else None
-    figure.update_layout(
+    figure.set_layout(
         make_layout(
             340,
             xaxis=make_axis(

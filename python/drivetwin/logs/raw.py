@@ -16,8 +16,10 @@ from typing import Protocol
 import numpy as np
 
 from drivetwin._util.time_steps import compute_median_step
+from drivetwin.channels.filling import Filling, find_filling
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray, compute_gap_limit
+from drivetwin.channels.update_raster import UpdateRaster, find_raster
 from drivetwin.errors import DamagedChannelError, Where
 
 MIN_SAMPLES = 10
@@ -59,6 +61,16 @@ class RawChannel:
         """Samples per second; None below two samples."""
         step = self.step
         return 1.0 / step if step is not None and step > 0.0 else None
+
+    @property
+    def raster(self) -> UpdateRaster | None:
+        """Update raster of the column; None if each sample may be an update."""
+        return find_raster(self.time, self.values)
+
+    @property
+    def filling(self) -> Filling | None:
+        """Measured samples of a column that was filled up; None if each sample may be measured."""
+        return find_filling(self.time, self.values) if self.raster is None else None
 
     @property
     def range(self) -> tuple[float, float] | None:

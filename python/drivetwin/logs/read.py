@@ -11,14 +11,15 @@ from pathlib import Path
 
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
+from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.recall import recall_options
 from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
-from drivetwin.channels.units import find_unit, list_first_spellings, resolve_channel_unit
+from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
+from drivetwin.channels.units import Unit, find_unit, list_first_spellings, resolve_channel_unit
 from drivetwin.errors import (
     DamagedChannelError,
     DrivetwinError,
@@ -40,11 +41,7 @@ from drivetwin.logs.quality.consistency_checks import (
 )
 from drivetwin.logs.quality.time_alignment import check_speed_clocks
 from drivetwin.logs.quality.torque_delay import check_torque_delays
-from drivetwin.logs.quality.update_raster import (
-    find_raster,
-    mark_late_samples,
-    replace_filling,
-)
+from drivetwin.logs.quality.update_raster import mark_late_samples, replace_filling
 from drivetwin.logs.raw import RawChannel, RawLog, Recording, Window
 from drivetwin.vehicle.card import VehicleCard
 
@@ -312,27 +309,46 @@ def _load_column(recording: Recording, spec: ChannelSpec) -> int:
     return min(picked, key=lambda one: recording.columns[one].empty)
 
 
-def _convert_channel(role: str, spec: ChannelSpec, source: RawChannel, file: str) -> Channel:
-    quantity = get_quantity(role)
-    unit_text = spec.unit if spec.unit is not None else source.unit
-    unit = resolve_channel_unit(unit_text, quantity, Where(file=file, channel=spec.source))
-    return Channel(
-        role=role,
-        quantity=quantity,
-        time=source.time if spec.time_shift == 0.0 else source.time + spec.time_shift,
-        values=unit.to_si(spec.sign * (spec.scale * source.values + spec.offset)),
-        source_name=source.name,
-        source_unit=unit_text or "",
-    )
+@dataclass(frozen=True)
+class _Conversion:
+    """Conversion of a column by its `spec`; the result is in the SI unit of `unit`."""
+
+    spec: ChannelSpec
+    unit: Unit
+
+    def convert_time(self, time: FloatArray) -> FloatArray:
+        return time if self.spec.time_shift == 0.0 else time + self.spec.time_shift
+
+    def convert_values(self, values: FloatArray) -> FloatArray:
+        return self.unit.to_si(self.spec.sign * (self.spec.scale * values + self.spec.offset))
+
+    def convert_filling(self, filling: Filling) -> Filling:
+        time, values = self.convert_time(filling.time), self.convert_values(filling.values)
+        return replace(filling, time=time, values=values)
 
 
 def _make_checked_channel(role: str, spec: ChannelSpec, raw: RawChannel, file: str) -> Checked:
     """Return the checked channel of a role, and its findings."""
     place = Where(channel=raw.name)
     notes = [report(Code.RECORDING, "", place, text=note) for note in raw.notes]
-    channel, filled = replace_filling(_convert_channel(role, spec, raw, file))
+    quantity = get_quantity(role)
+    unit = spec.unit if spec.unit is not None else raw.unit
+    where = Where(file=file, channel=spec.source)
+    conversion = _Conversion(spec, resolve_channel_unit(unit, quantity, where))
+    channel = Channel(
+        role=role,
+        quantity=quantity,
+        time=conversion.convert_time(raw.time),
+        values=conversion.convert_values(raw.values),
+        source_name=raw.name,
+        source_unit=unit or "",
+    )
+    computed = quantity in AUXILIARY or get_command_element(role) is not None
+    filling = None if computed else raw.filling
+    measured = None if filling is None else conversion.convert_filling(filling)
+    channel, filled = replace_filling(channel, measured)
     found = check_channel(channel, file)
-    held = channel.filling is None and find_raster(found.channel) is not None
+    held = channel.filling is None and found.channel.raster is not None
     findings = (*notes, *_check_unit_override(spec, raw), *filled, *found.findings)
     return Checked(replace(found.channel, held=held), findings)
 

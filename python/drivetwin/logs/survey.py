@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from drivetwin._util.time_steps import remember_for_arrays
 from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.filling import Filling, FillKind, find_filling
+from drivetwin.channels.filling import Filling, FillKind
 from drivetwin.channels.mapping import Mapped, make_spec, select_free
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.recognition import infer_candidates
 from drivetwin.channels.roles import NEEDED, get_quantity
-from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.channels.shiftlog import FloatArray, Quantity
 from drivetwin.errors import DamagedChannelError
-from drivetwin.logs.quality.update_raster import find_raster
 from drivetwin.logs.raw import RawChannel, Recording
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -41,7 +41,7 @@ class Column:
 
     def to_document(self) -> dict[str, Any]:
         """For JSON and tables."""
-        return asdict(self)
+        return dict(vars(self))
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def survey_recording(
         roles = tuple(role for role, found in candidates.items() if column in found)
         try:
             channel = recording.load(index)
-            filling = _find_filling(channel)
+            filling = channel.filling if _is_rising(channel.time) else None
             looked.append(_make_column(column, channel, filling, roles))
             if filling is not None and column not in mapped:
                 filled.append(_describe_filling(column, filling))
@@ -145,14 +145,6 @@ def _make_column(
     )
 
 
-def _find_filling(channel: RawChannel) -> Filling | None:
-    """Return the filling of a column that is evenly and often enough sampled."""
-    sent = _make_channel(channel)
-    if sent is None or find_raster(sent) is not None:
-        return None
-    return find_filling(sent.time, sent.values)
-
-
 def _describe_filling(column: LogColumn, filling: Filling) -> str:
     if filling.kind is FillKind.UNKNOWN:
         return f"{column}: filled up by interpolation; the measured samples cannot be found"
@@ -167,16 +159,13 @@ def _estimate_update_rate(channel: RawChannel) -> float | None:
     step = channel.step
     if step is None or step <= 0.0:
         return None
-    sent = _make_channel(channel)
-    raster = None if sent is None else find_raster(sent)
+    raster = channel.raster if _is_rising(channel.time) else None
     return 1.0 / (step if raster is None else raster.period)
 
 
-def _make_channel(channel: RawChannel) -> Channel | None:
-    """Build a channel of a column; None without rising time stamps."""
-    if not np.isfinite(channel.time).all() or not np.all(np.diff(channel.time) > 0.0):
-        return None
-    return Channel("", Quantity.FRACTION, channel.time, channel.values, channel.name, "")
+@remember_for_arrays
+def _is_rising(time: FloatArray) -> bool:
+    return bool(np.isfinite(time).all() and np.all(np.diff(time) > 0.0))
 
 
 def _describe_open_roles(

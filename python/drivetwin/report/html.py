@@ -10,7 +10,6 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.progress import notify_progress, scale_progress
@@ -18,6 +17,7 @@ from drivetwin._util.visible_text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.report.embedded_data import Store, encode_content
+from drivetwin.report.figure import Entry, encode_entries
 from drivetwin.report.sections.actuators import build_actuator_section
 from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.report.sections.identifiability import build_limits_section
@@ -121,29 +121,29 @@ def save_library(path: Path) -> None:
 
 
 def _load_encoded_library() -> str:
-    return encode_content(get_plotlyjs().encode())
+    return encode_content(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes())
 
 
 def encode_figure(block: FigureBlock, store: Store) -> Markup:
     """JSON of a figure, safe inside a script element: traces, layout, zooms, and of a figure over
     time the numbers of each curve's times and values in `store`."""
-    figure = json.loads(block.figure.to_json())
-    menus = figure["layout"].pop("updatemenus", [])
-    buttons = [button for menu in menus for button in menu["buttons"]]
+    layout = dict(block.figure.layout)
+    menus = layout.pop("updatemenus", [])
+    buttons = [button for menu in menus for button in menu.buttons]
     curves = [
         (store.add_time(curve.time), store.add_values(panel.display.to_display(curve.values)))
         for panel in block.panels
         for curve in panel.curves
     ]
-    for trace in figure["data"][: len(curves)]:
-        del trace["x"], trace["y"]
+    count = len(curves)
+    stored = [{**trace, "x": None, "y": None} for trace in block.figure.data[:count]]
     if buttons:
-        figure["layout"]["margin"]["t"] = _BELOW_BUTTONS
+        layout["margin"] = {**layout["margin"], "t": _BELOW_BUTTONS}
     return _encode_json(
         {
-            "data": figure["data"],
-            "layout": figure["layout"],
-            "zooms": [{"label": one["label"], "change": one["args"][0]} for one in buttons],
+            "data": encode_entries([*map(Entry, stored), *block.figure.data[count:]]),
+            "layout": encode_entries(layout),
+            "zooms": [{"label": one.label, "change": one.args[0]} for one in buttons],
             "curves": curves,
             "link": block.link,
         }

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
+from typing import TYPE_CHECKING
 
 import numpy as np
-import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
@@ -19,12 +19,16 @@ from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.findings import render
 from drivetwin.report.data_frames import make_frame
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.comparison import plot_friction_overlay
 from drivetwin.report.figures.parameters import plot_intervals
 from drivetwin.report.figures.recording import QUANTITIES, plot_log
 from drivetwin.report.figures.validation import plot_validation
 from drivetwin.report.labels import get_channel_label, get_channel_unit
 from drivetwin.twin.twin import Twin
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
 
 __all__ = ["Summary", "Table", "draw_figure", "make_frame", "summarise"]
 
@@ -95,9 +99,13 @@ def _format_html(table: Table) -> str:
     return f"<table><thead><tr>{cells(table.head, 'th')}</tr></thead><tbody>{rows}</tbody></table>"
 
 
-@singledispatch
 def draw_figure(thing: object) -> go.Figure:
     """Figure of a result; TypeError for what has none."""
+    return _plot(thing).to_plotly()
+
+
+@singledispatch
+def _plot(thing: object) -> Figure:
     raise TypeError(f"no figure of a {type(thing).__name__}")
 
 
@@ -107,24 +115,24 @@ def summarise(thing: object) -> Summary:
     raise TypeError(f"no summary of a {type(thing).__name__}")
 
 
-@draw_figure.register
-def _(log: ShiftLog) -> go.Figure:
+@_plot.register
+def _(log: ShiftLog) -> Figure:
     return plot_log(log)
 
 
-@draw_figure.register
-def _(found: Identification) -> go.Figure:
+@_plot.register
+def _(found: Identification) -> Figure:
     validations = found.evidence.validation
     return plot_validation(validations[0]) if validations else plot_intervals(found.estimates)
 
 
-@draw_figure.register
-def _(twin: Twin) -> go.Figure:
+@_plot.register
+def _(twin: Twin) -> Figure:
     return plot_friction_overlay("the element", twin.friction, list(twin.friction))
 
 
-@draw_figure.register
-def _(validation: Validation) -> go.Figure:
+@_plot.register
+def _(validation: Validation) -> Figure:
     return plot_validation(validation)
 
 

@@ -8,11 +8,10 @@ from dataclasses import replace
 from enum import StrEnum
 from itertools import pairwise
 
-import plotly.graph_objects as go
-
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.findings import Code, report
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.shift_phases import plot_shift_phases
 from drivetwin.report.style import ACCENT, MUTED
 from drivetwin.shifts.quality import compute_shift_quality
@@ -125,10 +124,10 @@ def _check_times(log: ShiftLog, times: Mapping[Boundary, float]) -> None:
         )
 
 
-def plot_phases(log: ShiftLog, shift: Shift) -> go.Figure:
+def plot_phases(log: ShiftLog, shift: Shift) -> Figure:
     """The shift with a line at each boundary, to be dragged; the other shapes stay in place."""
     figure = plot_shift_phases(log, shift)
-    figure.update_layout(xaxis={"uirevision": f"{shift.start_gear}-{shift.end_gear}"})
+    figure.merge_layout(xaxis={"uirevision": f"{shift.start_gear}-{shift.end_gear}"})
     for one, time in get_boundary_times(shift).items():
         outer = one in (Boundary.START, Boundary.END)
         figure.add_shape(
@@ -145,7 +144,7 @@ def plot_phases(log: ShiftLog, shift: Shift) -> go.Figure:
     return figure
 
 
-def parse_drag(figure: go.Figure, change: Mapping[str, object]) -> dict[Boundary, float]:
+def parse_drag(figure: Figure, change: Mapping[str, object]) -> dict[Boundary, float]:
     """Boundaries that a relayout event of the `plot_phases` has moved, with their time [s]."""
     found: dict[Boundary, float] = {}
     for index, shape in enumerate(figure.layout.shapes):

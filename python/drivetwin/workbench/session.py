@@ -13,8 +13,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any
 
-import plotly.graph_objects as go
-
 from drivetwin._util.atomic import write_text
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.log_survey import LogSurvey
@@ -25,6 +23,7 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
 from drivetwin.logs.formats.parser_limits import BASE_TIME, compute_parser_limits
+from drivetwin.report.figure import Figure
 from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
 from drivetwin.workbench.card_form import CardForm
@@ -48,7 +47,7 @@ class Live:
 
     identified: Validation
     present: Validation
-    figure: go.Figure
+    figure: Figure
 
 
 @dataclass(eq=False)

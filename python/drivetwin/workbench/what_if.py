@@ -9,13 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import plotly.graph_objects as go
-
 from drivetwin._util.display_units import Display, get_display_unit
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.decimate import decimate_around
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import build_validation_panels
 from drivetwin.report.labels import get_parameter_name
@@ -132,15 +131,15 @@ def simulate_changes(
     return rerun_shift(before, _apply_delays(twin, changes), log, model)
 
 
-def plot_what_if(identified: Validation, present: Validation) -> go.Figure:
+def plot_what_if(identified: Validation, present: Validation) -> Figure:
     """Simulation over measurement; where parameters are changed also the one as identified."""
     panels = [_add_identified(panel, identified) for panel in build_validation_panels(present)]
     figure = stack_panels(panels, present.phases, height=_HEIGHT)
-    figure.update_layout(uirevision=make_link(present.shift))
+    figure.merge_layout(uirevision=make_link(present.shift))
     return figure
 
 
-def collect_changed_curves(figure: go.Figure, present: Validation) -> dict[int, dict[str, Any]]:
+def collect_changed_curves(figure: Figure, present: Validation) -> dict[int, dict[str, Any]]:
     """Collect new x and y of the traces of `plot_what_if` that follow the sliders, by trace index.
 
     They are packed (`dtype`, `bdata` in base64), as formatting digits would take half of the time.

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.channels.filling import find_filling
 from drivetwin.channels.shiftlog import Channel, Quantity
-from drivetwin.findings import Code
+from drivetwin.findings import Code, Finding
 from drivetwin.logs.quality.update_raster import replace_filling
 
 
@@ -27,10 +28,14 @@ def make_channel(knots: FloatArray) -> Channel:
     )
 
 
+def replace_found(channel: Channel) -> tuple[Channel, list[Finding]]:
+    return replace_filling(channel, find_filling(channel.time, channel.values))
+
+
 def test_measured_samples_replace_a_filled_channel() -> None:
     """The channel keeps its knots, and the finding states their period."""
     knots = np.arange(0.0, 5.0, 0.01)
-    channel, findings = replace_filling(make_channel(knots))
+    channel, findings = replace_found(make_channel(knots))
     assert [one.code for one in findings] == [Code.CHANNEL_FILLED]
     assert channel.time == pytest.approx(knots[1:491], abs=1e-12)
 
@@ -39,13 +44,13 @@ def test_a_filling_without_knots_is_named() -> None:
     """Messages two to four rows apart leave too few straight parts; the channel stays as it is."""
     knots = 1e-3 * np.cumsum(np.random.default_rng(4).uniform(2.0, 4.0, 1700))
     filled = make_channel(knots)
-    channel, findings = replace_filling(filled)
+    channel, findings = replace_found(filled)
     assert [one.code for one in findings] == [Code.FILLING_UNKNOWN]
     assert channel.time is filled.time
 
 
 def test_a_measured_channel_stays_as_it_is() -> None:
     """Noise at each row."""
-    channel, findings = replace_filling(make_channel(np.arange(0.0, 5.0, 1e-3)))
+    channel, findings = replace_found(make_channel(np.arange(0.0, 5.0, 1e-3)))
     assert findings == []
     assert channel.filling is None

@@ -25,7 +25,7 @@ from tests.report.sample import SHIFT, TIME, log, validation
 def test_panels_share_time_and_do_not_overlap() -> None:
     figure = plot_shift_phases(log(), SHIFT)
     assert {trace.xaxis for trace in figure.data} == {"x"}
-    names = [name for name in figure.layout.to_plotly_json() if name.startswith("yaxis")]
+    names = [name for name in figure.layout if name.startswith("yaxis")]
     domains = sorted(tuple(figure.layout[name].domain) for name in names)
     assert all(low[1] < high[0] for low, high in pairwise(domains))
     assert (domains[0][0], domains[-1][1]) == pytest.approx((0.0, 1.0))
@@ -91,7 +91,7 @@ def test_what_hardly_moves_is_not_blown_up() -> None:
 def test_an_empty_view_has_no_range() -> None:
     panels = [Panel("torque", NM, [Curve("T", TIME, np.full_like(TIME, np.nan), MEASURED)])]
     assert compute_y_ranges(panels, (0.0, 2.0)) == {}
-    assert "range" not in plot_over_time_axis(panels, (0.0, 2.0), 300).layout.yaxis.to_plotly_json()
+    assert "range" not in plot_over_time_axis(panels, (0.0, 2.0), 300).layout.yaxis
 
 
 def test_late_in_a_long_recording_samples_keep_their_distance() -> None:

@@ -30,7 +30,6 @@ from drivetwin.logs.quality.outliers import (
     find_stale,
     find_stuck,
 )
-from drivetwin.logs.quality.update_raster import find_raster
 from drivetwin.logs.raw import MIN_SAMPLES
 
 MIN_SOUND = 0.5
@@ -259,7 +258,7 @@ def _check_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -
     """Apply `look` to the updated samples of a channel; include the samples that repeat them."""
     fresh = channel.fresh
     found = look(fresh)
-    if found is None or find_raster(channel) is None:
+    if found is None or channel.raster is None:
         return found
     update = np.searchsorted(fresh.time, channel.time, side="right") - 1
     return Damage(found.mask[np.clip(update, 0, None)], found.code)

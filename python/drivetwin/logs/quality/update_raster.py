@@ -8,11 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.channels.filling import FillKind, find_filling
-from drivetwin.channels.pressure_roles import get_command_element
+from drivetwin.channels.filling import Filling, FillKind
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel
-from drivetwin.channels.update_raster import UpdateRaster
 from drivetwin.findings import Code, Finding, Number, report
 
 _COARSE = 2.1e-3
@@ -20,20 +18,11 @@ _COARSE = 2.1e-3
 rows of 2 ms, however their stamps are rounded, its time is known to a millisecond and better."""
 
 
-def find_raster(channel: Channel) -> UpdateRaster | None:
-    """Return the update raster of a channel; None if each sample may be an update."""
-    return channel.raster
+def replace_filling(channel: Channel, filling: Filling | None) -> tuple[Channel, list[Finding]]:
+    """Reduce a channel that was filled up to its measured samples; return it and findings.
 
-
-def replace_filling(channel: Channel) -> tuple[Channel, list[Finding]]:
-    """Reduce a channel that another tool filled up to its measured samples; return it and findings.
-
-    Comes before all other checks, which know the noise of measured samples only.
+    Comes before all other checks, which assume the noise of measured samples.
     """
-    computed = channel.quantity in AUXILIARY or get_command_element(channel.role) is not None
-    if computed or find_raster(channel) is not None:
-        return channel, []
-    filling = find_filling(channel.time, channel.values)
     if filling is None:
         return channel, []
     if filling.kind is FillKind.UNKNOWN:

@@ -6,8 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from drivetwin._util.display_units import BAR, NM, Display, get_display_unit
 from drivetwin.calibration.calibrate import Assessment, Calibration
@@ -15,6 +13,7 @@ from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import Statistic
 from drivetwin.calibration.scenarios import Scenarios
+from drivetwin.report.figure import Entry, Figure, make_subplots, make_trace
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import ACCENT, MEASURED, MUTED, SIMULATED, make_axis, make_layout
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
@@ -40,7 +39,7 @@ class _Band:
     high: FloatArray
 
 
-def plot_profiles(found: Calibration) -> go.Figure:
+def plot_profiles(found: Calibration) -> Figure:
     """Profiles before and after, with acceleration and slip over the spread band."""
     panels = build_profile_panels(found)
     return plot_over_time_axis(panels, compute_full_range(panels), 820)
@@ -75,12 +74,12 @@ def build_profile_panels(found: Calibration) -> list[Panel]:
     ]
 
 
-def plot_distributions(found: Calibration) -> go.Figure:
+def plot_distributions(found: Calibration) -> Figure:
     """Histogram of each metric before and after over the fresh draws; limits as lines."""
     names = list(Metric)
     rows = -(-len(names) // _COLUMNS)
     titles = [f"{METRICS[one].label} [{get_metric_display(one).label}]" for one in names]
-    figure = make_subplots(rows=rows, cols=_COLUMNS, subplot_titles=titles)
+    figure = make_subplots(_COLUMNS * [1.0], rows * [1.0], gaps=(0.1, 0.3 / rows), titles=titles)
     for k, metric in enumerate(names):
         place = {"row": k // _COLUMNS + 1, "col": k % _COLUMNS + 1}
         for part, one in (("before", found.before), ("after", found.after)):
@@ -91,9 +90,9 @@ def plot_distributions(found: Calibration) -> go.Figure:
                 at = limit.bound * get_metric_display(metric).factor
                 dash = "dash" if limit.statistic is Statistic.MEAN else "solid"
                 figure.add_vline(x=at, line={"color": MEASURED, "dash": dash}, **place)
-    figure.update_layout(make_layout(210 * rows, barmode="overlay"))
-    figure.update_layout(margin={"t": 70}, legend={"y": 1.04})
-    figure.update_yaxes(make_axis("", showticklabels=False))
+    figure.merge_layout(**make_layout(210 * rows, barmode="overlay"))
+    figure.merge_layout(margin={"t": 70}, legend={"y": 1.04})
+    figure.update_axes("y", make_axis("", showticklabels=False))
     return figure
 
 
@@ -103,8 +102,9 @@ def get_metric_display(metric: Metric) -> Display:
     return _SECONDS if unit == "s" else get_display_unit(unit)
 
 
-def _build_histogram(name: str, values: FloatArray, *, listed: bool) -> go.Histogram:
-    return go.Histogram(
+def _build_histogram(name: str, values: FloatArray, *, listed: bool) -> Entry:
+    return make_trace(
+        "histogram",
         x=values.astype("float32"),
         name=name,
         nbinsx=60,

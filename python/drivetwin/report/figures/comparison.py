@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.report.figure import Figure, make_trace
 from drivetwin.report.figures.friction import draw_band
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import OUTPUTS
@@ -20,14 +20,14 @@ _ROW = 0.7
 """Share of the height of a row that the candidates of one parameter take up."""
 
 
-def plot_agreement(names: Sequence[str], found: Sequence[Agreement]) -> go.Figure:
+def plot_agreement(names: Sequence[str], found: Sequence[Agreement]) -> Figure:
     """Deviation of each candidate from the common mean, with 95 % intervals, by parameter.
 
     In standard deviations of the parameter (the median of the candidates'), so that narrow and wide
     ones read alike. Parameters that cannot be judged are left out; `names` are the candidates'.
     """
     shown = [one for one in found if one.apart is not None]
-    figure = go.Figure()
+    figure = Figure()
     for k, name in enumerate(names):
         style = get_candidate_style(k)
         points = [
@@ -55,10 +55,12 @@ def plot_agreement(names: Sequence[str], found: Sequence[Agreement]) -> go.Figur
         "ticktext": [get_parameter_label(one.id) for one in shown],
         "range": [len(shown) - 0.4, -0.6],
     }
-    figure.layout = make_layout(
-        120 + (18 + 12 * len(names)) * len(shown),
-        xaxis=make_axis("deviation from the common mean, with 95 % interval [σ]"),
-        yaxis=make_axis("", **ticks),
+    figure.set_layout(
+        make_layout(
+            120 + (18 + 12 * len(names)) * len(shown),
+            xaxis=make_axis("deviation from the common mean, with 95 % interval [σ]"),
+            yaxis=make_axis("", **ticks),
+        )
     )
     figure.add_vline(x=0.0, line={"color": "rgba(128,128,128,0.7)", "width": 1})
     return figure
@@ -76,12 +78,12 @@ def _standardise(one: Agreement, k: int) -> tuple[float, float]:
 
 def plot_friction_overlay(
     element: str, curves: Mapping[str, FrictionCurve], order: Sequence[str]
-) -> go.Figure:
+) -> Figure:
     """μ over slip of one element as each candidate has it, with 95 % bands.
 
     `curves` by name of the candidate; `order` are all candidates, which gives each its colour.
     """
-    figure = go.Figure()
+    figure = Figure()
     for name, curve in curves.items():
         style = get_candidate_style(order.index(name))
         figure.add_trace(draw_band(curve, style.fill, legendgroup=name, showlegend=False))
@@ -93,16 +95,18 @@ def plot_friction_overlay(
             legendgroup=name,
             line={"color": style.colour, "width": 2.0, "dash": style.dash},
         )
-    figure.layout = make_layout(
-        400,
-        xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
-        yaxis=make_axis("friction coefficient μ [–]"),
-        hovermode="x",
+    figure.set_layout(
+        make_layout(
+            400,
+            xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
+            yaxis=make_axis("friction coefficient μ [–]"),
+            hovermode="x",
+        )
     )
     return figure
 
 
-def plot_trial(trial: Trial, order: Sequence[str]) -> go.Figure:
+def plot_trial(trial: Trial, order: Sequence[str]) -> Figure:
     """One shift as measured and as each candidate simulates it, residuals below."""
     panels = build_trial_panels(trial, order)
     phases = next(iter(trial.runs.values())).phases
@@ -134,10 +138,11 @@ def build_trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
 
 def plot_fit_matrix(
     rows: Sequence[str], columns: Sequence[str], percent: Sequence[Sequence[float | None]]
-) -> go.Figure:
+) -> Figure:
     """Fit [%] of the output torque: candidates over the logs that they simulate."""
-    figure = go.Figure(
-        go.Heatmap(
+    figure = Figure(
+        make_trace(
+            "heatmap",
             x=list(columns),
             y=list(rows),
             z=[[np.nan if value is None else value for value in row] for row in percent],
@@ -150,9 +155,11 @@ def plot_fit_matrix(
             hovertemplate="%{y} on %{x}: %{text} %<extra></extra>",
         )
     )
-    figure.layout = make_layout(
-        130 + 34 * len(rows),
-        xaxis=make_axis("log and shift", ticks="", side="top"),
-        yaxis=make_axis("", ticks="", autorange="reversed"),
+    figure.set_layout(
+        make_layout(
+            130 + 34 * len(rows),
+            xaxis=make_axis("log and shift", ticks="", side="top"),
+            yaxis=make_axis("", ticks="", autorange="reversed"),
+        )
     )
     return figure

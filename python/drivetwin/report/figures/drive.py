@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-import plotly.graph_objects as go
 
 from drivetwin._util.display_units import BAR, NM, RPM, Display
 from drivetwin.drive.result import DriveRun, Maneuver
+from drivetwin.report.figure import Figure, make_trace
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import (
     ACCENT,
@@ -29,7 +29,7 @@ _BEFORE, _AFTER = 0.1, 0.6
 """Time before and after a shift in its figure, s."""
 
 
-def plot_motion(run: DriveRun) -> go.Figure:
+def plot_motion(run: DriveRun) -> Figure:
     """Speeds, torques, converter and pressures over the whole drive."""
     panels = build_motion_panels(run)
     return plot_over_time_axis(panels, compute_full_range(panels), 760)
@@ -56,7 +56,7 @@ def build_motion_panels(run: DriveRun) -> list[Panel]:
     ]
 
 
-def plot_maneuver(run: DriveRun, maneuver: Maneuver) -> go.Figure:
+def plot_maneuver(run: DriveRun, maneuver: Maneuver) -> Figure:
     """One shift: input speed, output torque, pressures and friction power of both elements."""
     panels = build_maneuver_panels(run, maneuver)
     return plot_over_time_axis(panels, compute_full_range(panels), 560)
@@ -77,11 +77,12 @@ def build_maneuver_panels(run: DriveRun, maneuver: Maneuver) -> list[Panel]:
     ]
 
 
-def plot_energy(run: DriveRun) -> go.Figure:
+def plot_energy(run: DriveRun) -> Figure:
     """Friction work by element and converter heat as bars."""
     parts = {"torque converter": run.audit.converter, **run.work}
-    figure = go.Figure(
-        go.Bar(
+    figure = Figure(
+        make_trace(
+            "bar",
             x=[value / 1e3 for value in parts.values()],
             y=list(parts),
             orientation="h",
@@ -90,7 +91,7 @@ def plot_energy(run: DriveRun) -> go.Figure:
         )
     )
     options = {"xaxis": make_axis("heat [kJ]"), "yaxis": make_axis("", autorange="reversed")}
-    figure.layout = make_layout(120 + 30 * len(parts), **options)
+    figure.set_layout(make_layout(120 + 30 * len(parts), **options))
     return figure
 
 

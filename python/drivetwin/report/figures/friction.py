@@ -6,18 +6,18 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.report.decimate import MAX_POINTS
+from drivetwin.report.figure import Entry, Figure, make_trace
 from drivetwin.report.style import COMPARED, FITTED, MEASURED, make_axis, make_layout
 
 _BAND = "rgba(213,94,0,0.18)"
 
 
-def plot_friction(element: str, curve: FrictionCurve) -> go.Figure:
+def plot_friction(element: str, curve: FrictionCurve) -> Figure:
     """Points, smoothed curve with band, and the fitted Stribeck law of one element."""
-    figure = go.Figure()
+    figure = Figure()
     if curve.points_slip.size:
         stride = -(-curve.points_slip.size // MAX_POINTS)
         figure.add_scatter(
@@ -45,20 +45,25 @@ def plot_friction(element: str, curve: FrictionCurve) -> go.Figure:
             name="Stribeck law",
             line={"color": COMPARED, "width": 1.6, "dash": "dash"},
         )
-    figure.layout = make_layout(
-        420,
-        xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
-        yaxis=make_axis(f"friction coefficient {curve.symbol} [–]", range=_compute_mu_range(curve)),
-        hovermode="x",
+    figure.set_layout(
+        make_layout(
+            420,
+            xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
+            yaxis=make_axis(
+                f"friction coefficient {curve.symbol} [–]", range=_compute_mu_range(curve)
+            ),
+            hovermode="x",
+        )
     )
     return figure
 
 
-def draw_band(curve: FrictionCurve, colour: str, **options: Any) -> go.Scatter:
+def draw_band(curve: FrictionCurve, colour: str, **options: Any) -> Entry:
     """Area between the bounds of a curve; empty if the curve has no bounds."""
     known = np.isfinite(curve.mu_lo) & np.isfinite(curve.mu_hi)
     slip = curve.slip[known]
-    return go.Scatter(
+    return make_trace(
+        "scatter",
         x=np.concatenate((slip, slip[::-1])),
         y=np.concatenate((curve.mu_hi[known], curve.mu_lo[known][::-1])),
         mode="lines",

@@ -4,18 +4,18 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 
 from drivetwin.estimation.linear.load_balance import LoadFit
+from drivetwin.report.figure import Figure
 from drivetwin.report.style import FITTED, MEASURED, make_axis, make_layout
 
 
-def plot_load(fit: LoadFit, final_drive: float | None) -> go.Figure:
+def plot_load(fit: LoadFit, final_drive: float | None) -> Figure:
     """Surplus torque over wheel acceleration, one point per window, with the slope J3/i_f.
 
     Without `final_drive` only the points are drawn.
     """
-    figure = go.Figure()
+    figure = Figure()
     figure.add_scatter(
         x=fit.acceleration,
         y=fit.torque,
@@ -32,9 +32,11 @@ def plot_load(fit: LoadFit, final_drive: float | None) -> go.Figure:
             name=f"J3 = {fit.J_vehicle:.4g} kg·m²",
             line={"color": FITTED, "width": 1.8},
         )
-    figure.layout = make_layout(
-        400,
-        xaxis=make_axis("wheel acceleration ω_w′, window mean [rad/s²]"),
-        yaxis=make_axis("T_o − T_v/i_f, window mean [Nm]"),
+    figure.set_layout(
+        make_layout(
+            400,
+            xaxis=make_axis("wheel acceleration ω_w′, window mean [rad/s²]"),
+            yaxis=make_axis("T_o − T_v/i_f, window mean [Nm]"),
+        )
     )
     return figure

@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from drivetwin.estimation.linear.momentum_balance import MomentumFit
+from drivetwin.report.figure import Figure, make_subplots
 from drivetwin.report.style import (
     COMPARED,
     FITTED,
@@ -15,7 +14,6 @@ from drivetwin.report.style import (
     SECOND,
     make_axis,
     make_layout,
-    merge_layout,
 )
 
 _STRETCHES = {
@@ -29,17 +27,9 @@ _SCAN_VIEW = 0.025
 """Ages shown on either side of the best one [s]."""
 
 
-def plot_momentum(fit: MomentumFit) -> go.Figure:
+def plot_momentum(fit: MomentumFit) -> Figure:
     """Driving against fitted inertia torque, one point per window; what is left; delay scan."""
-    figure = make_subplots(
-        rows=2,
-        cols=2,
-        specs=[[{}, {"rowspan": 2}], [{}, None]],
-        column_widths=[0.64, 0.36],
-        row_heights=[0.62, 0.38],
-        horizontal_spacing=0.12,
-        vertical_spacing=0.2,
-    )
+    figure = make_subplots([0.64, 0.36], [0.62, 0.38], gaps=(0.12, 0.2), tall=[(1, 2)])
     names = np.asarray(fit.stretch)
     for stretch, (label, colour) in _STRETCHES.items():
         inside = names == stretch
@@ -58,8 +48,7 @@ def plot_momentum(fit: MomentumFit) -> go.Figure:
     ends = [float(both.min()), float(both.max())]
     line = {"color": FITTED, "width": 1.6}
     figure.add_scatter(x=ends, y=ends, mode="lines", name="balance", line=line, row=1, col=1)
-    merge_layout(
-        figure,
+    figure.merge_layout(
         **make_layout(560),
         xaxis=make_axis("inertia torque Σ J·ω′, window mean [Nm]"),
         yaxis=make_axis("η·T_e − T_o/i,<br>window mean [Nm]"),
@@ -70,13 +59,12 @@ def plot_momentum(fit: MomentumFit) -> go.Figure:
     return figure
 
 
-def _add_scan(figure: go.Figure, fit: MomentumFit) -> None:
+def _add_scan(figure: Figure, fit: MomentumFit) -> None:
     scan = fit.scan
     shown = np.ones(scan.delay.size, dtype=bool)
     if scan.best is not None:
         shown = np.abs(scan.delay - scan.best) <= _SCAN_VIEW
-    merge_layout(
-        figure,
+    figure.merge_layout(
         xaxis2=make_axis("assumed age of T_e [ms]"),
         yaxis2=make_axis("misfit Q − min Q [–]", rangemode="tozero"),
     )

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, Verdict
+from drivetwin.report.figure import Figure, make_trace
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.style import DIVERGING, MUTED, VERDICT_COLOURS, make_axis, make_layout
 
@@ -16,7 +16,7 @@ _TICKS = [scale * 10.0**power for power in range(-4, 4) for scale in (1.0, 2.0, 
 """Labelled values of the logarithmic axis [%]."""
 
 
-def plot_intervals(estimates: Mapping[str, Estimate]) -> go.Figure:
+def plot_intervals(estimates: Mapping[str, Estimate]) -> Figure:
     """Half width of the 95 % interval relative to the value, total and noise alone, log axis.
 
     Parameters without an interval, design values, and times, which may be zero, are left out.
@@ -28,7 +28,7 @@ def plot_intervals(estimates: Mapping[str, Estimate]) -> go.Figure:
         and one.unit != "s"
         and compute_half_width_percent(one.value, one.std_total) is not None
     ]
-    figure = go.Figure()
+    figure = Figure()
     names = [get_parameter_label(one.id) for one in shown]
     figure.add_scatter(
         y=names,
@@ -46,15 +46,17 @@ def plot_intervals(estimates: Mapping[str, Estimate]) -> go.Figure:
         marker={"color": MUTED, "symbol": "line-ns-open", "size": 12, "line": {"width": 2.5}},
         hovertemplate="%{y}: ±%{x:.2g} % from noise<extra></extra>",
     )
-    figure.layout = make_layout(
-        90 + 26 * len(shown),
-        xaxis=make_axis(
-            "half width of the 95 % interval [% of the value]",
-            type="log",
-            tickvals=_TICKS,
-            ticktext=[f"{tick:g}" for tick in _TICKS],
-        ),
-        yaxis=make_axis("", autorange="reversed"),
+    figure.set_layout(
+        make_layout(
+            90 + 26 * len(shown),
+            xaxis=make_axis(
+                "half width of the 95 % interval [% of the value]",
+                type="log",
+                tickvals=_TICKS,
+                ticktext=[f"{tick:g}" for tick in _TICKS],
+            ),
+            yaxis=make_axis("", autorange="reversed"),
+        )
     )
     return figure
 
@@ -64,7 +66,7 @@ def compute_half_width_percent(value: float | None, std: float | None) -> float 
     return 196.0 * abs(std / value) if value and std else None
 
 
-def plot_correlation(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
+def plot_correlation(ids: Sequence[str], correlation: FloatArray) -> Figure:
     """Correlation matrix (n, n) of the estimates; pairs near ±1 are hard to separate.
 
     A fixed parameter has no correlation and is omitted.
@@ -73,8 +75,9 @@ def plot_correlation(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
     ids = [one for one, kept in zip(ids, shown, strict=True) if kept]
     correlation = correlation[np.ix_(shown, shown)]
     names = [get_parameter_label(one) for one in ids]
-    figure = go.Figure(
-        go.Heatmap(
+    figure = Figure(
+        make_trace(
+            "heatmap",
             x=names,
             y=names,
             z=correlation,
@@ -85,7 +88,9 @@ def plot_correlation(ids: Sequence[str], correlation: FloatArray) -> go.Figure:
             texttemplate="%{z:.2f}",
         )
     )
-    figure.layout = make_layout(
-        140 + 34 * len(ids), xaxis=make_axis(""), yaxis=make_axis("", autorange="reversed")
+    figure.set_layout(
+        make_layout(
+            140 + 34 * len(ids), xaxis=make_axis(""), yaxis=make_axis("", autorange="reversed")
+        )
     )
     return figure

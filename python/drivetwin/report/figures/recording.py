@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import plotly.graph_objects as go
-
 from drivetwin._util.display_units import BAR, NM, RPM, Display
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.shift_phases import get_shift_spans
 from drivetwin.report.figures.stack import (
     Curve,
@@ -36,7 +35,7 @@ QUANTITIES: dict[Quantity, tuple[str, Display]] = {
 _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 
 
-def plot_log(log: ShiftLog, shifts: Sequence[Shift] = ()) -> go.Figure:
+def plot_log(log: ShiftLog, shifts: Sequence[Shift] = ()) -> Figure:
     """All channels by quantity; `shifts` are shaded and named, with a button for each.
 
     A shift is too short in a whole log for the numbers of its phases to stand side by side.

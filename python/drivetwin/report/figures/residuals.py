@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import plotly.graph_objects as go
 
 from drivetwin._util.display_units import Display
 from drivetwin.estimation.likelihood.coloured_noise import compute_block_means
 from drivetwin.estimation.result.estimate import Z95, FloatArray
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, Phases, stack_panels
 from drivetwin.report.labels import get_channel_label
 from drivetwin.report.style import FITTED, MEASURED
@@ -20,7 +20,7 @@ _SIGMA = Display("σ")
 
 def plot_residuals(
     residuals: Mapping[str, tuple[FloatArray, FloatArray]], phases: Phases
-) -> go.Figure:
+) -> Figure:
     """Means of each output's residual over 20 ms blocks; of a right model 95 % lie in ±1.96 σ.
 
     `residuals` are those of one shift, as `compute_white_residuals` gives them.

@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-
 from drivetwin._util.display_units import NM
 from drivetwin.estimation.linear.ringdown import RingDown
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import FITTED, MEASURED, MUTED
 
 
-def plot_ringdown(ring: RingDown) -> go.Figure:
+def plot_ringdown(ring: RingDown) -> Figure:
     """Measured output torque with the extremes read from it, or with the fit and its residual."""
     panels = build_ringdown_panels(ring)
     if not ring.extremes_time.size:
@@ -26,7 +25,9 @@ def plot_ringdown(ring: RingDown) -> go.Figure:
         xaxis="x",
         yaxis="y",
     )
-    return figure.update_traces(showlegend=True)
+    for trace in figure.data:
+        trace["showlegend"] = True
+    return figure
 
 
 def build_ringdown_panels(ring: RingDown) -> list[Panel]:

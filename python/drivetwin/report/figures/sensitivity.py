@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from drivetwin._util.display_units import format_significant, get_display_unit
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
@@ -16,8 +14,9 @@ from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
 )
 from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.figure import Figure, make_subplots, make_trace
 from drivetwin.report.labels import get_channel_symbol, get_channel_unit, get_parameter_label
-from drivetwin.report.style import DIVERGING, make_axis, make_layout, merge_layout
+from drivetwin.report.style import DIVERGING, make_axis, make_layout
 
 _KINDS = {
     "gain": f"gain + {100 * SIZE:g} %",
@@ -29,21 +28,24 @@ _FULL_COLOUR = 3.0
 """Change [% of the value] at which the colour is full; the number stands in the cell."""
 _DOT = 0.05
 """Change below which a dot stands in place of a number."""
+_FOLLOWING = {"matches": "y", "autorange": "reversed", "ticks": "", "showticklabels": False}
+"""Axis of a panel whose rows are those of the first one."""
 _UPRIGHT = 9
 """Letters of a sensor's name that fit above its column; longer ones are turned."""
 
 
-def plot_sensitivity(found: Sensitivity) -> go.Figure:
+def plot_sensitivity(found: Sensitivity) -> Figure:
     """Change of each result [%] by sensor: of gain errors, of offsets, of older values."""
     names = [_format_label(one, found) for one in found.ids]
     change = _scale_changes(found)
     symbols = [get_channel_symbol(error.rsplit(" ", 1)[0]) for error in found.errors]
     angle = -90 if max(map(len, symbols)) > _UPRIGHT else 0
-    figure = make_subplots(cols=len(_KINDS), shared_yaxes=True, horizontal_spacing=0.02)
+    figure = make_subplots(len(_KINDS) * [1.0], gaps=(0.02, 0.0))
     for column, (kind, title) in enumerate(_KINDS.items(), start=1):
         chosen = [k for k, error in enumerate(found.errors) if error.endswith(kind)]
         figure.add_trace(
-            go.Heatmap(
+            make_trace(
+                "heatmap",
                 x=[_describe_sensor(found, k) for k in chosen],
                 y=names,
                 z=np.sign(change[:, chosen]) * np.sqrt(np.abs(change[:, chosen])),
@@ -58,15 +60,15 @@ def plot_sensitivity(found: Sensitivity) -> go.Figure:
             row=1,
             col=column,
         )
-        figure.update_xaxes(make_axis(title, side="top", tickangle=angle, ticks=""), col=column)
-    merge_layout(
-        figure,
+        axis = make_axis(title, side="top", tickangle=angle, ticks="")
+        figure.update_axes("x", axis, col=column)
+    figure.merge_layout(
         **{
             **make_layout(170 + 27 * len(names)),
             "margin": {"l": 70, "r": 20, "t": 80, "b": 20},
             "yaxis": make_axis("", autorange="reversed", ticks=""),
         },
-        **{f"yaxis{k}": {"autorange": "reversed", "ticks": ""} for k in range(2, len(_KINDS) + 1)},
+        **{f"yaxis{k}": _FOLLOWING for k in range(2, len(_KINDS) + 1)},
     )
     return figure
 

@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-
 from drivetwin._util.display_units import BAR, NM, RPM
 from drivetwin.channels.shiftlog import Channel, ShiftLog
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.style import ACCENT, COMPARED, MEASURED, SECOND
 from drivetwin.shifts.shift import Shift
@@ -19,7 +18,7 @@ _SPEEDS = (
 """Speeds of one magnitude share an axis: title, and by role the curve with its colour."""
 
 
-def plot_shift_phases(log: ShiftLog, shift: Shift) -> go.Figure:
+def plot_shift_phases(log: ShiftLog, shift: Shift) -> Figure:
     """Engine torque, pressures, output torque and speeds over time, as measured."""
     panels = build_shift_panels(log, shift)
     return stack_panels(panels, get_shift_spans(shift), height=120 + 130 * len(panels))

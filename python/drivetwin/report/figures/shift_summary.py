@@ -5,16 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import plotly.graph_objects as go
-
 from drivetwin._util.display_units import get_display_unit
+from drivetwin.report.figure import Figure
 from drivetwin.report.style import get_candidate_style, make_axis, make_layout
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 
-def plot_quality(name: str, shifts: Sequence[Shift]) -> go.Figure:
+def plot_quality(name: str, shifts: Sequence[Shift]) -> Figure:
     """One figure of shift quality over the pairs of gears: a point for each shift.
 
     Parameters
@@ -28,7 +27,7 @@ def plot_quality(name: str, shifts: Sequence[Shift]) -> go.Figure:
         shown, key=lambda one: (not one.kind.is_up, len(one.start_gear), one.start_gear)
     )
     order = list(dict.fromkeys(_format_gears(one) for one in by_gear))
-    figure = go.Figure()
+    figure = Figure()
     for k, kind in enumerate(one for one in ShiftKind if any(s.kind is one for s in shown)):
         alike = [one for one in shown if one.kind is kind]
         style = get_candidate_style(k)
@@ -43,11 +42,13 @@ def plot_quality(name: str, shifts: Sequence[Shift]) -> go.Figure:
             f"<extra>{kind.value}</extra>",
         )
     label = name.replace("_", " ")
-    figure.layout = make_layout(
-        300,
-        xaxis=make_axis("gears", type="category", categoryorder="array", categoryarray=order),
-        yaxis=make_axis(f"{label} [{display.label}]", rangemode="tozero"),
-        showlegend=True,
+    figure.set_layout(
+        make_layout(
+            300,
+            xaxis=make_axis("gears", type="category", categoryorder="array", categoryarray=order),
+            yaxis=make_axis(f"{label} [{display.label}]", rangemode="tozero"),
+            showlegend=True,
+        )
     )
     return figure
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from drivetwin._util.display_units import Display
 from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.report.decimate import decimate_around
+from drivetwin.report.figure import Entry, Figure, make_trace
 from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, make_axis, make_layout
 
 Phases = Mapping[str, tuple[float, float]]
@@ -62,7 +62,7 @@ class Panel:
     weight: float = 1.0
 
 
-def stack_panels(panels: Sequence[Panel], phases: Phases, height: int) -> go.Figure:
+def stack_panels(panels: Sequence[Panel], phases: Phases, height: int) -> Figure:
     """Draw panels from top to bottom over a common time axis [s].
 
     `phases` maps `before`, `torque`, `inertia`, `after` to intervals [s]; the view opens on the
@@ -80,14 +80,14 @@ def plot_over_time_axis(
     view: tuple[float, float],
     height: int,
     buttons: Mapping[str, Any] | None = None,
-) -> go.Figure:
+) -> Figure:
     """Draw panels from top to bottom over a common time axis [s] that opens on `view`.
 
     `buttons` are those of `build_zoom_buttons`; None: no buttons.
     """
     domains = _compute_domains([panel.weight for panel in panels])
     ranges = compute_y_ranges(panels, view)
-    traces: list[go.Scatter] = []
+    traces: list[Entry] = []
     options: dict[str, Any] = {}
     for number, (panel, domain) in enumerate(zip(panels, domains, strict=True), start=1):
         suffix = "" if number == 1 else str(number)
@@ -116,7 +116,7 @@ def plot_over_time_axis(
         options["updatemenus"] = [buttons]
     # Given at once: an update of the layout takes plotly as long as ten figures.
     layout = make_layout(height, hovermode="x unified", hoversubplots="axis", **options)
-    return go.Figure(traces, layout)
+    return Figure(traces, layout)
 
 
 def compute_y_ranges(
@@ -161,9 +161,10 @@ def _compute_domains(weights: Sequence[float]) -> list[tuple[float, float]]:
     return domains
 
 
-def _build_trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -> go.Scatter:
+def _build_trace(curve: Curve, panel: Panel, suffix: str, view: tuple[float, float]) -> Entry:
     time, values = decimate_around(curve.time, curve.values, view)
-    return go.Scatter(
+    return make_trace(
+        "scatter",
         x=time.astype("float32" if np.abs(time).max(initial=0.0) < _FINE else "float64"),
         y=panel.display.to_display(values).astype("float32"),
         name=curve.name,
@@ -234,7 +235,7 @@ def build_zoom_buttons(
     }
 
 
-def mark_phases(figure: go.Figure, phases: Phases) -> None:
+def mark_phases(figure: Figure, phases: Phases) -> None:
     """Shade torque and inertia phase and number all four phases above the top panel."""
     shade_phases(figure, phases)
     for phase, (start, end) in phases.items():
@@ -245,7 +246,7 @@ def mark_phases(figure: go.Figure, phases: Phases) -> None:
         write_above(figure, place, PHASE_NUMBER[phase], anchor)
 
 
-def shade_phases(figure: go.Figure, phases: Phases) -> None:
+def shade_phases(figure: Figure, phases: Phases) -> None:
     """Shade torque and inertia phase through all panels."""
     for phase in ("torque", "inertia"):
         start, end = phases[phase]
@@ -263,7 +264,7 @@ def shade_phases(figure: go.Figure, phases: Phases) -> None:
         )
 
 
-def write_above(figure: go.Figure, time: float, text: str, anchor: str = "center") -> None:
+def write_above(figure: Figure, time: float, text: str, anchor: str = "center") -> None:
     """Write a few letters above the top panel at a time [s]."""
     figure.add_annotation(
         x=time,

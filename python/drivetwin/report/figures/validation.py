@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-import plotly.graph_objects as go
 
 from drivetwin._util.display_units import BAR, NM, RPM, Display, scale_display
 from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.estimation.result.validation import SignalTrace, Validation
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import (
     Curve,
     Panel,
@@ -33,7 +33,7 @@ _OVERVIEW = ("output_torque", "input_speed", "output_speed")
 _OVERVIEW_PANELS = 2
 
 
-def plot_validation(validation: Validation) -> go.Figure:
+def plot_validation(validation: Validation) -> Figure:
     """Inputs that drove the model, then each output as measured and as simulated."""
     return stack_panels(build_validation_panels(validation), validation.phases, height=1180)
 
@@ -59,7 +59,7 @@ def build_validation_panels(validation: Validation) -> list[Panel]:
     return panels
 
 
-def plot_overview(validation: Validation) -> go.Figure:
+def plot_overview(validation: Validation) -> Figure:
     """Torque and speed through the shift, simulated over measured."""
     panels = build_overview_panels(validation)
     view = compute_shift_view(validation.phases)
@@ -77,7 +77,7 @@ def build_overview_panels(validation: Validation) -> list[Panel]:
     ]
 
 
-def plot_further_signals(validation: Validation) -> go.Figure:
+def plot_further_signals(validation: Validation) -> Figure:
     """Slip of both shift elements, and the signals that are not part of the fit."""
     panels = build_further_panels(validation)
     height = 110 + 140 * sum(panel.weight for panel in panels)

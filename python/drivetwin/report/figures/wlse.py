@@ -6,11 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from drivetwin.estimation.paper.wlse import GridFit
 from drivetwin.estimation.result.estimate import FloatArray
+from drivetwin.report.figure import Figure, make_subplots
 from drivetwin.report.style import (
     COMPARED,
     FITTED,
@@ -18,7 +17,6 @@ from drivetwin.report.style import (
     MUTED,
     make_axis,
     make_layout,
-    merge_layout,
 )
 
 
@@ -33,9 +31,9 @@ class WlseLabels:
     inertia: str
 
 
-def plot_wlse(fit: GridFit, labels: WlseLabels) -> go.Figure:
+def plot_wlse(fit: GridFit, labels: WlseLabels) -> Figure:
     """Scatter with the fitted line at the best grid value; RMS error over the grid next to it."""
-    figure = make_subplots(cols=2, column_widths=[0.62, 0.38], horizontal_spacing=0.12)
+    figure = make_subplots([0.62, 0.38], gaps=(0.12, 0.0))
     first = fit.rows[0].value
     inside = fit.weights >= 1.0
     groups = (
@@ -83,8 +81,7 @@ def plot_wlse(fit: GridFit, labels: WlseLabels) -> go.Figure:
         row=1,
         col=2,
     )
-    merge_layout(
-        figure,
+    figure.merge_layout(
         **make_layout(430),
         xaxis=make_axis(labels.acceleration),
         yaxis=make_axis(labels.torque),

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-import plotly.graph_objects as go
-
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Panel
 from drivetwin.shifts.shift import Shift
 
@@ -49,7 +48,7 @@ class FigureBlock:
     draws from them. `link` names the figures that zoom together.
     """
 
-    figure: go.Figure
+    figure: Figure
     caption: str
     panels: Sequence[Panel] = ()
     link: str = ""

@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-
 from drivetwin.calibration.certificate import LimitState
 from drivetwin.calibration.front import Front
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import MapPoint, OperatingMap
+from drivetwin.report.figure import Figure, make_trace
 from drivetwin.report.sections.blocks import (
     Block,
     Cell,
@@ -39,10 +38,11 @@ def build_front_section(front: Front | None) -> Section:
     )
 
 
-def plot_front(front: Front) -> go.Figure:
+def plot_front(front: Front) -> Figure:
     """Peak jerk over shift time, both for 95 % of the units, labelled with the energy in kJ."""
-    figure = go.Figure(
-        go.Scatter(
+    figure = Figure(
+        make_trace(
+            "scatter",
             x=[one.time for one in front.points],
             y=[one.jerk for one in front.points],
             text=[f"{1e-3 * one.energy:.0f}" for one in front.points],
@@ -52,9 +52,8 @@ def plot_front(front: Front) -> go.Figure:
             showlegend=False,
         )
     )
-    figure.update_layout(make_layout(380))
-    figure.update_xaxes(make_axis("shift time [s]"))
-    figure.update_yaxes(make_axis("peak jerk [m/s³]"))
+    axes = {"xaxis": make_axis("shift time [s]"), "yaxis": make_axis("peak jerk [m/s³]")}
+    figure.set_layout(make_layout(380, **axes))
     return figure
 
 

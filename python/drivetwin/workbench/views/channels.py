@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Literal
 
-import plotly.graph_objects as go
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import Display
 from drivetwin.logs.survey import Column
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.recording import plot_log
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import MEASURED
@@ -136,7 +136,7 @@ def _register_preview(page: ui.Page) -> None:
         return [graph]
 
 
-def plot_preview(shown: Preview) -> go.Figure:
+def plot_preview(shown: Preview) -> Figure:
     """Draw a column over time in the unit of the file."""
     curve = Curve(shown.name, shown.time, shown.values, MEASURED)
     panels = [Panel(shown.name, Display(shown.unit or "no unit"), [curve])]

@@ -15,12 +15,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
-import plotly.graph_objects as go
 from dash import Dash, Output, State, dcc, html, no_update, set_props
 from dash.dependencies import DashDependency
 from dash.development.base_component import Component
 
 from drivetwin.errors import DrivetwinError, Where
+from drivetwin.report.figure import Figure
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.session_state import SessionState
@@ -235,7 +235,7 @@ def make_hint(text: str) -> Component:
 
 
 def make_graph(
-    id: str, label: str, figure: go.Figure, *, cursors: bool = False, **config: Any
+    id: str, label: str, figure: Figure, *, cursors: bool = False, **config: Any
 ) -> Component:
     """Build a figure; `label` is its description for screen readers.
 
@@ -247,7 +247,7 @@ def make_graph(
         "modeBarButtons": [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
         **config,
     }
-    plot = dcc.Graph(id=id, config=options, figure=figure, className="plot")
+    plot = dcc.Graph(id=id, config=options, figure=figure.to_document(), className="plot")
     parts: list[Component] = [plot]
     if cursors:
         place = make_attributes(data_plot=id, data_label=label)
