@@ -43,10 +43,10 @@ def write_figure(outcome: Outcome, folder: Path) -> Path:
     """Write a page with the validation figure alone."""
     (validation,) = outcome.found.evidence.validation
     figure = plot_validation(validation)
-    figure.update_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white", margin={"t": 30})
-    figure.layout.updatemenus = ()
+    figure.merge_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white", margin={"t": 30})
+    figure.layout.pop("updatemenus")
     path = folder / "figure.html"
-    text = to_html(figure, config={"displayModeBar": False}, default_width=WIDTH)
+    text = to_html(figure.to_plotly(), config={"displayModeBar": False}, default_width=WIDTH)
     path.write_text(f"<style>body {{ margin: 0 }}</style>{text}", encoding="utf-8")
     return path
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.findings import render
-from drivetwin.logs.quality.update_raster import find_raster, mark_late_samples
+from drivetwin.logs.quality.update_raster import mark_late_samples
 
 STEP = 1e-3
 
@@ -95,7 +95,7 @@ def test_a_torque_that_changes_in_bursts_keeps_its_period_through_the_pauses(
         start = 31 + pause * step
         updates[start:] += 20.0
         updates[start : start + length] -= 50.0 * np.exp(-np.arange(length))
-    raster = find_raster(channel(hold(updates, 10)))
+    raster = channel(hold(updates, 10)).raster
     assert raster is not None
     assert raster.period == pytest.approx(0.01, rel=1e-6)
 
@@ -117,17 +117,17 @@ def test_clock_drift_does_not_add_up() -> None:
 def test_a_signal_sampled_at_every_stamp_is_not_held(rounding: float) -> None:
     noise = np.random.default_rng(1).normal(0.0, 5.0, 2000)
     values = rounding * np.round((1000.0 + noise) / rounding)
-    assert find_raster(channel(values)) is None
+    assert channel(values).raster is None
 
 
 def test_a_coarse_slow_signal_without_raster_is_not_held() -> None:
     ramp = np.round(30.0 * np.sin(np.linspace(0.0, 2.0, 4000)) ** 2)
-    assert find_raster(channel(ramp)) is None
+    assert channel(ramp).raster is None
 
 
 def test_constants_and_states_are_not_held() -> None:
-    assert find_raster(channel(np.full(500, 7.0))) is None
-    assert find_raster(channel(hold(wave(50, 1.0), 10), Quantity.STATE)) is None
+    assert channel(np.full(500, 7.0)).raster is None
+    assert channel(hold(wave(50, 1.0), 10), Quantity.STATE).raster is None
 
 
 def test_a_channel_that_is_not_held_stays_as_it_is() -> None:
@@ -142,7 +142,7 @@ def test_a_hole_brings_no_update_and_hides_none() -> None:
     fresh = replace(whole, time=whole.time[keep], values=whole.values[keep]).updates
     expected = np.arange(150) * 0.01
     assert fresh.time == pytest.approx(expected[(expected < 0.4535) | (expected > 0.5365)])
-    assert find_raster(whole) is not None
+    assert whole.raster is not None
 
 
 def between(period: float, step: float, count: int, rounding: float) -> tuple[Channel, FloatArray]:
@@ -176,7 +176,7 @@ def test_changes_by_chance_are_on_no_raster_between_samples(seed: int, step: flo
     values = np.repeat(wave(60, 0.01), gaps)
     chance = channel(values)
     chance = replace(chance, time=np.round(np.arange(values.size) * step, 6))
-    assert find_raster(chance) is None
+    assert chance.raster is None
 
 
 @given(st.integers(0, 740), st.integers(1, 400))

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.logs.quality.update_raster import find_raster
 from tests.channels.test_update_raster import STEP, channel, hold, wave
 
 
@@ -49,7 +48,7 @@ def test_a_coarse_signal_on_uneven_stamps_repeats_nothing() -> None:
     rng = np.random.default_rng(4)
     time = STEP * (np.arange(4000) + 0.4 * rng.uniform(size=4000))
     values = np.round(30.0 * np.sin(np.linspace(0.0, 9.0, 4000)) ** 2)
-    assert find_raster(replace(channel(values), time=time)) is None
+    assert replace(channel(values), time=time).raster is None
 
 
 @given(st.integers(0, 1000))

@@ -20,10 +20,15 @@ COARSE, FULL = 60, 400
 LOWEST = {COARSE: 0.80, FULL: TOO_LOW}
 
 
-def vary_draws(*, short: bool = False) -> pytest.MarkDecorator:
-    """Parametrise a test by `draws`: a coarse case for every run, the full one for its suite."""
-    marks = [pytest.mark.statistical, *([pytest.mark.short] if short else [])]
-    return pytest.mark.parametrize("draws", [COARSE, pytest.param(FULL, marks=marks)])
+def vary_draws(*, short: bool = False, slow: bool = False) -> pytest.MarkDecorator:
+    """Parametrise a test by `draws`: a coarse case for every run, the full one for its suite.
+
+    Of a `slow` test the coarse case is the short one of the suite, with `short` the full one.
+    """
+    suite, brief = pytest.mark.statistical, pytest.mark.short
+    coarse = pytest.param(COARSE, marks=[suite, brief] if slow else [])
+    full = pytest.param(FULL, marks=[suite, brief] if short else [suite])
+    return pytest.mark.parametrize("draws", [coarse, full])
 
 
 def compute_bounds(draws: int, claimed: float = CLAIMED) -> tuple[int, int]:

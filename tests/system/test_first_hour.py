@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
-import sys
+from contextlib import chdir, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from drivetwin.cli import main
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno import dyno
 from drivetwin.dyno.names import ScenarioName
@@ -39,11 +40,10 @@ CARD = (
 
 
 def run_command(folder: Path, *arguments: str) -> str:
-    """Run the program as a user would; return what it printed."""
-    command = [sys.executable, "-m", "drivetwin", *arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    """Run the program in `folder`; return what it printed."""
+    with chdir(folder), redirect_stdout(StringIO()) as printed:
+        assert main(arguments) == 0, arguments
+    return printed.getvalue()
 
 
 def write_bench_export(path: Path) -> dict[str, float]:

@@ -11,43 +11,55 @@ from drivetwin.cli.identify_run import Request, run_identification
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import convert_channels, format_card
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
+from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log
+from drivetwin.vehicle.card import load_card
 
 ROUND_OFF = 1e-9
 """Relative; the files hold the same doubles, and units are converted by one factor."""
 
 
-def results(folder: Path, method: Method) -> dict[str, Identification]:
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """One log by format, with its card beside."""
+    folder = tmp_path_factory.mktemp("formats")
     bench = dyno.run(load_scenario("paper_steps"), seed=4)
-    card = folder / "card.toml"
-    card.write_text(format_card(bench.scenario))
-    found = {}
-    for suffix in ("csv", "mf4", "mat", "parquet"):
-        log = folder / f"log.{suffix}"
-        write_log(log, convert_channels(bench))
-        found[suffix] = run_identification(log, Request(card, None, method)).found
-    return found
+    (folder / "card.toml").write_text(format_card(bench.scenario))
+    paths = {suffix: folder / f"log.{suffix}" for suffix in ("csv", "mf4", "mat", "parquet")}
+    for path in paths.values():
+        write_log(path, convert_channels(bench))
+    return paths
 
 
-def test_the_result_does_not_depend_on_the_format(tmp_path: Path) -> None:
-    first, *others = results(tmp_path, Method.LIKELIHOOD).values()
-    assert first.method is Method.LIKELIHOOD
+def test_every_format_gives_the_same_channels(logs: dict[str, Path]) -> None:
+    first, *others = (read_log(one, load_card(one.with_name("card.toml"))) for one in logs.values())
     for other in others:
         assert render(other.findings) == render(first.findings)
-        assert [s.quality for s in other.shifts] == [
-            pytest.approx(s.quality, rel=ROUND_OFF, abs=ROUND_OFF) for s in first.shifts
-        ]
-        assert other.shifts[0].sigma == pytest.approx(first.shifts[0].sigma, rel=ROUND_OFF)
-        for name, one in first.estimates.items():
-            two = other.estimates[name]
-            assert two.value == pytest.approx(one.value, rel=ROUND_OFF), name
-            assert two.std_total == pytest.approx(one.std_total, rel=ROUND_OFF), name
-            assert two.verdict is one.verdict
-        for element, curve in first.friction.items():
-            assert other.friction[element].mu == pytest.approx(curve.mu, rel=ROUND_OFF)
-        for signal, phases in first.fit.items():
-            for phase, fit in phases.items():
-                assert other.fit[signal][phase].rmse == pytest.approx(fit.rmse, rel=1e-6)
+        assert other.channels.keys() == first.channels.keys()
+        for role, one in first.channels.items():
+            two = other[role]
+            assert two.held == one.held
+            assert two.time == pytest.approx(one.time, rel=ROUND_OFF, abs=ROUND_OFF)
+            assert two.values == pytest.approx(one.values, rel=ROUND_OFF, abs=ROUND_OFF)
+
+
+def test_the_result_does_not_depend_on_the_format(logs: dict[str, Path]) -> None:
+    """By the fast method, which uses every channel; the channels themselves are compared above."""
+    request = Request(logs["csv"].with_name("card.toml"), None, Method.INTEGRAL)
+    first, other = (run_identification(logs[one], request).found for one in ("csv", "mf4"))
+    assert render(other.findings) == render(first.findings)
+    assert other.shifts[0].sigma == pytest.approx(first.shifts[0].sigma, rel=ROUND_OFF)
+    quality = pytest.approx(first.shifts[0].quality, rel=ROUND_OFF, abs=ROUND_OFF)
+    assert other.shifts[0].quality == quality
+    for name, one in first.estimates.items():
+        two = other.estimates[name]
+        assert two.value == pytest.approx(one.value, rel=ROUND_OFF), name
+        assert two.std_total == pytest.approx(one.std_total, rel=ROUND_OFF), name
+        assert two.verdict is one.verdict
+    for element, curve in first.friction.items():
+        assert other.friction[element].mu == pytest.approx(curve.mu, rel=ROUND_OFF)
+    for signal, phases in first.fit.items():
+        for phase, fit in phases.items():
+            assert other.fit[signal][phase].rmse == pytest.approx(fit.rmse, rel=1e-6)

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from drivetwin.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 LOGS = ROOT.parent / "shared" / "logs"
@@ -18,28 +20,27 @@ CARDS = ROOT / "examples" / "vehicles"
 pytestmark = pytest.mark.skipif(not LOGS.is_dir(), reason="the shared logs are not at hand")
 
 
-def _identify(name: str, out: Path) -> dict[str, Any]:
-    """Run the program in a process of its own and return result.json."""
-    command = [
-        sys.executable, "-m", "drivetwin", "identify", str(LOGS / f"{name}.csv"),
-        "--vehicle", str(CARDS / f"{name}.toml"), "-o", str(out),
-    ]  # fmt: skip
-    subprocess.run(command, check=True, capture_output=True)
-    result: dict[str, Any] = json.loads((out / "result.json").read_text())
-    return result
+@cache
+def _identify(name: str) -> tuple[frozenset[str], dict[str, Any]]:
+    """Run the program; return the names of the files that it writes, and result.json."""
+    log, card = LOGS / f"{name}.csv", CARDS / f"{name}.toml"
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        assert main(["identify", str(log), "--vehicle", str(card), "-o", str(out)]) == 0
+        files = frozenset(path.name for path in out.iterdir())
+        return files, json.loads((out / "result.json").read_text())
 
 
 @pytest.mark.parametrize("name", ["truck_a", "paper_like"])
-def test_writes_three_files(name: str, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    result = _identify(name, out)
-    assert {path.name for path in out.iterdir()} == {"result.json", "twin.toml", "report.html"}
+def test_writes_three_files(name: str) -> None:
+    files, result = _identify(name)
+    assert files == {"result.json", "twin.toml", "report.html"}
     assert (result["shifts"][0]["from"], result["shifts"][0]["to"]) == ("2", "3")
     assert result["fit"]["output_torque"]["all"]["fit_percent"] > 80.0
 
 
-def test_paper_like_says_what_its_constant_torque_cannot_tell(tmp_path: Path) -> None:
-    result = _identify("paper_like", tmp_path / "out")
+def test_paper_like_says_what_its_constant_torque_cannot_tell() -> None:
+    _, result = _identify("paper_like")
     for key in ("eta", "J_prime_2"):
         assert "not separately identifiable" in result["parameters"][key]["reason"]
     truth = {"eta": 0.85, "J_prime_2": 17.5, "Tv_over_if": 2300.0, "J_vehicle": 6056.0,

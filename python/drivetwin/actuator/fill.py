@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from math import copysign, inf, sqrt
 
 import numpy as np
-from scipy.constants import bar
 
 from drivetwin.actuator.held_signal import HeldSignal
 
-REFERENCE: float = bar
+REFERENCE = 1e5
 """Pressure [Pa] above the kiss pressure at which the fill time is stated."""
 
 

@@ -16,7 +16,6 @@ from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
@@ -104,6 +103,8 @@ class FillingSettings:
 
 FILLING = FillingSettings()
 
+_NO_BEND = 10.0
+"""Bends below so many round-offs count as none."""
 _BENDS_OF_A_KNOT = 2
 """Second differences of a record that a knot between two samples acts on [count]."""
 _ROUNDED_BENDS = 2.5
@@ -192,10 +193,14 @@ def _list_periods(values: FloatArray) -> list[float]:
     rounding hides the bend from one to the next.
     """
     peaks: list[tuple[float, float]] = []
+    nothing = _NO_BEND * ROUND_OFF * float(np.abs(values).max(initial=0.0))
     for order in (2, 4):
         for lag in FILLING.lags:
             if order * lag < values.size // 4:
-                peaks += _find_peaks(np.abs(_difference(values, order, lag)))
+                bends = np.abs(_difference(values, order, lag))
+                # The round-off of a straight record may repeat, too.
+                bends[bends < nothing] = 0.0
+                peaks += _find_peaks(bends)
     peaks.sort(reverse=True)
     periods: list[float] = []
     for _, period in peaks:
@@ -218,13 +223,14 @@ def _find_peaks(bends: FloatArray) -> list[tuple[float, float]]:
 
     Ranks instead of sizes, so that a shift does not outshine the rest of the record.
     """
+    from scipy.ndimage import median_filter
+
     _, inverse, count = np.unique(bends, return_inverse=True, return_counts=True)
     ranks = (np.cumsum(count) - 0.5 * count)[inverse]
     ranks -= ranks.mean()
     power = np.abs(np.fft.rfft(ranks * np.hanning(ranks.size))) ** 2
     # Relative to the lines beside: shifts and rest raise the low frequencies as a whole.
-    beside = np.pad(power, FILLING.beside, mode="reflect")
-    level = np.median(sliding_window_view(beside, 2 * FILLING.beside + 1), axis=1) / np.log(2.0)
+    level = median_filter(power, 2 * FILLING.beside + 1, mode="mirror") / np.log(2.0)
     power = np.divide(power, level, out=np.zeros_like(power), where=level > 0.0)
     high = power > np.log(power.size / FILLING.chance)
     longest = bends.size / FILLING.least_knots
@@ -271,7 +277,7 @@ def estimate_lattice(values: FloatArray) -> float:
     The least change of the slope of a densely sampled signal is one step.
     """
     bends = np.abs(np.diff(values, 2))
-    floor = 10.0 * ROUND_OFF * float(np.abs(values).max(initial=0.0))
+    floor = _NO_BEND * ROUND_OFF * float(np.abs(values).max(initial=0.0))
     bends = bends[bends > floor]
     if bends.size < FILLING.least_knots:
         return 0.0

@@ -87,9 +87,9 @@ def _select_first_match(
     Of the `spellings` of the columns the second, the last part of a name like `log.EngTrq`, counts
     only where no whole name matches.
     """
-    patterns = [re.compile(form) for form in forms]
-    for texts in spellings:
-        for form in patterns:
+    forms = tuple(forms)
+    for texts in filter(None, spellings):
+        for form in map(re.compile, forms):
             if found := [column for column, text in texts if form.fullmatch(text)]:
                 return found
     return []

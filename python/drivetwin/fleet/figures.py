@@ -52,8 +52,8 @@ def plot_drift(one: JointEstimate) -> Figure:
     for change in one.changes:
         place = _convert_readings(drift.field, np.array([0.5 * (change.before + change.after)]))[0]
         figure.add_vline(x=place, line={"color": SECOND, "width": 1.5, "dash": "dash"})
-    figure.set_layout(
-        make_layout(
+    figure.merge_layout(
+        **make_layout(
             380,
             xaxis=make_axis(drift.field),
             yaxis=make_axis(
@@ -127,8 +127,8 @@ def plot_units(one: JointEstimate) -> Figure:
         )
     few = len(units) <= 80
     ticks = [format_unit(one, unit) for unit in units] if few else None
-    figure.set_layout(
-        make_layout(
+    figure.merge_layout(
+        **make_layout(
             340,
             xaxis=make_axis(
                 "unit, from low to high",

@@ -11,7 +11,8 @@ from drivetwin.estimation.analysis.bootstrap import MIN_FITS, bootstrap
 from tests.estimation.asked import stepped
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.statistical
+@pytest.mark.short
 def test_spread_agrees_with_the_covariance() -> None:
     """Of ten refits a standard deviation is known to a quarter; over nine parameters together the
     ratio to that of the covariance is near one."""

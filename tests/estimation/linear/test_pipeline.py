@@ -127,7 +127,7 @@ def test_age_of_the_engine_torque_is_found(stepped: Run, age: float) -> None:
     assert estimates["eta"] == pytest.approx(0.85, rel=5e-4)
 
 
-@vary_draws()
+@vary_draws(slow=True)
 def test_intervals_cover_and_values_are_unbiased(stepped: Run, draws: int) -> None:
     truth = truth_of(Truth()) | {"te_delay": 0.012}
     errors: dict[str, list[float]] = {name: [] for name in truth}

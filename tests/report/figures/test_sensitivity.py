@@ -20,7 +20,7 @@ def test_a_time_is_told_in_ms_and_a_value_of_zero_in_no_per_cent() -> None:
         slips={},
     )
     gain = plot_sensitivity(found).data[0]
-    labels = ("τ_e (2) [ms]", "P0 (B2) [%]", "T_v/i_f [%]", "η [%]")
+    labels = ["τ_e (2) [ms]", "P0 (B2) [%]", "T_v/i_f [%]", "η [%]"]
     assert gain.y == labels
     assert [row[0] for row in gain.text] == ["+2.0", "·", "–", "+1.0"]
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Figures as functions: dataclasses in, `plotly` figures out; one set for report, notebook, app."""
+"""Figures as functions: dataclasses in, figures out; one set for report, notebook, app."""

@@ -79,7 +79,7 @@ def plot_distributions(found: Calibration) -> Figure:
     names = list(Metric)
     rows = -(-len(names) // _COLUMNS)
     titles = [f"{METRICS[one].label} [{get_metric_display(one).label}]" for one in names]
-    figure = make_subplots(_COLUMNS * [1.0], rows * [1.0], gaps=(0.1, 0.3 / rows), titles=titles)
+    figure = make_subplots(_COLUMNS * [1.0], rows * [1.0], gaps=(0.1, 0.5 / rows), titles=titles)
     for k, metric in enumerate(names):
         place = {"row": k // _COLUMNS + 1, "col": k % _COLUMNS + 1}
         for part, one in (("before", found.before), ("after", found.after)):
