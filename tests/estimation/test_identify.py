@@ -211,10 +211,12 @@ def test_where_the_fit_fails_the_linear_values_stand_with_a_warning(
 def test_inertias_outside_the_cards_ranges_are_told() -> None:
     log, card, shifts = recording("truck_a")
     assert not [
-        one for one in identify(log, card, shifts).findings if one.code is Code.OUTSIDE_DESIGN_RANGE
+        one
+        for one in identify(log, card, shifts, Method.INTEGRAL).findings
+        if one.code is Code.OUTSIDE_DESIGN_RANGE
     ]
     strict = replace(card, J_prime_range=(3.0, 9.0), J_vehicle_range=(1000.0, 2000.0))
-    found = identify(log, strict, shifts).findings
+    found = identify(log, strict, shifts, Method.INTEGRAL).findings
     outside = [one for one in found if one.code is Code.OUTSIDE_DESIGN_RANGE]
     assert [one.subject for one in outside] == ["J_prime_2", "J_prime_3", "J_vehicle"]
 

@@ -234,7 +234,8 @@ def refine_raster(
     if not min(misfits) < _CONTRAST * max(misfits):
         return None
     start = float(starts[int(np.argmin(misfits))])
-    for part in (slice(0, _SHORT // 4), slice(None)):
+    parts = (slice(0, _SHORT // 4), slice(None))
+    for part in parts[time.size <= _SHORT // 4 :]:
         length = float(time[part][-1] - time[part][0])
         scale = np.array([0.03 * period, 0.1 * period**2 / length])
         middle = np.array([start + period * round((0.5 * length) / period), period])

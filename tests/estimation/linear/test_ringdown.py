@@ -28,7 +28,7 @@ def ring(amplitude: float = 2000.0) -> FloatArray:
     return np.asarray(1800.0 + 50.0 * TIME + wave, dtype=float)
 
 
-@vary_draws()
+@vary_draws(slow=True)
 def test_fit_is_unbiased_and_its_intervals_cover(draws: int) -> None:
     """They are wide: the covariance allows for a torque that is not there (99 % are covered)."""
     rates, omegas, inside = [], [], np.zeros(2, dtype=int)
@@ -56,7 +56,7 @@ def high_gear(amplitude: float, seed: int) -> MeasuredSignal:
     return MeasuredSignal(time, 1000.0 + 40.0 * time + wave + noise, 20.0)
 
 
-@vary_draws()
+@vary_draws(slow=True)
 def test_a_ring_of_three_samples_a_period_is_told_with_intervals_that_cover(draws: int) -> None:
     found = [fit_ringdown(high_gear(400.0, k), 0.0, 1.6, None, after=0.015) for k in range(draws)]
     rates = np.array([ring.decay_rate for ring in found])
@@ -108,7 +108,7 @@ def jittering(own: float, seen: float, seed: int) -> tuple[MeasuredSignal, Drive
     return MeasuredSignal(TIME, torque, 3.0), Drive(MeasuredSignal(knots, measured, seen), 1.0)
 
 
-@vary_draws()
+@vary_draws(slow=True)
 @pytest.mark.parametrize(("own", "seen"), [(0.0, JITTER), (JITTER, 1.0), (JITTER, JITTER)])
 def test_intervals_cover_under_a_torque_that_jitters(
     own: float, seen: float, draws: int, request: pytest.FixtureRequest

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 from drivetwin.channels.names import (
@@ -34,12 +35,12 @@ class TableColumns:
     times: Sequence[int]
     is_packed_clock: bool = False
 
-    @property
+    @cached_property
     def clocks(self) -> list[int]:
         """The time columns; each is its own."""
         return list(dict.fromkeys(self.times))
 
-    @property
+    @cached_property
     def date(self) -> int | None:
         """Index of the column with the day of each row."""
         days = (i for i, name in enumerate(self.names) if name.casefold() in _DATE_NAMES)
