@@ -236,3 +236,18 @@ def test_names_of_the_user_are_recognised_and_kept(
     assert columns["Kanal 7"]["roles"] == ["engine_torque"]
     assert read_mapping(path).names == {"engine_torque": ["kanal_7"]}
     assert read_mapping(path).channels["engine_torque"].source == "Kanal 7"
+
+
+def test_of_many_columns_those_with_a_role_and_the_first_others_are_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("drivetwin.cli.inspect._MOST_ROWS", 2)
+    log = tmp_path / "log.csv"
+    rows = [f"{0.01 * k},{k},{k % 3},{k % 5},{k % 7},{100 + k}" for k in range(20)]
+    log.write_text("\n".join(["time [s],a [V],b [V],c [V],d [V],SpdIn [rpm]", *rows]) + "\n")
+    assert main(["inspect", str(log)]) == 0
+    text = capsys.readouterr().out
+    names = [line.split()[0] for line in text.splitlines() if " V " in line or " rpm " in line]
+    assert names == ["a", "b", "SpdIn"]
+    assert "2 more columns, all without a role" in text
+    assert len(_inspect(capsys, str(log))["columns"]) == 5
