@@ -196,7 +196,7 @@ class _TableLines:
         self.first = self._find_first_row(rows)
         values = [cell for cells, is_row in zip(self.cells, rows, strict=True) if is_row
                   for cell in cells]  # fmt: skip
-        sound = sum(classify_text(cell) is not Meaning.TEXT or is_value(cell) for cell in values)
+        sound = sum(is_value(cell) or classify_text(cell) is not Meaning.TEXT for cell in values)
         self.fitness = sound / max(1, len(values)) - _HANDICAP * (separator == BLANKS)
         """Share of the cells of rows that are no text."""
 
