@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from math import copysign, inf, sqrt
 
 import numpy as np
+from scipy.constants import bar
 
 from drivetwin.actuator.held_signal import HeldSignal
 
-REFERENCE = 1e5
+REFERENCE: float = bar
 """Pressure [Pa] above the kiss pressure at which the fill time is stated."""
 
 
