@@ -109,7 +109,10 @@ def test_a_third_element_may_lack_its_pressure() -> None:
 def test_several_candidates_for_a_needed_role_are_an_error() -> None:
     with pytest.raises(MappingError) as caught:
         resolve_roles(columns([*ENGLISH, "Motormoment"]), {}, ELEMENTS, NEEDED, "log.csv")
-    assert caught.value.what == "'engine_torque' may be any of the columns EngTrq, Motormoment"
+    assert (
+        caught.value.what
+        == "'engine_torque' has several candidates: the columns EngTrq, Motormoment"
+    )
     assert "channels.engine_torque = { source" in caught.value.remedy
 
 

@@ -65,7 +65,7 @@ def test_the_result_tells_logs_test_and_prediction(written: Written) -> None:
     assert result.several.consistency.agree
     (held,) = result.held_out
     assert held.file == "run3.csv"
-    assert held.outcome.value == "as noise allows"
+    assert held.outcome.value == "consistent with noise"
     percent = held.fit["output_torque"]["all"].fit_percent
     assert percent is not None
     assert percent > 85.0

@@ -89,7 +89,7 @@ def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
     integral = identified("paper_like", Method.INTEGRAL)
     assert found.estimates["J_vehicle"].value == integral.estimates["J_vehicle"].value
     assert integral.evidence.gave_up == ""
-    with pytest.raises(IdentificationError, match=r"gave up on this log.*the search crawls"):
+    with pytest.raises(IdentificationError, match=r"fit of this log failed.*the search crawls"):
         get_likelihood_fit(found)
 
 

@@ -122,7 +122,7 @@ def test_time_that_does_not_increase_is_refused(tmp_path: Path, suffix: str) -> 
 
 def test_what_a_format_cannot_hold_is_refused(tmp_path: Path) -> None:
     one = channels()[0]
-    with pytest.raises(FileFormatError, match=r"no format is known by '\.xls'"):
+    with pytest.raises(FileFormatError, match=r"no format has the ending '\.xls'"):
         write_log(tmp_path / "log.xls", [one])
     with pytest.raises(FileFormatError, match="names repeat"):
         write_log(tmp_path / "log.csv", [one, one])

@@ -51,7 +51,7 @@ def test_the_page_opens_with_the_verdict(page: str, found: Identification) -> No
     verdict = markup.index(f"Model: {found.status}")
     assert verdict < markup.index("<table")
     assert verdict < markup.index('class="plot"')
-    assert "10 of 12 parameters are identified, 1 only weakly known, 1 not ident" in markup
+    assert "10 of 12 parameters are identified, 1 weak, 1 not ident" in markup
 
 
 def test_sections_of_other_methods_are_closed(page: str, found: Identification) -> None:

@@ -52,7 +52,7 @@ def test_a_valid_model_names_the_fit() -> None:
 def test_limits_name_open_and_weak_parameters_and_the_recording_that_helps() -> None:
     verdict = explain_identification(replace(simulated(ModelStatus.LIMITED), findings=()))
     assert "engine torque delay τ_e is not identifiable" in verdict.reason
-    assert "shaft damping c_o is known weakly" in verdict.reason
+    assert "shaft damping c_o is weak" in verdict.reason
     assert "step the pedal in gear" in verdict.action
 
 

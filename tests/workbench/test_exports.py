@@ -80,7 +80,7 @@ def test_nothing_to_export_is_told(tmp_path: Path) -> None:
 def test_a_twin_from_a_workspace_has_no_report(identified: Session, tmp_path: Path) -> None:
     from dataclasses import replace
 
-    bare = Outcome(Method.INTEGRAL, identified.work.require_twin())
+    bare = Outcome(Method.INTEGRAL, identified.work.require_outcome().twins)
     work = replace(identified.work, results={Method.INTEGRAL: bare})
     with pytest.raises(InputError, match="identify again"):
         make_product(work, Record.REPORT, tmp_path)

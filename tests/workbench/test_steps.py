@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -19,6 +20,10 @@ DONE, NEXT, OPEN, BLOCKED = Status.DONE, Status.NEXT, Status.OPEN, Status.BLOCKE
 
 def _list_statuses(work: SessionState, *, running: bool = False) -> list[Status]:
     return [one.status for one in assess_steps(work, running=running)]
+
+
+def _change_log(work: SessionState, **changes: Any) -> SessionState:
+    return work.set_log(replace(work.require_open_log(), **changes))
 
 
 def _get(work: SessionState, step: Step) -> StepState:
@@ -41,15 +46,29 @@ def test_a_log_without_a_card_leads_to_the_card(session: Session) -> None:
 
 def test_a_log_that_cannot_be_read_leads_to_the_channels(identified: Session) -> None:
     opened = replace(identified.work.require_opened(), log=None, found=None, fault="no unit")
-    work = replace(identified.work, opened=opened, shifts=()).drop_results()
+    work = _change_log(identified.work, opened=opened, shifts=())
     assert _list_statuses(work) == [DONE, NEXT, DONE, BLOCKED, BLOCKED, BLOCKED, BLOCKED]
     assert _get(work, Step.SHIFTS).remedy is Step.CHANNELS
 
 
 def test_without_a_shift_the_reasons_are_shown(identified: Session) -> None:
-    work = replace(identified.work, shifts=()).drop_results()
+    work = _change_log(identified.work, shifts=())
     shifts = _get(work, Step.SHIFTS)
     assert (shifts.status, shifts.has_content) == (BLOCKED, True)
+
+
+def test_every_log_must_be_readable_and_one_shift_fitted(identified: Session) -> None:
+    work = identified.work
+    one = work.require_open_log()
+    opened = replace(one.opened, log=None, found=None, fault="no unit")
+    broken = replace(one, source=replace(one.source, name="b.csv"), opened=opened, shifts=())
+    both = replace(work, logs=(one, broken)).drop_results()
+    assert _get(both, Step.CHANNELS).text == "b.csv cannot be read as mapped."
+    assert _get(both, Step.SHIFTS).remedy is Step.CHANNELS
+    assert _get(both, Step.IDENTIFY).status is BLOCKED
+    held = work.drop_results().hold_out([frozenset({0})])
+    assert _get(held, Step.SHIFTS).text == "1→2 found, 1 held out."
+    assert _get(held, Step.IDENTIFY).text == "Every shift is held out."
 
 
 def test_only_the_default_method_completes_the_identification(identified: Session) -> None:
@@ -58,7 +77,7 @@ def test_only_the_default_method_completes_the_identification(identified: Sessio
     assert _get(work, Step.IDENTIFY).status is NEXT
     assert _get(work, Step.MODEL).status in (OPEN, DONE)
     outcome = work.require_outcome()
-    likelihood = work.add_result(Outcome(Method.LIKELIHOOD, outcome.twin, outcome.found))
+    likelihood = work.add_result(Outcome(Method.LIKELIHOOD, outcome.twins, outcome.found))
     assert _get(likelihood, Step.IDENTIFY).status is DONE
 
 

@@ -42,7 +42,7 @@ def test_a_reopened_workspace_goes_on_where_it_was(
 ) -> None:
     session.reopen(session.get_folder_source(saved.name))
     before, after = identified.work, session.work
-    assert after.moves == before.moves
+    assert after.logs[0].moves == before.logs[0].moves
     assert after.locks == before.locks
     assert after.changes == {"k_o": 1.5e5, "mu.B3": 1.05}
     assert after.method is before.method
@@ -71,17 +71,17 @@ def _without(key: str) -> Callable[[dict[str, Any]], object]:
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
-        (_without("log"), "log"),
+        (_without("logs"), "logs"),
         (_without("card"), "card"),
-        (lambda c: c.update(version=2), "version"),
+        (lambda c: c.update(version=1), "version"),
         (lambda c: c.update(format="other"), "format"),
         (lambda c: c.update(surprise=1), "surprise"),
-        (lambda c: c["log"].update(sha256="x"), "sha256"),
+        (lambda c: c["logs"][0]["file"].update(sha256="x"), "sha256"),
         (lambda c: c.update(sliders={"k_o": "much"}), "sliders"),
         (lambda c: c.update(locks={"k_o": {"kind": "loose"}}), "locks"),
-        (lambda c: c.update(phases={"0": {"dawn": 1.0}}), "phases"),
-        (lambda c: c.update(channels={"nonsense": {"source": "x"}}), "channels"),
-        (lambda c: c["twins"]["integral"].pop("parameters"), "twins"),
+        (lambda c: c["logs"][0].update(phases={"0": {"dawn": 1.0}}), "phases"),
+        (lambda c: c["logs"][0].update(channels={"nonsense": {"source": "x"}}), "channels"),
+        (lambda c: c["twins"]["integral"]["bench.csv"].pop("parameters"), "twins"),
     ],
 )
 def test_a_damaged_key_is_named(
@@ -114,7 +114,7 @@ def test_what_is_no_workspace_is_refused(tmp_path: Path, content: bytes) -> None
 @pytest.mark.parametrize("path", ["../bench.csv", "/etc/passwd", "absent.csv"])
 def test_a_workspace_cannot_name_files_outside(session: Session, saved: Path, path: str) -> None:
     content = json.loads(saved.read_text())
-    content["log"]["path"] = path
+    content["logs"][0]["file"]["path"] = path
     crafted = saved.with_name("crafted.workspace.json")
     crafted.write_text(json.dumps(content))
     with pytest.raises(RefusedError):
@@ -124,7 +124,7 @@ def test_a_workspace_cannot_name_files_outside(session: Session, saved: Path, pa
 
 def test_a_changed_log_is_told(session: Session, saved: Path) -> None:
     content = json.loads(saved.read_text())
-    content["log"]["sha256"] = "0" * 64
+    content["logs"][0]["file"]["sha256"] = "0" * 64
     crafted = saved.with_name("changed.workspace.json")
     crafted.write_text(json.dumps(content))
     with pytest.raises(RefusedError, match="no longer the file"):

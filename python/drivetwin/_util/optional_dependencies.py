@@ -80,7 +80,7 @@ def handle_parser_errors(kind: str, path: Path) -> Iterator[None]:
             raise
         except Exception as fault:
             fault.__traceback__ = None  # frees what the parser built, while nobody listens
-            text = " ".join(str(fault).split())[:120] or "no more is known"
+            text = " ".join(str(fault).split())[:120] or "without details"
             raise FileFormatError(
                 f"{kind} cannot be read, it may be cut or damaged ({type(fault).__name__}: {text})",
                 "record or export the log again",

@@ -133,7 +133,7 @@ def make_choice_parser(choices: Iterable[str]) -> Callable[[str], str]:
         exact = [one for one in known if one.casefold() == wanted]
         found = exact or [one for one in known if wanted and one.casefold().startswith(wanted)]
         if len(found) != 1:
-            raise ValueError(f"{text.strip()!r} is none of {', '.join(known)}")
+            raise ValueError(f"{text.strip()!r} is not one of {', '.join(known)}")
         return found[0]
 
     return parse

@@ -65,7 +65,7 @@ def iterate_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
     default = Answer(sources.name, Origin.DEFAULT)
     yield Question(
         ("name",), "--name NAME", "Name of the vehicle",
-        "The name stands in reports and results.", parse_name, default=default,
+        "Reports and results contain the name.", parse_name, default=default,
     )  # fmt: skip
     yield from _iterate_gear_questions(answers, sources)
     yield from iterate_element_questions(answers, sources.survey, sources.estimates)

@@ -150,7 +150,7 @@ def _list_dependencies(answers: Answers) -> tuple[object, ...]:
 def _make_open_error(questions: list[Question]) -> InputError:
     listed = "".join(f"\n  - {one.option}: {one.prompt}" for one in questions)
     return InputError(
-        f"{len(questions)} entries of the card are open, and there is no terminal to ask:{listed}",
+        f"{len(questions)} entries of the card are open, and no terminal for questions:{listed}",
         "state them by these options, or run the command in a terminal; `--draft` writes a file in "
         "which open entries are comments",
     )

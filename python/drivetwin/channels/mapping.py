@@ -85,7 +85,7 @@ def resolve_roles(
             continue
         named = ", ".join(map(str, candidates))
         if role in strict:
-            what = f"{role!r} may be any of the columns {named}"
+            what = f"{role!r} has several candidates: the columns {named}"
             raise MappingError(what, _suggest_choice(role, candidates), Where(file=file))
         findings.append(report(Code.COLUMN_AMBIGUOUS, role=role, columns=named))
     absent = {role: one.spec.source for role, one in open_roles.items() if role not in channels}

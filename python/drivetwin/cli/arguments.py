@@ -89,7 +89,7 @@ OptionalVehicleFile = Annotated[
     typer.Option(
         "--vehicle",
         metavar="CARD",
-        help="Vehicle card, in place of the twin's own.",
+        help="Vehicle card, in place of that of the twin.",
         callback=require_card,
     ),
 ]

@@ -45,20 +45,22 @@ _RESUME = ".resume.json"
 def calibrate(
     twin: TwinFile,
     shift: Annotated[
-        str, typer.Option("--shift", metavar="GEAR-GEAR", help="Which shift, as 2-3.")
+        str, typer.Option("--shift", metavar="GEAR-GEAR", help="Shift to calibrate, such as 2-3.")
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="Where the results go.")
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the results.")
     ],
     limits: Annotated[
         Path | None,
         typer.Option("--limits", metavar="FILE", help="Limits and spread (TOML)."),
     ] = None,
     engine_torque: Annotated[
-        float | None, typer.Option("--engine-torque", metavar="NM", help="At the request.")
+        float | None,
+        typer.Option("--engine-torque", metavar="NM", help="Engine torque at the shift request."),
     ] = None,
     engine_speed: Annotated[
-        float | None, typer.Option("--engine-speed", metavar="RPM", help="At the request.")
+        float | None,
+        typer.Option("--engine-speed", metavar="RPM", help="Engine speed at the shift request."),
     ] = None,
     system_pressure: Annotated[
         float | None,
@@ -69,17 +71,18 @@ def calibrate(
     ] = 0.5,
     policy: Annotated[
         PolicyKind,
-        typer.Option("--policy", help="The controller's parameters, or knots of the profiles."),
+        typer.Option("--policy", help="Unknowns: controller parameters, or knots of the profiles."),
     ] = PolicyKind.CONTROLLER,
     start: Annotated[
         Path | None,
-        typer.Option("--start", metavar="FILE", help="A calibration.toml to start from."),
+        typer.Option("--start", metavar="FILE", help="Earlier calibration.toml as the start."),
     ] = None,
     effort: Annotated[
-        float, typer.Option("--effort", min=0.05, max=20.0, help="Length of the search, times 1.")
+        float,
+        typer.Option("--effort", min=0.05, max=20.0, help="Factor on the length of the search."),
     ] = 1.0,
     draws: Annotated[
-        int, typer.Option("--draws", min=59, help="Fresh draws of the certificate.")
+        int, typer.Option("--draws", min=59, help="Number of fresh draws of the certificate.")
     ] = 2000,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of draws and search.")] = 1,
     front: Annotated[
@@ -90,7 +93,7 @@ def calibrate(
         typer.Option(
             "--map",
             metavar="GRID",
-            help="Calibrate operating points, as torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; "
+            help="Grid of operating points, such as torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; "
             "from, to, points).",
         ),
     ] = None,
@@ -100,10 +103,10 @@ def calibrate(
     ] = False,
     as_json: JsonFlag = False,
 ) -> None:
-    """Find shift profiles that keep peak jerk small over the spread of made units.
+    """Find shift profiles with a small peak jerk over the spread of made units.
 
-    Minimises the tail mean of peak jerk under limits, and certifies the result on fresh draws.
-    DIR gets calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx.
+    Minimise the tail mean of peak jerk under limits, and certify the result on fresh draws. Write
+    calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx into DIR.
     """
     from drivetwin.calibration.identified_range import check_identified_range
     from drivetwin.calibration.settings import CalibrationSettings

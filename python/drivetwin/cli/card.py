@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 IMPLAUSIBLE = 3
 """Exit code of a card with findings, with --strict."""
 
-card = typer.Typer(help="Check a vehicle card, or write one.", no_args_is_help=True)
+card = typer.Typer(help="Write or check a vehicle card.", no_args_is_help=True)
 card.command()(new)
 
 
@@ -41,16 +41,16 @@ def check(
     ] = None,
     channels: ChannelsFile = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Exit with 3 if anything is implausible.")
+        bool, typer.Option("--strict", help="Exit with code 3 if an entry is implausible.")
     ] = False,
     as_json: JsonFlag = False,
 ) -> None:
-    """Report what is implausible on a vehicle card, before an identification.
+    """Report implausible entries of a vehicle card, before an identification.
 
     Each finding names the entry, its value, the value or range expected, the reason and the remedy.
-    With LOG the entries are compared with the speeds, pressures and torques of the log too.
-    The exit code is 0; with --strict 3 if anything is implausible; 2 for a card or log that cannot
-    be read.
+    With LOG, the entries are also compared with the speeds, pressures and torques of the log.
+    The exit code is 0. With --strict it is 3 if an entry is implausible. It is 2 if card or log
+    cannot be read.
     """
     from drivetwin.files.records import dump_findings
     from drivetwin.vehicle.card import load_card

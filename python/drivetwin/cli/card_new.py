@@ -29,49 +29,52 @@ if TYPE_CHECKING:
 
 def new(
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="CARD.toml", help="The card to write.")
+        Path, typer.Option("-o", "--output", metavar="CARD.toml", help="File of the new card.")
     ],
     from_log: Annotated[
         Path | None,
-        typer.Option("--from", metavar="LOG", help="Fill in what a log of the vehicle shows."),
+        typer.Option("--from", metavar="LOG", help="Log of the vehicle; its data fill in entries."),
     ] = None,
     channels: ChannelsFile = None,
     draft: Annotated[
         bool,
-        typer.Option("--draft", help="Ask nothing: mark guesses, leave open entries as comments."),
+        typer.Option(
+            "--draft", help="Ask no questions: mark guesses, leave open entries as comments."
+        ),
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing card.")] = False,
     name: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Name of the vehicle; the file's name if not."),
+        typer.Option(metavar="NAME", help="Name of the vehicle; default: name of the file."),
     ] = None,
     gearbox: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Built-in gearbox, as `drivetwin gearbox` lists them, or none."
+            metavar="NAME", help="Built-in gearbox (listed by `drivetwin gearbox`), or none."
         ),
     ] = None,
     ratios: Annotated[
-        str | None, typer.Option(metavar="LOW,...,HIGH", help="Ratios of the gears, falling.")
+        str | None,
+        typer.Option(metavar="LOW,...,HIGH", help="Ratios of the gears, in falling order."),
     ] = None,
     gears: Annotated[
         str | None, typer.Option(metavar="NAME,...", help="Names of the gears, from low to high.")
     ] = None,
     elements: Annotated[
-        str | None, typer.Option(metavar="NAME,...", help="Shift element that makes each gear.")
+        str | None, typer.Option(metavar="NAME,...", help="Shift element engaged in each gear.")
     ] = None,
     element: Annotated[
         list[str] | None,
         typer.Option(
             metavar="[NAME:]KEY=VALUE,...",
-            help="Data of a shift element, without NAME of all; repeatable. Keys: kind, P0_bar, "
+            help="Data of a shift element, or of all without NAME; repeatable. Keys: kind, P0_bar, "
             "P0_std_bar, gain_m3 or surfaces, derating, area_m2 (or piston_outer_mm, "
             "piston_inner_mm), radius_m (or outer_mm, inner_mm), of a clutch i_c, i_out; "
             "drum_inertia_kgm2, peak.",
         ),
     ] = None,
     input_gear: Annotated[
-        str | None, typer.Option(metavar="RATIO", help="Ratio of the input gear; 1 if not given.")
+        str | None, typer.Option(metavar="RATIO", help="Ratio of the input gear; default: 1.")
     ] = None,
     final_drive: Annotated[
         str | None, typer.Option(metavar="RATIO", help="Ratio of the final drive.")
@@ -96,7 +99,9 @@ def new(
     ] = None,
     vehicle_inertia: Annotated[
         str | None,
-        typer.Option(metavar="LOW..HIGH", help="Instead of mass: inertia at the wheel [kg·m²]."),
+        typer.Option(
+            metavar="LOW..HIGH", help="Inertia at the wheel, in place of the mass [kg·m²]."
+        ),
     ] = None,
     output_inertia: Annotated[
         str | None,
@@ -113,11 +118,11 @@ def new(
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Write a vehicle card: in a terminal by questions, else from options.
+    """Write a vehicle card by questions in a terminal, or from options.
 
-    With --from LOG what the log shows is filled in. Without a terminal, or with --draft, that is a
-    draft: each guess is marked, and open entries are comments. A gain is never guessed. With --json
-    nothing is asked.
+    With --from LOG, entries are estimated from the log. Without a terminal, or with --draft, the
+    card is a draft: guesses are marked, and open entries are comments. A gain is never guessed.
+    With --json no questions are asked.
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.authoring.card_text import format_card, refuse_faults

@@ -30,14 +30,14 @@ _METHODS = (DEFAULT_METHOD, Method.PAPER)
 
 def demo(
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="Where all files go.")
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for all files.")
     ] = Path("drivetwin-demo"),
     scenario: ScenarioOption = ScenarioName.PAPER_STEPS,
     seed: SeedOption = 0,
     noise: NoiseOption = 1.0,
     as_json: JsonFlag = False,
 ) -> None:
-    """Make a log with the paper's numbers, identify it both ways, compare with the truth."""
+    """Identify a synthetic log with known truth by two methods, and compare."""
     from drivetwin.cli.arguments import REPORT
     from drivetwin.cli.comparison import compare
     from drivetwin.cli.identify_run import Request, run_identification, write_outcome

@@ -38,7 +38,7 @@ class Course(StrEnum):
 def drive(
     card: Annotated[
         str,
-        typer.Argument(metavar="CARD", help="Gearbox card (TOML), or the name of a built-in."),
+        typer.Argument(metavar="CARD", help="Gearbox card (TOML), or name of a built-in gearbox."),
     ] = "three-set-4000cr",
     course: Annotated[
         Course,
@@ -49,19 +49,19 @@ def drive(
     ] = Course.ALL_KINDS,
     powertrain: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Powertrain file (TOML), or the name of a built-in."),
+        typer.Option(metavar="FILE", help="Powertrain file (TOML), or name of a built-in one."),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help=f"Where {FIGURE} and {TRACES} go."),
+        typer.Option("-o", "--output", metavar="DIR", help=f"Folder for {FIGURE} and {TRACES}."),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Drive from standstill: converter, lock-up, shifts of all kinds, the full gearbox.
+    """Simulate a drive from standstill with converter, lock-up and all kinds of shift.
 
-    A table of all shifts: when they begin, how long the input slips, friction work and peak power
-    of the off-going and the on-coming element, lowest and highest torque of the output shaft; and
-    where the energy went.
+    Print a table of all shifts: start, duration of slip at the input, friction work and peak power
+    of the off-going and the on-coming element, lowest and highest torque of the output shaft. Print
+    the energy balance.
     """
     from drivetwin.drive import (
         load_powertrain,

@@ -44,34 +44,42 @@ def examine(
     channels: ChannelsFile = None,
     profile: Annotated[
         list[str] | None,
-        typer.Option(metavar="PARAMETER", help="Profile likelihood of a parameter, such as J_out."),
+        typer.Option(
+            metavar="PARAMETER",
+            help="Compute the profile likelihood of a parameter, such as J_out.",
+        ),
     ] = None,
     bootstrap: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Fit N logs made from the fit with other noise.")
+        int,
+        typer.Option(
+            min=0, metavar="N", help="Fit N logs simulated from the fit with other noise."
+        ),
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap's noise.")] = 0,
     friction: Annotated[
         FrictionShape | None,
-        typer.Option(help="Friction over slip as a curve of this shape, in place of Stribeck's."),
+        typer.Option(
+            help="Estimate friction over slip as a curve of this shape instead of the Stribeck law."
+        ),
     ] = None,
     departures: Annotated[
         bool,
         typer.Option(
             "--departures",
-            help="Drag of the open clutches; friction over pressure.",
+            help="Estimate drag of the open clutches, and friction over pressure.",
         ),
     ] = False,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where the files go.")
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for the files.")
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Tell which experiment would narrow what a log leaves open, and test the intervals.
+    """Recommend the test that reduces parameter uncertainty most, and test the intervals.
 
-    The log is identified by the likelihood method first. Always: the experiments that would narrow
-    weak, not identifiable and least known parameters, with the interval to expect. On request:
-    profile likelihood, which needs no linearity, parametric bootstrap, friction of free or monotone
-    shape (with a twin that has it), and what departs from the friction law.
+    The log is first identified by the likelihood method. The command lists the experiments that
+    narrow weak, not identifiable and least known parameters, with the expected intervals. Options
+    add the profile likelihood, a parametric bootstrap, friction curves of free or monotone shape
+    with a twin, and departures from the friction law.
     """
     from drivetwin.cli.identify_run import Request, run_identification
     from drivetwin.estimation.result.method import Method

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _Output = Annotated[
     Path | None,
     typer.Option(
-        "-o", "--output", metavar="PATH", help="File, a folder for c; by default ./TWIN.FORM."
+        "-o", "--output", metavar="PATH", help="File, or folder for c; default: ./TWIN.FORM."
     ),
 ]
 _Powertrain = Annotated[
@@ -35,7 +35,7 @@ _Powertrain = Annotated[
     typer.Option(
         "--powertrain",
         metavar="FILE",
-        help="Parameter files: add the torque converter of this powertrain (TOML or built-in).",
+        help="For parameter files: add the torque converter of this powertrain (TOML or built-in).",
     ),
 ]
 _Template = Annotated[
@@ -43,13 +43,15 @@ _Template = Annotated[
     typer.Option(
         "--template",
         metavar="FILE",
-        help="Parameter files: labels, units, axes and breakpoints of this file (TOML).",
+        help="For parameter files: template with labels, units, axes and breakpoints (TOML).",
     ),
 ]
 _Shift = Annotated[
     str | None,
     typer.Option(
-        "--shift", metavar="GEAR-GEAR", help="Models: which shift, as 2-3; else the first."
+        "--shift",
+        metavar="GEAR-GEAR",
+        help="For models: shift, such as 2-3; default: the first upshift.",
     ),
 ]
 _Log = Annotated[
@@ -57,36 +59,39 @@ _Log = Annotated[
     typer.Option(
         "--log",
         metavar="LOG",
-        help="Models: start as this log does; fmu and modelica hold its shift.",
+        help="For models: log with the initial state; fmu and modelica contain its shift.",
     ),
 ]
 _Platforms = Annotated[
     list[Platform] | None,
-    typer.Option("--platform", help="fmu: build for this one, by zig; may be repeated."),
+    typer.Option("--platform", help="For fmu: target platform, built by zig; repeatable."),
 ]
 
 
 def export(
     twin: TwinFile,
-    to: Annotated[Target, typer.Option("--to", help="What to write.")],
+    to: Annotated[Target, typer.Option("--to", help="Form of the export.")],
     output: _Output = None,
     names: Annotated[
-        Names, typer.Option("--names", help="Parameter files: whose names the parameters get.")
+        Names,
+        typer.Option("--names", help="For parameter files: naming convention of the parameters."),
     ] = Names.DRIVETWIN,
     powertrain: _Powertrain = None,
     template: _Template = None,
     shift: _Shift = None,
     log: _Log = None,
     channels: ChannelsFile = None,
-    fmi: Annotated[FmiVersion, typer.Option("--fmi", help="fmu: version.")] = FmiVersion.FMI2,
+    fmi: Annotated[
+        FmiVersion, typer.Option("--fmi", help="For fmu: version of the standard.")
+    ] = FmiVersion.FMI2,
     platforms: _Platforms = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Write the identified model for another program.
 
-    c: C99 sources for a controller. fmu: co-simulation with sources inside. modelica: a package of
-    the Standard Library's components.
-    Parameter files (ssv, cdfx, dcm, m, json, csv) hold what is known, with units and intervals.
+    c: C99 sources for a controller. fmu: co-simulation FMU with sources. modelica: package of
+    components of the Standard Library. ssv, cdfx, dcm, m, json, csv: parameter files with units and
+    intervals.
     """
     from drivetwin.files.twin_conversion import load_twin
 

@@ -40,7 +40,7 @@ class LogsOrCommand(TyperGroup):
 
 fleet = typer.Typer(
     cls=LogsOrCommand,
-    help="Identify many logs into a store that resumes; report, estimate and query it.",
+    help="Identify many logs into a store; report, estimate and query it. Runs can be resumed.",
     no_args_is_help=True,
 )
 StoreFolder = Annotated[Path, typer.Argument(metavar="STORE", help="Folder of `fleet -o`.")]
@@ -57,30 +57,32 @@ StoreOption = Annotated[
 ]
 ListFile = Annotated[
     Path | None,
-    typer.Option("--list", metavar="FILE", help="CSV with a column `path`, or a path a line."),
+    typer.Option(
+        "--list", metavar="FILE", help="CSV with a column `path`, or text with one path per line."
+    ),
 ]
 MethodOption = Annotated[
     Method, typer.Option(metavar="METHOD", help="paper, integral or likelihood.")
 ]
 Workers = Annotated[
-    int | None, typer.Option(min=1, help="Processes on this machine; one a core if not given.")
+    int | None, typer.Option(min=1, help="Processes on this machine; default: one per core.")
 ]
 Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Work on a Dask cluster, tcp://host:port.")
 ]
-TimeLimit = Annotated[float, typer.Option(min=0.1, metavar="S", help="Time that one log may take.")]
+TimeLimit = Annotated[float, typer.Option(min=0.1, metavar="S", help="Time limit of one log.")]
 MemoryLimit = Annotated[
-    int, typer.Option(min=64, metavar="MIB", help="Memory that one worker may hold.")
+    int, typer.Option(min=64, metavar="MIB", help="Memory limit of one worker.")
 ]
 Attempts = Annotated[
-    int, typer.Option(min=1, help="How often a log is tried that loses its worker.")
+    int, typer.Option(min=1, help="Number of attempts for a log that loses its worker.")
 ]
-Retry = Annotated[bool, typer.Option("--retry", help="Try again what is in quarantine.")]
-Reports = Annotated[bool, typer.Option("--reports", help="Write the report of each log too.")]
+Retry = Annotated[bool, typer.Option("--retry", help="Retry the logs in quarantine.")]
+Reports = Annotated[bool, typer.Option("--reports", help="Also write the report of each log.")]
 Traces = Annotated[
-    bool, typer.Option("--traces", help="Write simulation over measurement of each log too.")
+    bool, typer.Option("--traces", help="Also write measured and simulated signals of each log.")
 ]
-Events = Annotated[bool, typer.Option("--json", help="Print one JSON event a line on stdout.")]
+Events = Annotated[bool, typer.Option("--json", help="Print one JSON event per line on stdout.")]
 
 
 @fleet.command(RUN)
@@ -101,9 +103,9 @@ def run(
     traces: Traces = False,
     as_json: Events = False,
 ) -> None:
-    """Identify all logs that the store does not hold yet.
+    """Identify all logs that are not yet in the store.
 
-    Whatever ends a run, the same command goes on from there; nothing is computed twice.
+    The same command continues an interrupted run; finished logs are not computed again.
     """
     from drivetwin.cli.fleet_view import show_progress
     from drivetwin.errors import InputError
@@ -160,12 +162,15 @@ def report(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="FILE.html", help="report.html in the store if not given."
+            "-o",
+            "--output",
+            metavar="FILE.html",
+            help="Page to write; default: report.html in the store.",
         ),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Write the report of a store: shared values, ageing, units, what is odd, what failed."""
+    """Write the report of a store: shared values, ageing, units, outliers, failures."""
     from drivetwin.fleet.report import PAGE, save_fleet_report
     from drivetwin.fleet.store import Store
 
@@ -183,7 +188,9 @@ def estimate(
     store: StoreFolder,
     parameter: Annotated[
         list[str] | None,
-        typer.Option("--parameter", metavar="ID", help="Only this one; may be given again."),
+        typer.Option(
+            "--parameter", metavar="ID", help="Parameter to estimate; repeatable; default: all."
+        ),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
@@ -282,11 +289,13 @@ def query(
     sql: Annotated[str, typer.Argument(metavar="SQL", help="SELECT over parameters, files, …")],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Write .csv or .parquet instead."),
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Write the answer as .csv or .parquet."
+        ),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Ask a store in SQL (DuckDB).
+    """Query a store in SQL (DuckDB).
 
     Tables: parameters, frictions, fits, qualities, warnings, rows, files, logs, shifts, settings.
     """

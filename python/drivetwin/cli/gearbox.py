@@ -27,21 +27,23 @@ if TYPE_CHECKING:
 def gearbox(
     card: Annotated[
         str | None,
-        typer.Argument(metavar="CARD", help="Gearbox card (TOML), or the name of a built-in one."),
+        typer.Argument(metavar="CARD", help="Gearbox card (TOML), or name of a built-in gearbox."),
     ] = None,
     gear: Annotated[
         str | None, typer.Option("--gear", metavar="GEAR", help="Show one gear in full.")
     ] = None,
     modelica: Annotated[
         Path | None,
-        typer.Option("--modelica", metavar="FILE.mo", help="Write it as a Modelica package."),
+        typer.Option(
+            "--modelica", metavar="FILE.mo", help="Write the gearbox as a Modelica package."
+        ),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """List the gears of a gearbox with computed and published ratio; without CARD, the built-ins.
+    """List the gears of a gearbox with computed and published ratio.
 
-    With --gear: speed of every member per input speed, torque of every element on every member per
-    input torque, and the power that flows there.
+    Without CARD, list the built-in gearboxes. With --gear, print the speed of every member per
+    input speed, the torque of every element on every member per input torque, and the power flow.
     """
     from drivetwin.gearbox import (
         describe_ratio_differences,

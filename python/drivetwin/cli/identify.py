@@ -49,16 +49,16 @@ def identify(
     ] = DEFAULT_METHOD,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Where result, twin and report go."),
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for result, twin and report."),
     ] = None,
     together: Annotated[
-        bool, typer.Option("--together", help="All logs are of one vehicle: fit them as one.")
+        bool, typer.Option("--together", help="Fit all logs of one vehicle jointly.")
     ] = False,
     hold_out: Annotated[
         list[str] | None,
         typer.Option(
             metavar="SHIFT",
-            help="Predict instead of fit: number of a shift, a LOG, or LOG:NUMBER; repeatable.",
+            help="Shift to predict instead of fit: its number, a LOG, or LOG:NUMBER; repeatable.",
         ),
     ] = None,
     effects: Annotated[
@@ -66,23 +66,23 @@ def identify(
         typer.Option(
             "--effect",
             metavar="NAME=STD",
-            help="Prior of an effect that the model leaves out, as tyre_slip=0.002; 0: none.",
+            help="Prior of an effect that the model omits, such as tyre_slip=0.002; 0: no effect.",
         ),
     ] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Exit with 3 if a model is not valid.")
+        bool, typer.Option("--strict", help="Exit with code 3 if a model is not valid.")
     ] = False,
     as_json: JsonFlag = False,
 ) -> None:
-    """Identify the driveline behind a shift log.
+    """Identify the driveline from shift logs.
 
-    With -o, DIR/result.json, DIR/twin.toml and DIR/report.html are written;
-    several logs are identified one by one, each into DIR/NAME-OF-LOG. A log that cannot be
-    identified is reported, and the exit code is 2; the others have their results.
+    With -o, write DIR/result.json, DIR/twin.toml and DIR/report.html. Several logs are identified
+    one by one, each into DIR/NAME-OF-LOG. If a log cannot be identified, it is reported and the
+    exit code is 2; the other logs get their results.
 
-    With --together they are fitted as one: the driveline is common to all logs, the load and the
-    delay of the engine torque are specific to each. A log or shift of --hold-out takes no part in
-    the fit; it is simulated with the parameters of the others and compared. It implies --together.
+    With --together, one driveline is fitted to all logs; load and engine-torque delay are specific
+    to each log. With --hold-out, which implies --together, a log or shift takes no part in the fit.
+    It is simulated with the parameters of the others and compared.
     """
     how = Request(vehicle, channels, method, tuple(effects or ()))
     if together or hold_out:

@@ -49,21 +49,21 @@ def inspect(
         Path | None,
         typer.Option(
             metavar="MAP",
-            help="Write the mapping shown as a file to edit; open points are comments.",
+            help="Write the channel mapping as a file to edit; open points are comments.",
         ),
     ] = None,
     accept_proposals: Annotated[
         bool,
         typer.Option(
             "--accept-proposals",
-            help="With --write-mapping: units that are the only proposal become entries.",
+            help="With --write-mapping: enter units that are the only proposal.",
         ),
     ] = False,
     as_json: JsonFlag = False,
 ) -> None:
-    """List the columns of a log: unit, rate, range, gaps, and the role each would play.
+    """List the columns of a log with unit, rate, range, gaps and proposed role.
 
-    And what `shifts` and `identify` would warn of in it, or refuse it for.
+    Also list the warnings of `shifts` and `identify`, and their reason if they refuse the log.
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.channels.mapping import Mapped
@@ -74,9 +74,7 @@ def inspect(
     from drivetwin.vehicle.card import load_card
 
     if accept_proposals and write_mapping is None:
-        raise InputError(
-            "--accept-proposals has nothing to write them to", "add --write-mapping MAP"
-        )
+        raise InputError("--accept-proposals needs a mapping file", "add --write-mapping MAP")
     card = None if vehicle is None else load_card(vehicle)
     mapping = find_mapping(channels, log)
     stated = Mapped({}) if mapping is None else read_mapping(mapping)

@@ -45,25 +45,28 @@ def observe(
     by: Annotated[
         Observer,
         typer.Option(
-            help="smoother: follows the speeds, with or without pressures; simulation: driven by "
+            help="smoother: from the measured speeds, with or without pressures; simulation: from "
             "engine torque and pressures alone."
         ),
     ] = Observer.SMOOTHER,
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="Where torques go: .csv, .parquet, .mf4, .mat."
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="File for the torques: .csv, .parquet, .mf4 or .mat.",
         ),
     ] = None,
     figure: Annotated[
         Path | None,
-        typer.Option("--figure", metavar="FILE.html", help="Where the figures go."),
+        typer.Option("--figure", metavar="FILE.html", help="Page with the figures."),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Tell the torques of output shaft and clutches through the shifts of a log, with 95 % bands.
+    """Estimate torques of output shaft and clutches in the shifts of a log, with 95 % bands.
 
-    For logs without torque sensors. An output torque in the log is not used.
+    The log needs no output torque; if it has one, it is not used.
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.files.twin_conversion import load_twin

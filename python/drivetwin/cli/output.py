@@ -29,9 +29,7 @@ _STATUS_COLOURS = {
     ModelStatus.NOT_VALIDATED: "yellow",
 }
 
-JsonFlag = Annotated[
-    bool, typer.Option("--json", help="Print the result as JSON on stdout, nothing else.")
-]
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print only the result, as JSON on stdout.")]
 
 
 def make_console(*, stderr: bool = False) -> Console:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from drivetwin.gearbox import CouplingError, Reduction
 
 GearboxCard = Annotated[
-    str, typer.Argument(metavar="CARD", help="Gearbox card (TOML), or the name of a built-in one.")
+    str, typer.Argument(metavar="CARD", help="Gearbox card (TOML), or name of a built-in gearbox.")
 ]
 
 
@@ -35,10 +35,10 @@ def reduce(
     ],
     as_json: JsonFlag = False,
 ) -> None:
-    """Reduce a shift to the dual-clutch form and estimate the error of it.
+    """Reduce a shift to the dual-clutch form and compute the error of the reduction.
 
-    Ratios of both elements, mass matrix, condition (1) with the members that violate it, the error
-    of neglecting their coupling, first estimated, then simulated.
+    Print the ratios of both elements, the mass matrix, and condition (1) with the members that
+    violate it. Print the error of neglecting their coupling, as estimated and as simulated.
     """
     from drivetwin.gearbox import describe_ratio_differences, load_gearbox
     from drivetwin.gearbox import reduce as reduce_shift

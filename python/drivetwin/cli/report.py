@@ -27,15 +27,15 @@ def report(
     ],
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="FILE.html", help="Where a comparison goes."),
+        typer.Option("-o", "--output", metavar="FILE.html", help="Page with the comparison."),
     ] = Path("comparison.html"),
     channels: ChannelsFile = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Find the report of an identification, or compare several.
+    """Print the path of a report, or compare several identifications.
 
-    One folder or result.json: the path of its report. Several, or a twin and logs: a page that
-    compares their parameters and friction, and the simulation of each log by each twin.
+    For one folder or result.json, print the path of its report. For several, or a twin and logs,
+    write a page that compares parameters, friction, and the simulation of each log by each twin.
     """
     made = [source for source in sources if _is_identification(source)]
     logs = [source for source in sources if not _is_identification(source)]
@@ -49,7 +49,7 @@ def report(
         if made[0].suffix == ".toml":
             raise InputError(
                 "a twin alone has nothing to be compared with",
-                "name further twins, or logs that it shall simulate",
+                "name further twins, or logs to simulate",
                 Where(file=str(made[0])),
             )
         _print_page_name(made[0], as_json=as_json)

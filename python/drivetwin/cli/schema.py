@@ -14,7 +14,9 @@ from drivetwin.files.schemas import FileKind, build_json_schema
 def schema(
     kind: Annotated[
         FileKind | None,
-        typer.Argument(metavar="KIND", help="Kind of file.", show_default=False),
+        typer.Argument(
+            metavar="KIND", help="Kind of file; default: list the kinds.", show_default=False
+        ),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:

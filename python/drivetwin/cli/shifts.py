@@ -43,15 +43,15 @@ def shifts(
         typer.Option(
             "--html",
             metavar="FILE.html",
-            help="Where a page goes that shows shift quality by kind of shift.",
+            help="Page with shift quality by kind of shift.",
         ),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Find the shifts of a log, their phases and figures of shift quality.
+    """Detect the shifts of a log, with phases and shift quality.
 
-    For a log without output torque also the driveline's resonance after each shift and the total
-    inertia over η in each gear held, where the log carries them.
+    For a log without output torque, also estimate the resonance of the driveline after each shift,
+    and the total inertia over η in each gear held, as far as the log determines them.
     """
     from drivetwin.cli.tables import build_shift_table
     from drivetwin.files.records import dump_findings

@@ -42,13 +42,13 @@ def simulate(
             "-o",
             "--output",
             metavar="FILE.csv",
-            help="Where measured and simulated signals go, side by side (SI).",
+            help="Table of measured and simulated signals, side by side (SI).",
         ),
     ] = None,
     html: Annotated[
         Path | None,
         typer.Option(
-            "--html", metavar="FILE.html", help="Where a page goes that compares both in plots."
+            "--html", metavar="FILE.html", help="Page with plots of measured and simulated signals."
         ),
     ] = None,
     step_size: Annotated[
@@ -56,26 +56,28 @@ def simulate(
         typer.Option(
             "--step",
             metavar="SECONDS",
-            help="Sample the inputs at fixed steps, as an importer of the exported FMU does.",
+            help="Step at which the inputs are sampled, as by an importer of the exported FMU.",
         ),
     ] = None,
     input_kind: Annotated[
         InputKind,
-        typer.Option("--input", help="Inputs between these steps; `hold` alone takes 1 ms."),
+        typer.Option(
+            "--input", help="Inputs between these steps; without --step the step is 1 ms."
+        ),
     ] = InputKind.LINEAR,
     parameters: Annotated[
         Path | None,
         typer.Option(
             "--parameters",
             metavar="FILE",
-            help="Values in place of the twin's: an exported parameter file that was edited.",
+            help="Exported and edited parameter file; its values replace those of the twin.",
         ),
     ] = None,
     from_command: Annotated[
         bool,
         typer.Option(
             "--from-command",
-            help="Take pressures from the commands in the log, through the twin's actuators.",
+            help="Compute pressures from the commands in the log by the actuators of the twin.",
         ),
     ] = False,
     template: Annotated[
@@ -90,9 +92,8 @@ def simulate(
 ) -> None:
     """Simulate the shifts of a log with an identified model and compare.
 
-    Measured engine torque and pressures drive the model; the log may be another than the twin's.
-    Ratios and shift elements are the twin's own, so no vehicle card is needed. The twin may be
-    given as the folder that `identify -o` wrote.
+    The inputs are the measured engine torque and pressures. The log can differ from the log of the
+    identification. Ratios and shift elements are those of the twin; a vehicle card is not needed.
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.cli.tables import build_fit_table

@@ -30,7 +30,7 @@ ScenarioOption = Annotated[
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the sensor noise.")]
 NoiseOption = Annotated[
-    float, typer.Option(help="Factor on the sensor noise; 0: no noise and no rounding.")
+    float, typer.Option(help="Factor on the sensor noise; 0: neither noise nor rounding.")
 ]
 
 
@@ -41,26 +41,28 @@ def synth(
             "-o",
             "--output",
             metavar="NAME.csv",
-            help="The log to write; .mf4, .parquet or .mat choose these formats.",
+            help="Log to write; the ending .csv, .mf4, .parquet or .mat sets the format.",
         ),
     ] = Path("synth.csv"),
     scenario: ScenarioOption = ScenarioName.PAPER_STEPS,
     seed: SeedOption = 0,
     noise: NoiseOption = 1.0,
     torque_reduction: Annotated[
-        float, typer.Option(help="Share of engine torque the TCU takes in the inertia phase.")
+        float,
+        typer.Option(help="Share by which the engine torque is reduced in the inertia phase."),
     ] = 0.0,
     drum: Annotated[
         float | None,
         typer.Option(
-            metavar="KGM2", help="Inertia of each brake drum in the gearbox scenarios, 0.05 if not."
+            metavar="KGM2",
+            help="Inertia of each brake drum in the gearbox scenarios; default: 0.05.",
         ),
     ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=SIZE",
-            help="A departure from the dual-clutch model, repeatable; in units and shares of "
+            help="Departure from the dual-clutch model, repeatable; units and shares are those of "
             f"docs/howto/synthetic-log.md: {', '.join(EffectId)}.",
         ),
     ] = None,
@@ -68,7 +70,7 @@ def synth(
 ) -> None:
     """Make a shift log with known truth on the virtual dynamometer.
 
-    Beside the log NAME.csv stand NAME.truth.json and the vehicle card NAME.card.toml.
+    Also write the truth NAME.truth.json and the vehicle card NAME.card.toml.
     """
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.effects import parse_effects

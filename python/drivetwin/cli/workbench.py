@@ -34,20 +34,23 @@ def workbench(
         Path | None, typer.Option("--channels", metavar="MAP", help="Channel mapping file (TOML).")
     ] = None,
     folder: Annotated[
-        Path, typer.Option("--folder", metavar="DIR", help="Files are opened and saved in here.")
+        Path,
+        typer.Option(
+            "--folder", metavar="DIR", help="Folder for all files that are opened or saved."
+        ),
     ] = Path(),
     host: Annotated[
-        str, typer.Option("--host", help="Address to listen on; this machine alone by default.")
+        str, typer.Option("--host", help="Address to listen on; default: this machine only.")
     ] = LOOPBACK,
-    port: Annotated[int, typer.Option("--port", help="Port; 0: any free one.")] = 8050,
+    port: Annotated[int, typer.Option("--port", help="Port; 0: any free port.")] = 8050,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
     ] = True,
 ) -> None:
-    """Open the workbench: from a log to a checked model, in the browser.
+    """Open the workbench in the browser: from a log to a validated model.
 
-    Works without a network. Only holders of the printed link get in; other machines reach it only
-    with --host.
+    No network is needed. Access requires the printed link. Other machines can connect only with
+    --host.
     """
     _require_dash()
     from drivetwin.workbench.access_control import Access, is_loopback
@@ -103,7 +106,7 @@ def _require_dash() -> None:
 
 def _make_start(place: Folder, log: Path | None, card: Path | None, mapping: Path | None) -> Start:
     """The files of the command line, as far as the folder holds them. Raises RefusedError."""
-    from drivetwin.workbench.session_state import Source
+    from drivetwin.workbench.open_log import Source
     from drivetwin.workbench.views.page import Start
 
     def source(path: Path | None) -> Source | None:

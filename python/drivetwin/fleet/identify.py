@@ -81,7 +81,7 @@ def _check_inputs(recipe: TaskSpec) -> None:
     if not same:
         raise StoreError(
             "the vehicle card or the channel mapping changed while the fleet was at work",
-            "run the same command again: what was done with the old ones is done anew",
+            "run the same command again: logs identified with the old ones are identified anew",
             Where(file=recipe.vehicle),
         )
 

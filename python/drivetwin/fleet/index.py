@@ -103,7 +103,7 @@ class Index:
         version = self._fetch_value("PRAGMA user_version")
         if version != _FORMAT:
             raise StoreError(
-                f"the index has format {version}, this program knows {_FORMAT}",
+                f"the index has format {version}, this program reads {_FORMAT}",
                 "give another folder, or use the program's version that made the store",
                 Where(file=str(self._path)),
             )

@@ -141,12 +141,12 @@ def _build_parameters_section(found: Sequence[JointEstimate], missing: Sequence[
         blocks.append(NotesBlock("Of all parameters", shared))
     if missing:
         names = ", ".join(map(get_parameter_label, missing))
-        blocks.append(NotesBlock("Too few logs tell a value of their own", [names]))
+        blocks.append(NotesBlock("Too few logs with a value of their own", [names]))
     return Section(
         "parameters",
         "What the logs say together",
         "Each log counts by what it states of its own error; units may differ, and age. Sensor "
-        "errors that a unit keeps are part of the spread: logs alone cannot tell them apart.",
+        "errors that a unit keeps are part of the spread: logs alone do not separate them.",
         blocks,
     )
 
@@ -202,7 +202,7 @@ def write_remark(one: JointEstimate, shared: Sequence[str] = ()) -> str:
     if spread := _get_significant_spread(one):
         parts.append("units differ" + _describe_small_effect(spread, one))
     if one.left_out:
-        parts.append(f"{one.left_out} logs tell nothing of it")
+        parts.append(f"{one.left_out} logs do not determine it")
     if one.excess > 1.5:
         parts.append(f"logs scatter {one.excess:.1f} times as much as they state")
     return "; ".join(parts)

@@ -12,7 +12,7 @@ from typing import Any
 from drivetwin.estimation.result.method import Method
 
 GO_ON = (
-    "make room or give write permission, then run the same command again: what is done stays done"
+    "make room or give write permission, then run the same command again: finished logs are kept"
 )
 """Remedy for the user if a store cannot be written."""
 

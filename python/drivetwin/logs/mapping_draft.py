@@ -111,7 +111,7 @@ def _list_stubs(survey: Survey) -> tuple[Stub, ...]:
         if role in survey.mapping:
             continue
         rivals = [one for one in survey.columns if role in one.roles]
-        why = f"{role} may be any of several columns: choose one." if rivals else ""
+        why = f"{role} has several candidates: choose one." if rivals else ""
         found = rivals or [one for one in free if not one.roles]
         listed = [_make_candidate(one, role, survey, named=bool(rivals)) for one in found]
         candidates = sorted((one for one in listed if one is not None), key=_rank_candidate)

@@ -173,7 +173,7 @@ def _describe_open_roles(
 ) -> list[str]:
     """Roles that no column, or more than one, could play."""
     notes = [
-        f"{role} may be any of {', '.join(map(str, found))}: name one in a channel mapping"
+        f"{role} has candidates: {', '.join(map(str, found))}: name one in a channel mapping"
         for role, found in candidates.items()
         if len(found) > 1
     ]

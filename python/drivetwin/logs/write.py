@@ -51,7 +51,7 @@ def write_log(path: Path | str, channels: Sequence[RawChannel]) -> None:
     where = Where(file=str(path))
     if writer is None:
         known = ", ".join(_WRITERS)
-        raise FileFormatError(f"no format is known by {path.suffix!r}", f"use {known}", where)
+        raise FileFormatError(f"no format has the ending {path.suffix!r}", f"use {known}", where)
     names = [channel.name for channel in channels]
     if len(set(names)) < len(names) or _TIME in names:
         raise FileFormatError("names repeat, or one is 'time'", "rename the channels", where)

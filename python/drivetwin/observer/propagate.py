@@ -61,7 +61,7 @@ def select_uncertain(
     """
     if twin.over_eta:
         raise MissingParameterError(
-            "the twin knows torques over η only: the log behind it had no output torque",
+            "the twin has torques over η only, because its log had no output torque",
             "identify from a log that has one, or state eta on the vehicle card",
             Where(file=twin.name),
         )

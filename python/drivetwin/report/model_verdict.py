@@ -100,7 +100,7 @@ def _explain_limits(
     weak_ids = _select_ids(estimates, Verdict.WEAK)
     parts = [
         f"{_list_names(ids)} {word}"
-        for ids, word in ((open_ids, "not identifiable from this log"), (weak_ids, "known weakly"))
+        for ids, word in ((open_ids, "not identifiable from this log"), (weak_ids, "weak"))
         if ids
     ]
     if not parts:

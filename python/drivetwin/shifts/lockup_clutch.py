@@ -186,7 +186,7 @@ def _check_flag_closing(log: ShiftLog, card: VehicleCard, flag: Channel, span: S
     if slip is None:
         warning = "no speeds of engine and input: the flag is unchecked"
     elif abs(slip) > CLOSED:
-        warning = f"the flag tells lock-up, but engine and input differ by {100 * slip:.1f} %"
+        warning = f"the flag indicates lock-up, but engine and input differ by {100 * slip:.1f} %"
     return LockUp(span[0], flag.step / float(np.sqrt(12.0)), span[1], warning)
 
 

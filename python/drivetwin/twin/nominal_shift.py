@@ -32,6 +32,6 @@ def _find_first_shift(twin: Twin) -> tuple[str, str]:
         if held[0] != held[1] and any(name in twin.friction for name in held):
             return old, new
     raise InputError(
-        f"the twin {twin.name!r} has no pair of neighbouring gears with a known friction curve",
+        f"the twin {twin.name!r} has no neighbouring gears with an identified friction curve",
         "name the shift with --shift, such as --shift 2-3",
     )

@@ -199,7 +199,7 @@ class Twin(DisplayMixin):
             return self.gears[name]
         except KeyError:
             raise InputError(
-                f"the twin {self.name!r} knows no gear {name!r}",
+                f"the twin {self.name!r} has no gear {name!r}",
                 f"use one of {', '.join(self.gears)}",
             ) from None
 
@@ -271,7 +271,7 @@ class Twin(DisplayMixin):
         if missing:
             raise MissingParameterError(
                 f"the twin cannot be simulated without {'; '.join(missing)}",
-                "give these values as overrides, or identify from a log that can tell them",
+                "give these values as overrides, or identify from a log that determines them",
                 Where(file=self.name),
             )
         return values
@@ -299,7 +299,7 @@ class Twin(DisplayMixin):
             design = self.elements[name]
         except KeyError:
             raise InputError(
-                f"the twin {self.name!r} knows no shift element {name!r}",
+                f"the twin {self.name!r} has no shift element {name!r}",
                 f"use one of {', '.join(self.elements)}",
             ) from None
         curve = self.friction.get(name, self.friction.get(partner))

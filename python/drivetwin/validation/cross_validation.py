@@ -93,8 +93,8 @@ def _select_log_estimates(
         return extract_log(found, several.logs[number - 1]), {}
     if told is None:
         raise IdentificationError(
-            "load and age of the engine torque of a log that was not fitted are told by the "
-            "likelihood method alone",
+            "only the likelihood method estimates load and engine-torque delay of a log that was "
+            "not fitted",
             "use --method likelihood, or hold out a shift of a log whose other shifts are fitted",
             Where(file=log.source),
         )

@@ -108,7 +108,7 @@ class VehicleCard:
             if element in gear.elements:
                 return compute_brake_ratios(gear.ratio)
         raise self._make_error(
-            f"element {element!r} holds no gear", "name it under a gear's elements"
+            f"element {element!r} engages in no gear", "name it under a gear's elements"
         )
 
     def _make_error(self, what: str, remedy: str) -> CardError:

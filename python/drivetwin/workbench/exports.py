@@ -96,8 +96,8 @@ def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
 
             save_result(path, _get_evidence(work))
         case Record.REPORT:
-            log = work.require_log()
-            text: str = jobs.call(render_log_report, _get_evidence(work), log, limit=REPORT_LIMIT)
+            found, logs = _get_evidence(work), work.get_fitted_logs()
+            text: str = jobs.call(render_log_report, found, logs, limit=REPORT_LIMIT)
             return text.encode()
         case Record.SIGNALS:
             return _format_signals(work).encode()

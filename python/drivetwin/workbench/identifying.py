@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from drivetwin._util.progress import scale_progress
@@ -11,12 +11,8 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
-from drivetwin.pipeline import identify
-from drivetwin.shifts.detect import FoundShifts
-from drivetwin.shifts.shift import Shift
-from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.simulate_log import attach_validation
+from drivetwin.validation.multi_log import Source, identify_together
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.workbench.jobs import Emit, to_fault
 
@@ -26,24 +22,29 @@ _WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Input of an identification; `card` includes the fixed values, `shifts` the manual edits."""
+    """Input of an identification; `card` includes the fixed values, the shifts manual edits."""
 
-    log: ShiftLog
+    sources: Sequence[Source]
     card: VehicleCard
-    shifts: tuple[Shift, ...]
     methods: Sequence[Method]
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of one method, with its twin; `found` holds the validation.
+    """Result of one method, with a twin for each fitted log by its name.
 
-    `found` is None if the twin comes from a saved workspace, because the evidence is not saved.
+    `found` holds the validation; it is None if the twins come from a saved workspace, because the
+    evidence is not saved.
     """
 
     method: Method
-    twin: Twin
+    twins: Mapping[str, Twin]
     found: Identification | None = None
+
+    @property
+    def twin(self) -> Twin:
+        """The twin of the first fitted log."""
+        return next(iter(self.twins.values()))
 
 
 @dataclass(frozen=True)
@@ -60,31 +61,29 @@ def identify_all(emit: Emit, task: Task) -> None:
     Whatever ends one method, a fault of the program included, leaves the others their turn.
     """
     whole, start = sum(_WEIGHTS[method] for method in task.methods), 0.0
-    shifts = FoundShifts(task.shifts, ())
     for method in task.methods:
         end = start + _WEIGHTS[method] / whole
         with scale_progress(start, end, f"{method.value} method"):
-            emit(_run_method(task, shifts, method))
+            emit(_run_method(task, method))
         start = end
 
 
-def _run_method(task: Task, shifts: FoundShifts, method: Method) -> Outcome | Refusal:
+def _run_method(task: Task, method: Method) -> Outcome | Refusal:
     """Run one method; return its outcome, or the reason of its failure."""
     try:
-        return _make_outcome(task, shifts, method)
+        made = identify_together(task.sources, task.card, method)
+        return Outcome(method, made.twins, rank_experiments(made.found))
     except Exception as error:
         fault = to_fault(error)
         return Refusal(method, f"{fault.what} -> {fault.remedy}")
 
 
-def _make_outcome(task: Task, shifts: FoundShifts, method: Method) -> Outcome:
-    found = identify(task.log, task.card, shifts, method)
-    twin = build_twin(found, task.card)
-    return Outcome(method, twin, rank_experiments(attach_validation(found, twin, task.log)))
-
-
-def render_log_report(emit: Emit, found: Identification, log: ShiftLog) -> None:
-    """The report of an identification as HTML text; emits it."""
+def render_log_report(emit: Emit, found: Identification, logs: Sequence[ShiftLog]) -> None:
+    """The report of an identification as HTML text; emits it. `logs` are those fitted, in order."""
     from drivetwin.report.html import render_report
+    from drivetwin.report.together import render_joint_report
 
-    emit(render_report(found, log))
+    if len(logs) == 1 and not found.evidence.held_out:
+        emit(render_report(found, logs[0]))
+    else:
+        emit(render_joint_report(found, logs))

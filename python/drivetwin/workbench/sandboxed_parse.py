@@ -36,7 +36,6 @@ from drivetwin.logs.raw import Recording
 from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Survey, survey_recording
 from drivetwin.plausibility.check import FROM_READING, check_card, select_card_findings
-from drivetwin.report.decimate import extract_envelope
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.workbench.jobs import Emit
@@ -85,7 +84,7 @@ class ColumnKey:
 
 @dataclass(frozen=True, eq=False)
 class Preview:
-    """A column as recorded: `time` (n,) [s], `values` (n,) in `unit`; long ones as envelope."""
+    """A column as recorded: `time` (n,) [s], `values` (n,) in `unit`."""
 
     name: str
     unit: str
@@ -141,7 +140,7 @@ def read_column(emit: Emit, request: Request, key: ColumnKey) -> None:
             raise InputError("there is no such column", "choose one that is listed")
         channel = recording.load(places[key.number])
     known = np.isfinite(channel.time)
-    time, values = extract_envelope(channel.time[known], channel.values[known])
+    time, values = channel.time[known], channel.values[known]
     emit(Preview(channel.name, channel.unit or "", time, values))
 
 

@@ -29,16 +29,20 @@ from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspa
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.identifying import Task, identify_all
 from drivetwin.workbench.mapping import Entry, apply_entries
+from drivetwin.workbench.open_log import OpenLog, Source
 from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.sample import write_sample
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
-from drivetwin.workbench.session_state import SessionState, Source
+from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.workspace_folder import Folder
+from drivetwin.workbench.zoom import View
 
 MOST_SESSIONS = 16
 """Maximum number of sessions; opening another closes the one that was idle longest."""
 MOST_UPLOADS = 8
 """Maximum number of uploads of a session; the oldest one that is not open is deleted."""
+MOST_LOGS = 6
+"""Maximum number of logs of a session; below `MOST_UPLOADS`, as all may be uploads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +66,8 @@ class Session:
     gearbox: Gearbox | None = None
     uploads: dict[str, uploads.Upload] = field(default_factory=dict)
     form: CardForm | None = None
-    previews: dict[ColumnKey, Preview] = field(default_factory=dict)
+    preview: tuple[ColumnKey, Preview] | None = None
+    view: View | None = None
     used: float = field(default_factory=time.monotonic)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
@@ -71,7 +76,8 @@ class Session:
         key = secrets.token_hex(8)
         upload = uploads.store_stream(stream, name, claimed, self.scratch / key, limit)
         with self.lock:
-            used = {one.path for one in (self.work.log, self.work.card) if one is not None}
+            used = {one.source.path for one in self.work.logs}
+            used |= set() if self.work.card is None else {self.work.card.path}
             while len(self.uploads) >= MOST_UPLOADS:
                 oldest = next(k for k, one in self.uploads.items() if one.path not in used)
                 self.uploads.pop(oldest).path.unlink(missing_ok=True)
@@ -91,33 +97,67 @@ class Session:
         return Source(self.folder.get_name(path), path)
 
     def open(self, log: Source, card: Source | None = None, mapping: Path | None = None) -> None:
-        """Open a log, with its card if there is one; discard the work on the previous log.
+        """Open a log, with its card if there is one; discard the work on the previous logs.
 
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
         with self.lock:
-            work = SessionState(log=log, card=card, mapping=mapping)
-            work = work.set_opened(self._read(work, {}))
+            fresh = self._read_log(log, card, mapping, {})
             self.cancel()
-            self._set(work)
-            self.previews.clear()
+            self._set(SessionState(logs=(fresh,), card=card))
             self.form = None
 
     def open_log(self, log: Source) -> None:
         """Open a log with the card that is open, if any; see `open`."""
         self.open(log, self.work.card)
 
+    def add_log(self, log: Source) -> None:
+        """Open a log of the same vehicle beside the others, read as the selected one is mapped.
+
+        Raises InputError for a log that is open or one too many, and the errors of the readers.
+        """
+        with self.lock:
+            work, like = self.work, self.work.require_open_log()
+            if log.name in (one.source.name for one in work.logs):
+                raise InputError(f"a log called {log.name} is open", "rename one of them")
+            if len(work.logs) >= MOST_LOGS:
+                raise InputError(
+                    f"{MOST_LOGS} logs are open, which is the limit", "remove one in the step Log"
+                )
+            fresh = self._read_log(log, work.card, like.mapping, like.channels)
+            self.cancel()
+            self._set(replace(work, logs=(*work.logs, fresh)).drop_results())
+
+    def remove_log(self, index: int) -> None:
+        """Close one of several logs. Raises InputError."""
+        with self.lock:
+            work = self.work.remove_log(index)
+            self.cancel()
+            self._set(work)
+
+    def select_log(self, index: int) -> None:
+        """Select the log that the views show. Raises InputError."""
+        with self.lock:
+            self._set(self.work.select_log(index))
+
+    def hold_out(self, held: Sequence[frozenset[int]]) -> None:
+        """Set the indices of the shifts to predict, log by log. Raises InputError."""
+        with self.lock:
+            self.work = self.work.hold_out(held)
+
     def open_card(self, card: Source) -> None:
-        """Open a card for the log that is open; results on another card are discarded.
+        """Open a card for the open logs; results on another card are discarded.
 
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
         with self.lock:
             self.work.require_opened()
-            work = replace(self.work, card=card, locks={})
-            work = work.set_opened(self._read(work, work.channels))
+            logs = tuple(
+                self._read_log(one.source, card, one.mapping, one.channels)
+                for one in self.work.logs
+            )
             self.cancel()
-            self._set(work)
+            self._set(replace(self.work, logs=logs, card=card, locks={}, shift=0).drop_results())
 
     def open_sample(self) -> None:
         """Open a synthetic log with its card, as an example."""
@@ -127,22 +167,20 @@ class Session:
     def read_column(self, index: int) -> Preview:
         """Read the column `index` of the survey as recorded. Raises InputError without numbers."""
         with self.lock:
-            key = make_column_key(self.work.require_opened().survey, index)
-            if key not in self.previews:
-                request = self._make_request(self.work, {})
+            one = self.work.require_open_log()
+            key = make_column_key(one.opened.survey, index)
+            if self.preview is None or self.preview[0] != key:
+                request = _make_request(one.source, self.work.card, one.mapping, {})
                 limit = compute_parser_limits(request.log).seconds
-                self.previews[key] = jobs.call(
-                    sandboxed_parse.read_column, request, key, limit=limit
-                )
-            return self.previews[key]
+                preview = jobs.call(sandboxed_parse.read_column, request, key, limit=limit)
+                self.preview = (key, preview)
+            return self.preview[1]
 
     def begin_card(self) -> None:
         """Begin the form of a new card from the log. Raises the typed errors of the readers."""
         with self.lock:
-            self.work.require_opened()
-            request = replace(
-                self._make_request(self.work, self.work.channels), card=None, card_label=""
-            )
+            one = self.work.require_open_log()
+            request = _make_request(one.source, None, one.mapping, one.channels)
             surveyed: LogSurvey = jobs.call(
                 sandboxed_parse.survey_for_card,
                 request,
@@ -172,18 +210,19 @@ class Session:
             return Source(self.folder.get_name(path), path)
 
     def correct_mapping(self, entries: Sequence[Entry]) -> None:
-        """Read the log again with the corrected mapping; discard the previous results.
+        """Read the selected log again with the corrected mapping; discard the previous results.
 
         Raises MappingError, UnitError; the work stays as it was then, and goes on.
         """
         with self.lock:
-            channels = apply_entries(self.work.require_opened().survey, entries)
-            opened = self._read(self.work, channels)
+            one = self.work.require_open_log()
+            channels = apply_entries(one.opened.survey, entries)
+            fresh = self._read_log(one.source, self.work.card, one.mapping, channels)
             self.cancel()
-            self._set(replace(self.work, channels=channels).set_opened(opened))
+            self._set(self.work.set_log(fresh))
 
     def move_boundaries(self, index: int, changes: Mapping[Boundary, float]) -> None:
-        """Set boundaries of a shift by hand; none: as detected. Raises InputError."""
+        """Set boundaries of a shift of the selected log; none: as detected. Raises InputError."""
         with self.lock:
             self._set(self.work.apply_moves(index, changes))
 
@@ -198,8 +237,7 @@ class Session:
             if self.job is not None:
                 raise InputError("an identification is running", "wait for it or cancel it")
             work = self.work
-            work.require_shift()
-            task = Task(work.require_log(), work.apply_locks_to_card(), work.shifts, tuple(methods))
+            task = Task(work.build_sources(), work.apply_locks_to_card(), tuple(methods))
             self._set(work.drop_results())
             self.job = jobs.start(identify_all, task)
 
@@ -241,6 +279,23 @@ class Session:
                 raise InputError("there is no such result", "choose one that is listed")
             self._set(replace(self.work, method=method, changes={}))
 
+    def set_view(self, view: View) -> bool:
+        """Note the time window that was zoomed to.
+
+        Returns True if another shift was selected: the only one in the window, unless sliders of
+        the selected one were moved.
+        """
+        with self.lock:
+            inside = [
+                k for k, one in enumerate(self.work.shifts) if view[0] <= one.lockup_time <= view[1]
+            ]
+            can_select = len(inside) == 1 and not self.work.changes
+            is_other = can_select and inside[0] != self.work.shift
+            if is_other:
+                self._set(replace(self.work, shift=inside[0]))
+            self.view = view
+            return is_other
+
     def get_simulation(self) -> Live:
         """Run and figure at the present sliders. Raises what the simulation needs and lacks."""
         with self.lock:
@@ -261,7 +316,7 @@ class Session:
             )
             self.work = replace(work, changes=dict(changes))
             self.live = replace(live, present=present)
-            return what_if.collect_changed_curves(live.figure, present)
+            return what_if.collect_changed_curves(live.figure, present, self.view)
 
     def note_export(self) -> None:
         """Record that the result was exported."""
@@ -291,10 +346,12 @@ class Session:
         """Go on with a saved workspace. Raises RefusedError, and the errors of log and card."""
         with self.lock:
             content = workspace.load_workspace(source.path, source.name)
-            log, card = workspace.locate_sources(content, self.folder, source.name)
-            work = SessionState(log=log, card=card, channels=content.to_specs())
-            work = work.set_opened(self._read(work, work.channels))
-            work = workspace.restore_workspace(content, work)
+            logs, card = workspace.locate_sources(content, self.folder, source.name)
+            read = tuple(
+                self._read_log(one, card, None, entry.to_specs())
+                for one, entry in zip(logs, content.logs, strict=True)
+            )
+            work = workspace.restore_workspace(content, SessionState(logs=read, card=card))
             self.cancel()
             self._set(work)
 
@@ -304,37 +361,44 @@ class Session:
         shutil.rmtree(self.scratch, ignore_errors=True)
 
     def _set(self, work: SessionState) -> None:
+        if work.log != self.work.log:
+            self.preview = None
+        if (work.log, work.shift) != (self.work.log, self.work.shift):
+            self.view = None
         self.work = work
         self.live = None
 
-    def _read(
-        self, work: SessionState, channels: Mapping[str, ChannelSpec]
-    ) -> sandboxed_parse.Opened:
-        request = self._make_request(work, channels)
-        scratch = self.scratch / "mapping.toml"
+    def _read_log(
+        self,
+        log: Source,
+        card: Source | None,
+        mapping: Path | None,
+        channels: Mapping[str, ChannelSpec],
+    ) -> OpenLog:
+        request = _make_request(log, card, mapping, channels)
         opened: sandboxed_parse.Opened = jobs.call(
             sandboxed_parse.open_log,
             request,
-            scratch,
+            self.scratch / "mapping.toml",
             limit=compute_parser_limits(request.log).seconds,
         )
-        return opened
+        shifts = () if opened.found is None else opened.found.shifts
+        return OpenLog(log, opened, mapping, channels, shifts)
 
-    def _make_request(
-        self, work: SessionState, channels: Mapping[str, ChannelSpec]
-    ) -> sandboxed_parse.Request:
-        """The files of a session; a log of the folder has the mapping of its project."""
-        if work.log is None:
-            raise InputError("no log is open", "open one in the step Log")
-        project = None if work.log.uploaded else find_project_mapping(work.log.path)
-        return sandboxed_parse.Request(
-            log=work.log.path,
-            label=work.log.name,
-            card=None if work.card is None else work.card.path,
-            card_label="" if work.card is None else work.card.name,
-            mapping=work.mapping or project,
-            channels=channels,
-        )
+
+def _make_request(
+    log: Source, card: Source | None, mapping: Path | None, channels: Mapping[str, ChannelSpec]
+) -> sandboxed_parse.Request:
+    """The files to read; a log of the folder has the mapping of its project."""
+    project = None if log.uploaded else find_project_mapping(log.path)
+    return sandboxed_parse.Request(
+        log=log.path,
+        label=log.name,
+        card=None if card is None else card.path,
+        card_label="" if card is None else card.name,
+        mapping=mapping or project,
+        channels=channels,
+    )
 
 
 @dataclass(eq=False)

@@ -3,50 +3,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
+from drivetwin.validation.multi_log import Source as FitSource
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.locks import Lock, apply_locks, check_lock, get_card_lock
 from drivetwin.workbench.identifying import Outcome, Refusal
-from drivetwin.workbench.phases import Boundary, move_boundaries
+from drivetwin.workbench.open_log import OpenLog, Source
+from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.sandboxed_parse import Opened
-
-
-@dataclass(frozen=True)
-class Source:
-    """File in use: display name, path, and upload flag."""
-
-    name: str
-    path: Path
-    uploaded: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class SessionState:
     """The state of a session.
 
-    `channels` are the corrections of the mapping, `moves` the boundaries set by hand [s] by number
-    of the shift, `changes` the sliders (SI) that differ from the identified values. `method` and
-    `shift` select the result and the shift of the sliders. `ended` is the reason why the last
-    identification ended before its last method; empty if it was completed. `has_viewed` and
-    `has_exported` state whether the result was looked at in the step Model, and exported.
+    `at` selects one of the `logs`: the views show its channels, phases and simulation. `method` and
+    `shift` select the result and the shift of the sliders; `changes` are the sliders (SI) that
+    differ from the identified values. `ended` is the reason why the last identification ended
+    before its last method; empty if it was completed. `has_viewed` and `has_exported` state whether
+    the result was looked at in the step Model, and exported.
     """
 
-    log: Source | None = None
+    logs: tuple[OpenLog, ...] = ()
+    at: int = 0
     card: Source | None = None
-    mapping: Path | None = None
-    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
-    opened: Opened | None = None
-    shifts: tuple[Shift, ...] = ()
-    moves: Mapping[int, Mapping[Boundary, float]] = field(default_factory=dict)
     locks: Mapping[str, Lock] = field(default_factory=dict)
     results: Mapping[Method, Outcome] = field(default_factory=dict)
     refusals: Mapping[Method, str] = field(default_factory=dict)
@@ -58,30 +47,69 @@ class SessionState:
     has_exported: bool = False
 
     @property
+    def log(self) -> Source | None:
+        """File of the selected log; None before one is open."""
+        return self.logs[self.at].source if self.logs else None
+
+    @property
+    def opened(self) -> Opened | None:
+        """Contents of the selected log; None before one is open."""
+        return self.logs[self.at].opened if self.logs else None
+
+    @property
+    def shifts(self) -> tuple[Shift, ...]:
+        """Shifts of the selected log."""
+        return self.logs[self.at].shifts if self.logs else ()
+
+    @property
+    def channels(self) -> Mapping[str, ChannelSpec]:
+        """Corrections of the selected log's mapping."""
+        return self.logs[self.at].channels if self.logs else {}
+
+    @property
+    def all_shifts(self) -> tuple[Shift, ...]:
+        """Shifts of all logs."""
+        return tuple(shift for one in self.logs for shift in one.shifts)
+
+    @property
     def verdict_outcome(self) -> Outcome | None:
         """Result of the default method, which alone gives a verdict; None before it."""
         return self.results.get(DEFAULT_METHOD)
 
-    def set_opened(self, opened: Opened) -> SessionState:
-        """After a log was read: what was found from another reading no longer holds."""
-        shifts = opened.found.shifts if opened.found is not None else ()
-        return replace(
-            self,
-            opened=opened,
-            shifts=shifts,
-            moves={},
-            shift=0,
-        ).drop_results()
+    def set_log(self, fresh: OpenLog) -> SessionState:
+        """Replace the selected log after it was read again; results no longer hold."""
+        logs = tuple(fresh if k == self.at else one for k, one in enumerate(self.logs))
+        return replace(self, logs=logs, shift=0).drop_results()
+
+    def select_log(self, index: int) -> SessionState:
+        """Select the log that the views show. Raises InputError."""
+        if not 0 <= index < len(self.logs):
+            raise InputError("there is no such log", "choose one that is listed")
+        return replace(self, at=index, shift=0, changes={})
+
+    def remove_log(self, index: int) -> SessionState:
+        """Close one of several logs; results no longer hold. Raises InputError."""
+        if not 0 <= index < len(self.logs) or len(self.logs) == 1:
+            raise InputError("there is no such log to remove", "choose one of several logs")
+        logs = tuple(one for k, one in enumerate(self.logs) if k != index)
+        at = min(self.at - (index < self.at), len(logs) - 1)
+        return replace(self, logs=logs, at=at, shift=0).drop_results()
+
+    def hold_out(self, held: Sequence[frozenset[int]]) -> SessionState:
+        """Set the indices of the shifts to predict, log by log. Raises InputError."""
+        if len(held) != len(self.logs) or any(
+            not own <= set(range(len(one.shifts)))
+            for own, one in zip(held, self.logs, strict=False)
+        ):
+            raise InputError("there is no such shift", "choose one of the shifts of the log")
+        logs = (replace(one, held=own) for one, own in zip(self.logs, held, strict=True))
+        return replace(self, logs=tuple(logs))
 
     def apply_moves(self, index: int, changes: Mapping[Boundary, float]) -> SessionState:
-        """With boundaries of one shift set by hand; none: as detected. Raises InputError."""
-        log, card = self.require_log(), self.require_card()
-        detected = self._get_detected_shift(index)
-        kept = {**self.moves.get(index, {}), **changes} if changes else {}
-        fresh = move_boundaries(log, card, detected, kept)
-        shifts = tuple(fresh if k == index else one for k, one in enumerate(self.shifts))
-        moves = {k: v for k, v in {**self.moves, index: kept}.items() if v}
-        return replace(self, shifts=shifts, moves=moves)
+        """With boundaries of a shift of the selected log by hand; none: as detected."""
+        fresh = self.require_open_log().apply_moves(self.require_card(), index, changes)
+        logs = tuple(fresh if k == self.at else one for k, one in enumerate(self.logs))
+        return replace(self, logs=logs)
 
     def set_lock(self, parameter_id: str, lock: Lock) -> SessionState:
         """With one parameter locked; a lock as on the card is none. Raises InputError."""
@@ -112,11 +140,34 @@ class SessionState:
         """The card as the locks have it."""
         return apply_locks(self.require_card(), self.locks)
 
-    def require_opened(self) -> Opened:
-        """Return the opened log; raise InputError if none is open."""
-        if self.opened is None:
+    def require_open_log(self) -> OpenLog:
+        """Return the selected log; raise InputError if none is open."""
+        if not self.logs:
             raise InputError("no log is open", "open one in the step Log")
-        return self.opened
+        return self.logs[self.at]
+
+    def build_sources(self) -> list[FitSource]:
+        """Build the input of an identification from all logs.
+
+        Raises InputError for a log that cannot be read, and if no shift is left to fit.
+        """
+        self.require_card()
+        logs = [one.require_log() for one in self.logs]
+        if not self.all_shifts:
+            raise InputError(
+                "the log holds no usable gear shift", "the step Shifts lists the reasons"
+            )
+        if not any(one.fitted for one in self.logs):
+            raise InputError("every shift is held out", "fit at least one in the step Shifts")
+        return [
+            FitSource(log, FoundShifts(one.shifts, ()), frozenset(k + 1 for k in one.held))
+            for log, one in zip(logs, self.logs, strict=True)
+            if one.shifts
+        ]
+
+    def require_opened(self) -> Opened:
+        """Return the contents of the selected log; raise InputError if none is open."""
+        return self.require_open_log().opened
 
     def require_card(self) -> VehicleCard:
         """The vehicle card; raises InputError before one is open."""
@@ -126,13 +177,8 @@ class SessionState:
         return card
 
     def require_log(self) -> ShiftLog:
-        """Return the log; raise InputError if none is open or it cannot be read."""
-        opened = self.require_opened()
-        if opened.log is None:
-            raise InputError(
-                "the log cannot be read as mapped", "correct the mapping in the step Channels"
-            )
-        return opened.log
+        """Return the channels of the selected log; raise InputError if it cannot be read."""
+        return self.require_open_log().require_log()
 
     def require_shift(self) -> Shift:
         """Return the selected shift; raise InputError if the log has none."""
@@ -151,11 +197,17 @@ class SessionState:
         return self.results[self.method]
 
     def require_twin(self) -> Twin:
-        """The twin that is shown; raises InputError before an identification."""
-        return self.require_outcome().twin
+        """The twin of the selected log; raises InputError before an identification."""
+        outcome, source = self.require_outcome(), self.require_open_log().source
+        if source.name not in outcome.twins:
+            raise InputError(
+                f"no shift of {source.name} was fitted: load and signal delay of this log are "
+                "not in the model",
+                "choose a fitted log; the step Identify shows the prediction of this one",
+            )
+        return outcome.twins[source.name]
 
-    def _get_detected_shift(self, index: int) -> Shift:
-        found = self.require_opened().found
-        if found is None or not 0 <= index < len(found.shifts):
-            raise InputError("there is no such shift", "choose one of the shifts of the log")
-        return found.shifts[index]
+    def get_fitted_logs(self) -> list[ShiftLog]:
+        """Return the logs of the result that is shown, in the order of the fit."""
+        logs = {one.source.name: one.require_log() for one in self.logs}
+        return [logs[name] for name in self.require_outcome().twins]

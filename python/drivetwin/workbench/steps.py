@@ -65,7 +65,7 @@ def _iterate_states(work: SessionState, running: bool) -> Iterator[StepState]:
         for step in list(Step)[1:]:
             yield StepState(step, Status.BLOCKED, "No log is open.", Step.LOG)
         return
-    yield StepState(Step.LOG, Status.DONE, f"{work.log.name} is open.")
+    yield StepState(Step.LOG, Status.DONE, _describe_logs(work))
     yield _assess_channels(work)
     yield _assess_card(work)
     yield _assess_shifts(work)
@@ -73,10 +73,22 @@ def _iterate_states(work: SessionState, running: bool) -> Iterator[StepState]:
     yield from _assess_use(work, running)
 
 
+def _describe_logs(work: SessionState) -> str:
+    names = [one.source.name for one in work.logs]
+    return f"{names[0]} is open." if len(names) == 1 else f"{len(names)} logs are open."
+
+
+def _find_unreadable(work: SessionState) -> str:
+    """Return what is wrong if a log cannot be read as mapped; empty without one."""
+    names = [one.source.name for one in work.logs if one.opened.log is None]
+    return f"{names[0]} cannot be read as mapped." if names else ""
+
+
 def _assess_channels(work: SessionState) -> StepState:
     log = work.require_opened().log
-    if log is None:
-        return StepState(Step.CHANNELS, Status.OPEN, "The log cannot be read as mapped.")
+    fault = _find_unreadable(work)
+    if log is None or fault:
+        return StepState(Step.CHANNELS, Status.OPEN, fault)
     missing = [role for role in NEEDED if role not in log]
     if missing:
         text = f"{len(log.channels)} channels are mapped; not in the log: {', '.join(missing)}."
@@ -96,24 +108,34 @@ def _assess_card(work: SessionState) -> StepState:
 
 def _assess_shifts(work: SessionState) -> StepState:
     opened = work.require_opened()
-    if opened.log is None:
-        text = "The log cannot be read as mapped."
-        return StepState(Step.SHIFTS, Status.BLOCKED, text, Step.CHANNELS)
+    if fault := _find_unreadable(work):
+        return StepState(Step.SHIFTS, Status.BLOCKED, fault, Step.CHANNELS)
     if opened.card is None:
         return StepState(Step.SHIFTS, Status.BLOCKED, "No vehicle card is open.", Step.CARD)
-    if not work.shifts:
+    if not work.all_shifts:
         text = "The log has no usable shift. The reasons are below."
         return StepState(Step.SHIFTS, Status.BLOCKED, text, Step.CARD, has_content=True)
-    return StepState(
-        Step.SHIFTS, Status.DONE, f"{', '.join(make_shift_labels(work.shifts))} found."
-    )
+    return StepState(Step.SHIFTS, Status.DONE, _describe_shifts(work))
+
+
+def _describe_shifts(work: SessionState) -> str:
+    """Name the shifts of one log, or count those of several; and those held out."""
+    count = len(work.all_shifts)
+    held = sum(len(one.held) for one in work.logs)
+    text = f"{count} shifts of {len(work.logs)} logs found"
+    if len(work.logs) == 1:
+        text = f"{', '.join(make_shift_labels(work.shifts))} found"
+    return f"{text}, {held} held out." if held else f"{text}."
 
 
 def _assess_identification(work: SessionState, running: bool) -> StepState:
     if running:
         return StepState(Step.IDENTIFY, Status.RUNNING, "The identification is running.")
-    if not work.shifts:
+    if not work.all_shifts or _find_unreadable(work):
         return StepState(Step.IDENTIFY, Status.BLOCKED, "There is no shift.", Step.SHIFTS)
+    if not any(one.fitted for one in work.logs):
+        text = "Every shift is held out."
+        return StepState(Step.IDENTIFY, Status.BLOCKED, text, Step.SHIFTS)
     if work.verdict_outcome is not None:
         return StepState(Step.IDENTIFY, Status.DONE, "The model is identified.")
     if DEFAULT_METHOD in work.refusals or work.ended:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +12,6 @@ from drivetwin._util.display_units import Display, get_display_unit
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.parameters import get_parameter_spec
-from drivetwin.report.decimate import decimate_around
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import build_validation_panels
@@ -23,13 +21,13 @@ from drivetwin.report.style import COMPARED
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
-    FloatArray,
     FrictionTable,
     ShiftElement,
     Stribeck,
 )
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
+from drivetwin.workbench.zoom import View, encode_curves
 
 FRICTION = "mu."
 """Prefix of the slider that scales the friction of an element; 1 as identified."""
@@ -133,35 +131,34 @@ def simulate_changes(
 
 def plot_what_if(identified: Validation, present: Validation) -> Figure:
     """Simulation over measurement; where parameters are changed also the one as identified."""
-    panels = [_add_identified(panel, identified) for panel in build_validation_panels(present)]
+    panels = build_what_if_panels(identified, present)
     figure = stack_panels(panels, present.phases, height=_HEIGHT)
     figure.merge_layout(uirevision=make_link(present.shift))
     return figure
 
 
-def collect_changed_curves(figure: Figure, present: Validation) -> dict[int, dict[str, Any]]:
+def build_what_if_panels(identified: Validation, present: Validation) -> list[Panel]:
+    """Return the panels of `plot_what_if` from top to bottom."""
+    return [_add_identified(panel, identified) for panel in build_validation_panels(present)]
+
+
+def collect_changed_curves(
+    figure: Figure, present: Validation, view: View | None = None
+) -> dict[int, dict[str, Any]]:
     """Collect new x and y of the traces of `plot_what_if` that follow the sliders, by trace index.
 
-    They are packed (`dtype`, `bdata` in base64), as formatting digits would take half of the time.
+    They are fine in `view` [s]; None: the view on which the figure opens.
     """
-    view = figure.layout.xaxis.range
     curves = [
         (panel.display, curve)
         for panel in build_validation_panels(present)
         for curve in panel.curves
+        if curve.name in _FOLLOWING
     ]
-    following = [pair for pair in curves if pair[1].name in _FOLLOWING]
     places = [k for k, trace in enumerate(figure.data) if trace.name in _FOLLOWING]
-    found = {}
-    for place, (display, curve) in zip(places, following, strict=True):
-        time, values = decimate_around(curve.time, curve.values, (view[0], view[1]))
-        found[place] = {"x": _encode_values(time), "y": _encode_values(display.to_display(values))}
-    return found
-
-
-def _encode_values(values: FloatArray) -> dict[str, str]:
-    """An array as plotly.js reads it without a number being spelled out."""
-    return {"dtype": "f4", "bdata": base64.b64encode(values.astype("<f4").tobytes()).decode()}
+    opening = figure.layout.xaxis.range
+    shown = view or (opening[0], opening[1])
+    return encode_curves(zip(places, curves, strict=True), shown)
 
 
 def _build_slider(twin: Twin, name: str) -> Slider | None:

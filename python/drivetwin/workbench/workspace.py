@@ -23,8 +23,9 @@ from drivetwin.files.twin_conversion import build_twin_file, restore_twin
 from drivetwin.files.twin_file import TwinFile
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.identifying import Outcome
+from drivetwin.workbench.open_log import OpenLog, Source
 from drivetwin.workbench.phases import Boundary
-from drivetwin.workbench.session_state import SessionState, Source
+from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.workspace_folder import Folder
 
@@ -47,21 +48,16 @@ class LockEntry(StrictModel):
     std: float = Field(default=0.0, ge=0)
 
 
-class WorkspaceFile(StrictModel):
-    """The whole file. `phases` [s] go by number of the shift, `sliders` (SI) by parameter id."""
+class LogEntry(StrictModel):
+    """A log with the corrections of its mapping.
 
-    format: Literal["drivetwin workspace"] = "drivetwin workspace"
-    version: Literal[1] = 1
-    program: str
-    log: FileEntry
-    card: FileEntry
+    `phases` [s] go by index of the shift; `held` are the indices of the shifts to predict.
+    """
+
+    file: FileEntry
     channels: dict[str, ChannelTable] = Field(default_factory=dict)
     phases: dict[int, dict[Boundary, float]] = Field(default_factory=dict)
-    locks: dict[str, LockEntry] = Field(default_factory=dict)
-    twins: dict[Method, TwinFile] = Field(default_factory=dict)
-    method: Method | None = None
-    shift: int = Field(default=0, ge=0)
-    sliders: dict[str, float] = Field(default_factory=dict)
+    held: list[int] = Field(default_factory=list)
 
     @field_validator("channels")
     @classmethod
@@ -76,6 +72,22 @@ class WorkspaceFile(StrictModel):
     def to_specs(self) -> dict[str, ChannelSpec]:
         """Corrections of the mapping by role."""
         return {role: table.to_spec() for role, table in self.channels.items()}
+
+
+class WorkspaceFile(StrictModel):
+    """The whole file. `twins` go by method and name of the log, `sliders` (SI) by parameter id."""
+
+    format: Literal["drivetwin workspace"] = "drivetwin workspace"
+    version: Literal[2] = 2
+    program: str
+    logs: list[LogEntry] = Field(min_length=1, max_length=100)
+    card: FileEntry
+    log: int = Field(default=0, ge=0)
+    locks: dict[str, LockEntry] = Field(default_factory=dict)
+    twins: dict[Method, dict[str, TwinFile]] = Field(default_factory=dict)
+    method: Method | None = None
+    shift: int = Field(default=0, ge=0)
+    sliders: dict[str, float] = Field(default_factory=dict)
 
     def to_locks(self) -> dict[str, Lock]:
         """Locks by parameter id."""
@@ -94,18 +106,19 @@ def save_workspace(work: SessionState, path: Path, folder: Folder) -> None:
             "a file of this name exists and is no workspace", "choose another name",
             Where(file=path.name),
         )  # fmt: skip
-    log, card = (_make_file_entry(one, path.parent, folder) for one in (work.log, work.card))
     content = WorkspaceFile(
         program=get_program_version(),
-        log=log,
-        card=card,
-        channels={role: _make_channel_table(spec) for role, spec in work.channels.items()},
-        phases={index: dict(times) for index, times in work.moves.items()},
+        logs=[_make_log_entry(one, path.parent, folder) for one in work.logs],
+        card=_make_file_entry(work.card, path.parent, folder),
+        log=work.at,
         locks={
             name: LockEntry(kind=one.kind, value=one.value, std=one.std)
             for name, one in work.locks.items()
         },
-        twins={method: build_twin_file(one.twin) for method, one in work.results.items()},
+        twins={
+            method: {name: build_twin_file(twin) for name, twin in one.twins.items()}
+            for method, one in work.results.items()
+        },
         method=work.method,
         shift=work.shift,
         sliders=dict(work.changes),
@@ -133,24 +146,32 @@ def load_workspace(path: Path, label: str) -> WorkspaceFile:
         ) from None
 
 
-def locate_sources(content: WorkspaceFile, folder: Folder, label: str) -> tuple[Source, Source]:
-    """Locate log and card of a workspace in the folder. Raises RefusedError if one has changed."""
-    return _locate_source(content.log, folder, label), _locate_source(content.card, folder, label)
+def locate_sources(
+    content: WorkspaceFile, folder: Folder, label: str
+) -> tuple[list[Source], Source]:
+    """Locate logs and card of a workspace in the folder. Raises RefusedError if one has changed."""
+    logs = [_locate_source(one.file, folder, label) for one in content.logs]
+    return logs, _locate_source(content.card, folder, label)
 
 
 def restore_workspace(content: WorkspaceFile, work: SessionState) -> SessionState:
-    """Return `work`, whose log was read again, with the saved state of the workspace.
+    """Return `work`, whose logs were read again, with the saved state of the workspace.
 
-    Raises InputError where phases, locks or sliders do not belong to the log.
+    Raises InputError where phases, locks or sliders do not belong to the logs.
     """
-    for index, times in content.phases.items():
-        work = work.apply_moves(index, times)
+    for index, entry in enumerate(content.logs):
+        work = work.select_log(index)
+        for shift, times in entry.phases.items():
+            work = work.apply_moves(shift, times)
+    work = work.hold_out([frozenset(entry.held) for entry in content.logs])
     for name, lock in content.to_locks().items():
         work = work.set_lock(name, lock)
     results = {
-        method: Outcome(method, restore_twin(twin)) for method, twin in content.twins.items()
+        method: Outcome(method, {name: restore_twin(twin) for name, twin in twins.items()})
+        for method, twins in content.twins.items()
+        if twins
     }
-    work = replace(work, results=results)
+    work = replace(work.select_log(content.log), results=results)
     if content.method in results and content.shift < len(work.shifts):
         changes = dict(content.sliders)
         work = replace(work, method=content.method, shift=content.shift, changes=changes)
@@ -174,9 +195,18 @@ def compute_digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def _make_log_entry(one: OpenLog, beside: Path, folder: Folder) -> LogEntry:
+    return LogEntry(
+        file=_make_file_entry(one.source, beside, folder),
+        channels={role: _make_channel_table(spec) for role, spec in one.channels.items()},
+        phases={index: dict(times) for index, times in one.moves.items()},
+        held=sorted(one.held),
+    )
+
+
 def _make_file_entry(source: Source | None, beside: Path, folder: Folder) -> FileEntry:
     if source is None:
-        raise RefusedError("no log is open", "open a log and its vehicle card first")
+        raise RefusedError("no vehicle card is open", "open one in the step Card")
     if not source.uploaded:
         return FileEntry(path=source.name, sha256=compute_digest(source.path))
     target = folder.make_new_path(folder.get_name(beside / source.name), "")

@@ -29,5 +29,5 @@ def test_spread_agrees_with_the_covariance() -> None:
 
 
 def test_too_few_are_refused() -> None:
-    with pytest.raises(InputError, match="tells no spread"):
+    with pytest.raises(InputError, match="too small for a spread"):
         bootstrap(stepped(), MIN_FITS - 1, seed=0)

@@ -72,6 +72,6 @@ def test_refuses_other_methods() -> None:
 
 def test_of_a_search_that_was_given_up_it_is_told_why() -> None:
     evidence = replace(by_the_paper().evidence, gave_up="the work ran out")
-    with pytest.raises(IdentificationError, match=r"gave up on this log.+ the work ran") as told:
+    with pytest.raises(IdentificationError, match=r"fit of this log failed.+ the work ran") as told:
         get_likelihood_fit(replace(by_the_paper(), evidence=evidence))
     assert "--method likelihood" not in told.value.remedy

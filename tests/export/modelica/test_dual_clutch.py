@@ -74,7 +74,7 @@ def test_an_element_named_as_another_part_is_refused(name: str) -> None:
     model = _model()
     off, on = (replace(one, drum_inertia=0.1) for one in model.elements)
     renamed = replace(model, elements=(off, replace(on, name=name)))
-    with pytest.raises(InputError, match="would stand for two parts of the Modelica model"):
+    with pytest.raises(InputError, match="would name two parts of the Modelica model"):
         format_modelica(Subject("truck 2-3", renamed, SLIPPING))
 
 

@@ -270,7 +270,7 @@ REFUSED: dict[str, tuple[str, type[DrivetwinError], str]] = {
         "Time,a\n0 sec,1\n1 sec,2\n2 parsec,3\n", TimeError, "line 4: '2 parsec' is no duration"
     ),
     "two times": ("Time,Timestamp,a\ns,s,Nm\n0,0,1\n1,1,2\n2,2,3\n", MappingError, "several time"),
-    "no names": (rows(), FileFormatError, "line 1 holds numbers where the names should stand"),
+    "no names": (rows(), FileFormatError, "line 1 holds numbers in place of names"),
     "a table above": (
         "1,2,3\n4,5,6\n7,8,9\n" + PLAIN, FileFormatError, ""
     ),

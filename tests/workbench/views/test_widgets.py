@@ -54,8 +54,8 @@ def test_a_log_without_a_shift_is_no_success(
 ) -> None:
     messages: list[tuple[str, bool]] = []
     monkeypatch.setattr(widgets, "notify", lambda text, fault=False: messages.append((text, fault)))
-    work = replace(identified.work, shifts=identified.work.shifts[:shifts])
-    widgets.notify_opened_log("a.csv is open", work)
+    log = identified.work.require_open_log()
+    widgets.notify_opened_log("a.csv is open", replace(log, shifts=log.shifts[:shifts]))
     assert messages == [(says, bad)]
 
 
@@ -67,8 +67,9 @@ def test_a_fault_of_the_mapping_speaks_of_the_page(
     fault = (
         "no channel -> name it in a channel mapping file (--channels) or in [channels] of the card"
     )
-    opened = replace(identified.work.require_opened(), fault=fault)
-    widgets.notify_opened_log("a.csv is open", replace(identified.work, opened=opened))
+    log = identified.work.require_open_log()
+    failed = replace(log, opened=replace(log.opened, fault=fault))
+    widgets.notify_opened_log("a.csv is open", failed)
     assert messages == [
         "The log cannot be read as mapped. no channel -> correct it in the step Channels"
     ]

@@ -70,7 +70,7 @@ def bootstrap(found: Identification, count: int, seed: int) -> Bootstrap:
     """
     if count < MIN_FITS:
         raise InputError(
-            f"a bootstrap of {count} fits tells no spread", f"ask for {MIN_FITS} or more"
+            f"a bootstrap of {count} fits is too small for a spread", f"ask for {MIN_FITS} or more"
         )
     base, signals = get_likelihood_fit(found)
     estimate = compute_parameters(base.problem, base.point, signals)

@@ -77,7 +77,7 @@ class Departure:
     def text(self) -> str:
         """Verdict of the log on it."""
         if self.std > DEPENDENCE.max_relative_std * self.plausible:
-            return "not told by this log"
+            return "not determined by this log"
         if abs(self.value) > DEPENDENCE.significant_sigma * self.std:
             return "seen"
         return "none seen"

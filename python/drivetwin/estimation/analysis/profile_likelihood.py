@@ -82,7 +82,7 @@ def compute_profile(found: Identification, parameter: str) -> Profile:
     held = _FixedParameter(fit, signals, list(told).index(parameter), parameter)
     if held.std == 0.0:
         raise InputError(
-            f"{parameter} is known from design and does not move",
+            f"{parameter} is fixed by design",
             "give it a standard deviation on the vehicle card, or choose another",
         )
     notify_progress(0.0)
@@ -106,7 +106,7 @@ def get_likelihood_fit(found: Identification) -> tuple[LikelihoodFit, Sequence[S
     fit, gave_up = found.evidence.likelihood, found.evidence.gave_up
     if fit is None and gave_up:
         raise IdentificationError(
-            f"the likelihood method gave up on this log, so there is no fit to work on: {gave_up}",
+            f"the likelihood fit of this log failed, so it has no profile: {gave_up}",
             REMEDY,
         )
     if fit is None:

@@ -26,7 +26,7 @@ def require_compatible(logs: Sequence[ShiftLog]) -> None:
     if without and len(without) < len(logs):
         raise InputError(
             f"{', '.join(without)} without an output torque among logs that have one: the former "
-            "tell all torques over η, the latter tell them as they are",
+            "determine torques over η only, the latter torques themselves",
             "map the sensor as `output_torque`, or identify the two kinds apart",
             Where(file=without[0]),
         )

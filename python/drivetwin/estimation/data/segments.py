@@ -151,7 +151,7 @@ def find_segments(
         raise IdentificationError(
             "nowhere does torque flow from the engine to the wheels throughout, which the momentum "
             "balance by the dissipative loss law needs",
-            "use the likelihood method, or record a second with the pedal down beside the shift",
+            "use the likelihood method, or record a second with the pedal down close to the shift",
         )
     if not found:
         raise IdentificationError(

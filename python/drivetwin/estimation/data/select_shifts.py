@@ -91,7 +91,7 @@ def _describe_rejection(left: float, steady: bool) -> str:
             "change those with the steadiest load first; hold it out to see it predicted"
         )
     if not np.isfinite(left):
-        return "the gears held beside it tell nothing of its load; other shifts of the log do"
+        return "the gears before and after it do not determine its load; those of other shifts do"
     return (
         f"the load is not constant: the balance of the vehicle leaves {left:.3g} times its noise "
         "power, as where the brake is used or the grade changes; other shifts of the log do without"

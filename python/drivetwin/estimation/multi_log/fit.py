@@ -79,7 +79,7 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
         except IdentificationError as fault:
             raise IdentificationError(
                 f"each of {len(logs)} logs can be explained, but not all by one set of parameters: "
-                f"alone they tell {'; '.join(find_largest_differences(alone)) or fault.what}",
+                f"alone they give {'; '.join(find_largest_differences(alone)) or fault.what}",
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
     told = build_estimates(fit, signals, drivelines, pool_curves(alone), priors)

@@ -332,7 +332,7 @@ def _compute_information_inverse(information: FloatArray) -> FloatArray:
     balanced = information / np.outer(scale, scale)
     if np.linalg.cond(balanced) > 1e14:
         raise IdentificationError(
-            "the equations cannot tell some of the parameters apart",
+            "the equations do not separate some of the parameters",
             "record a run in which engine torque and speed change independently",
         )
     return np.asarray(np.linalg.inv(balanced) / np.outer(scale, scale), dtype=float)

@@ -66,8 +66,8 @@ noise levels are estimates themselves, and an effect of a tenth of the noise is 
 class Outcome(StrEnum):
     """Assessment of a prediction."""
 
-    ALLOWED = "as noise allows"
-    WORSE = "worse than noise"
+    ALLOWED = "consistent with noise"
+    WORSE = "inconsistent: model error"
     NOT_JUDGED = "not judged"
     NOT_PREDICTED = "not predicted"
 

@@ -75,7 +75,7 @@ def _refuse_doubles(names: Iterable[str]) -> None:
     doubled = [name for name, count in Counter(names).items() if count > 1]
     if doubled:
         raise InputError(
-            f"{', '.join(map(repr, doubled))} would stand for two parts of the Modelica model",
+            f"{', '.join(map(repr, doubled))} would name two parts of the Modelica model",
             "give the shift element or the node another name",
         )
 

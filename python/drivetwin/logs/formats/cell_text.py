@@ -79,7 +79,7 @@ def check_decimal_signs(columns: Sequence[Written], file: str) -> None:
     if point is not None:
         fault = f"numbers with point ({point.decode()!r}) and with comma ({example!r})"
     elif not any(clear for _, _, _, clear in columns):
-        fault = f"the comma in {example!r} and all others may stand for decimals or for thousands"
+        fault = f"the comma in {example!r} and all others may separate decimals or thousands"
     elif grouped is not None:
         one, other = (text.decode() for text in grouped)
         fault = f"a column with {one!r} and {other!r}: the comma may group thousands"

@@ -80,7 +80,7 @@ class _Block:
 def _parse_block(data: mmap.mmap, place: int, expected: bytes) -> _Block | str:
     """The block at a place, or what is wrong there."""
     if place % 8 or place + 24 > len(data):
-        return f"a block should stand at byte {place} of {len(data)}"
+        return f"a block is expected at byte {place} of {len(data)}"
     kind = data[place : place + 4]
     length, links = struct.unpack_from("<QQ", data, place + 8)
     if (expected and kind != expected) or place + length > len(data) + 8:

@@ -220,7 +220,7 @@ class _TableLines:
             named = self._find_commented_names(lines)
             if not named:
                 raise FileFormatError(
-                    f"line {self.lines[0].number} holds numbers where the names should stand",
+                    f"line {self.lines[0].number} holds numbers in place of names",
                     EXPORT,
                     Where(file=file),
                 )

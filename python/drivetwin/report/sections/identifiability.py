@@ -137,8 +137,8 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
             Cell("what would narrow it"),
         )
         yield TableBlock(
-            "The least well known. Where sensor tolerances and effects make the interval, no "
-            "experiment narrows it.",
+            "The least certain parameters. Where sensor tolerances and effects make the interval, "
+            "no experiment narrows it.",
             head,
             rows,
         )

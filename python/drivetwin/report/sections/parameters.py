@@ -107,7 +107,7 @@ def _count_parameters(found: Identification) -> str:
     count = Counter(estimate.verdict for estimate in found.estimates.values())
     text = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)} parameters are identified"
     for verdict, words in (
-        (Verdict.WEAK, "only weakly known"),
+        (Verdict.WEAK, "weak"),
         (Verdict.NOT_IDENTIFIABLE, "not identifiable from this log"),
         (Verdict.DESIGN, "taken from the vehicle card"),
     ):

@@ -238,7 +238,7 @@ def _build_judgement_table(found: Identification, held: Sequence[HeldOut]) -> Ta
             verdict = Cell(one.outcome.value, badge=True, tone=_TONES[one.outcome])
             rows.append((*make_cells(one.name, ""), *dashes, Cell(""), verdict))
     return TableBlock(
-        "Predictions beside what was fitted (of all fitted shifts), and what noise allows.",
+        "Errors of the predictions, of the fitted shifts, and the limit set by noise.",
         head,
         rows,
     )
@@ -261,8 +261,8 @@ def _build_prediction_blocks(one: HeldOut, run: Validation) -> Iterator[Block]:
     """Simulation over measurement of one prediction, and its fit by phase."""
     yield FigureBlock(
         plot_validation(run),
-        f"{one.name}, predicted: measured inputs, each output as measured and as predicted, and "
-        "below it what is left.",
+        f"{one.name}, predicted: measured inputs, each output as measured and as predicted, "
+        "and the residual below.",
         build_validation_panels(run),
         make_link(one.shift),
     )

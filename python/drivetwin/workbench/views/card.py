@@ -10,10 +10,10 @@ from dash.development.base_component import Component
 
 from drivetwin.findings import render
 from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import card_form
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import UploadField
@@ -88,7 +88,7 @@ def open_card(session: Session, source: Source) -> None:
     """Open a card for the log of the session, and show what came of it."""
     session.open_card(source)
     ui.notify_topic(ui.Topic.LOG)
-    ui.notify_opened_log(f"{source.name} is open", session.work)
+    ui.notify_opened_log(f"{source.name} is open", session.work.require_open_log())
 
 
 def _build_content(opened: Opened) -> list[Component]:

@@ -60,7 +60,9 @@ def register(page: ui.Page) -> None:
         """Read the log and show the questions."""
         session.begin_card()
         ui.notify_topic(ui.Topic.FORM)
-        ui.notify("Values in grey come from the log or are defaults. Type what is known better.")
+        ui.notify(
+            "Values in grey come from the log or are defaults. Type a better value over them."
+        )
 
 
 def _register_writing(page: ui.Page) -> None:
@@ -87,7 +89,7 @@ def _register_writing(page: ui.Page) -> None:
         source = session.write_card(name or "", texts, can_replace=existing == "replace")
         session.open_card(source)
         ui.notify_topic(ui.Topic.LOG)
-        ui.notify_opened_log(f"{source.name} is written and open", session.work)
+        ui.notify_opened_log(f"{source.name} is written and open", session.work.require_open_log())
 
 
 def _register_fields(page: ui.Page) -> None:

@@ -10,9 +10,10 @@ from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import Display
+from drivetwin.errors import InputError
 from drivetwin.logs.survey import Column
 from drivetwin.report.figure import Figure
-from drivetwin.report.figures.recording import plot_log
+from drivetwin.report.figures.recording import build_log_panels, plot_log
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import MEASURED
 from drivetwin.workbench.exports import Record
@@ -20,8 +21,10 @@ from drivetwin.workbench.mapping import Entry, Row, list_roles, list_rows, list_
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened, Preview
 from drivetwin.workbench.session import Session
+from drivetwin.workbench.views import log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import Index
+from drivetwin.workbench.views.log_choice import Place, build_log_choice
 
 _PREVIEW_HEIGHT = 330
 _SIGNS = {"+": "as recorded", "-": "reversed"}
@@ -47,6 +50,11 @@ def register(page: ui.Page) -> None:
     """Showing and correcting the mapping."""
 
     _register_preview(page)
+    log_choice.register(page, Place.CHANNELS)
+    zooming.register(page, "preview-plot", _get_preview_panels)
+    zooming.register(
+        page, "channels-plot", lambda session: build_log_panels(session.work.require_log())
+    )
 
     @page.callback(
         Output("channels-content", "children"),
@@ -60,7 +68,9 @@ def register(page: ui.Page) -> None:
         opened = session.work.opened
         if opened is None:
             return [], [], [], []
-        return _build_content(opened), [_build_choice(opened)], [], _build_figure(opened)
+        choice = build_log_choice(session.work, Place.CHANNELS)
+        content = [*choice, *_build_content(opened)]
+        return content, [_build_choice(opened)], [], _build_figure(opened)
 
     @page.callback(
         Input("apply-mapping", "n_clicks"),
@@ -86,7 +96,7 @@ def register(page: ui.Page) -> None:
             ]
         )
         ui.notify_topic(ui.Topic.LOG)
-        ui.notify_opened_log("The log is read as mapped", session.work)
+        ui.notify_opened_log("The log is read as mapped", session.work.require_open_log())
 
 
 def _build_content(opened: Opened) -> list[Component]:
@@ -138,9 +148,20 @@ def _register_preview(page: ui.Page) -> None:
 
 def plot_preview(shown: Preview) -> Figure:
     """Draw a column over time in the unit of the file."""
-    curve = Curve(shown.name, shown.time, shown.values, MEASURED)
-    panels = [Panel(shown.name, Display(shown.unit or "no unit"), [curve])]
+    panels = build_preview_panels(shown)
     return plot_over_time_axis(panels, compute_full_range(panels), _PREVIEW_HEIGHT)
+
+
+def build_preview_panels(shown: Preview) -> list[Panel]:
+    """Return the panel of `plot_preview`."""
+    curve = Curve(shown.name, shown.time, shown.values, MEASURED)
+    return [Panel(shown.name, Display(shown.unit or "no unit"), [curve])]
+
+
+def _get_preview_panels(session: Session) -> list[Panel]:
+    if session.preview is None:
+        raise InputError("no column is shown", "choose one for the preview")
+    return build_preview_panels(session.preview[1])
 
 
 def _name_column(column: Column) -> str:

@@ -61,7 +61,11 @@ def register(page: ui.Page) -> None:
         candidates = _collect_candidates(work)
         log = work.require_log()
         work.require_outcome()
-        twins = {method.value: one.twin for method, one in work.results.items()}
+        twins = {
+            method.value: one.twins[log.source]
+            for method, one in work.results.items()
+            if log.source in one.twins
+        }
         trials = simulate_trials(twins, log, work.shifts, log.source)
         sections = [
             *([build_agreement_section(candidates)] if len(candidates) > 1 else []),

@@ -14,6 +14,8 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.parameters import build_findings_section, build_result_section
+from drivetwin.report.sections.together import build_holdout_section, build_joint_section
+from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.vehicle.locks import LockKind
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.page_words import replace_options
@@ -144,7 +146,7 @@ def _register_progress(page: ui.Page) -> None:
 
 def _build_content(work: SessionState, *, running: bool) -> list[Component]:
     """Build the result of the default method once its run is finished, and what a run takes."""
-    if not work.shifts:
+    if not work.all_shifts:
         return []
     content: list[Component] = []
     for text in dict.fromkeys(work.refusals.values()):
@@ -188,6 +190,11 @@ def _build_result(outcome: Outcome) -> list[Component]:
         )
     else:
         content += render_section(build_result_section(outcome.found), "result")
+        held, several = outcome.found.evidence.held_out, outcome.found.evidence.several
+        if held:
+            content += render_section(build_holdout_section(outcome.found, held), "held-out")
+        if several is not None:
+            content += render_section(build_joint_section(outcome.found, several), "logs")
         if outcome.found.findings:
             content += render_section(build_findings_section(outcome.found), "findings")
         if outcome.found.fit:
@@ -199,9 +206,12 @@ def _build_result(outcome: Outcome) -> list[Component]:
 def _describe_inputs(work: SessionState) -> Component:
     """Describe the inputs of the next run."""
     rows = []
-    for index, times in work.moves.items():
-        shift = work.shifts[index]
-        rows.append((f"phases {shift.start_gear}→{shift.end_gear}", f"{len(times)} set by hand"))
+    for log in work.logs:
+        where = f" of {log.source.name}" if len(work.logs) > 1 else ""
+        labels = make_shift_labels(log.shifts)
+        for index, times in log.moves.items():
+            rows.append((f"phases {labels[index]}{where}", f"{len(times)} set by hand"))
+        rows += [(f"shift {labels[k]}{where}", "held out") for k in sorted(log.held)]
     for name, lock in work.locks.items():
         text = "free" if lock.kind is LockKind.FREE else f"{lock.value:.5g} (SI)"
         if lock.kind is LockKind.PRIOR:

@@ -99,8 +99,8 @@ def build_table(work: SessionState, names: Iterable[str]) -> Component:
 
 def list_default_ids(work: SessionState) -> list[str]:
     """List the parameters that can be fixed before an identification."""
-    gears = dict.fromkeys(g for s in work.shifts for g in (s.start_gear, s.end_gear))
-    elements = dict.fromkeys(e for s in work.shifts for e in (s.offgoing, s.oncoming))
+    gears = dict.fromkeys(g for s in work.all_shifts for g in (s.start_gear, s.end_gear))
+    elements = dict.fromkeys(e for s in work.all_shifts for e in (s.offgoing, s.oncoming))
     return [
         "eta",
         *(f"J_prime_{gear}" for gear in gears),

@@ -10,10 +10,11 @@ from dash.development.base_component import Component
 
 from drivetwin.findings import render
 from drivetwin.logs.formats.detect import SUFFIXES
+from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import Source
+from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import UploadField, get_triggered_part
 from drivetwin.workbench.views.sources import format_source, get_source
@@ -27,13 +28,15 @@ def layout() -> list[Component]:
     return [
         ui.make_hint(
             "Open a recording with at least one gear shift. Paths are inside the folder of the "
-            "workbench."
+            "workbench. Add log opens a further recording of the same vehicle: one model is "
+            "identified from all."
         ),
         ui.make_row(
             html.Div(
                 ui.make_field("log-path", "Log", type="text", list="log-names"), className="wide"
             ),
             ui.make_button("Open log", "open-log", main=True),
+            ui.make_button("Add log", "add-log"),
             ui.make_upload_button("Upload a log…", "log", "log-upload"),
             ui.make_button("Open the sample", "open-sample"),
         ),
@@ -58,7 +61,7 @@ def register(page: ui.Page) -> None:
     def show(session: Session, _: str) -> tuple[Any, ...]:
         """Render the open log and the files of the folder."""
         work = session.work
-        content = [] if work.opened is None else _build_content(work.opened)
+        content = [] if work.opened is None else [*_list_logs(work), *_build_content(work.opened)]
         names = session.folder.list_names(SUFFIXES)
         options = [html.Option(value=name) for name in names]
         return content, format_source(work.log), options, _build_files(names)
@@ -82,6 +85,31 @@ def _register_opening(page: ui.Page) -> None:
         """Open the log of the field."""
         _open(session, get_source(session, log, upload))
 
+    @page.callback(
+        Input("add-log", "n_clicks"),
+        State("log-path", "value"),
+        State("log-upload", "data"),
+        busy="add-log",
+    )
+    def add_path(session: Session, _: object, log: str | None, upload: UploadField | None) -> None:
+        """Open the log of the field beside the others."""
+        if not session.work.logs:
+            _open(session, get_source(session, log, upload))
+            return
+        source = get_source(session, log, upload)
+        session.add_log(source)
+        ui.notify_topic(ui.Topic.LOG)
+        ui.notify_opened_log(f"{source.name} is added", session.work.logs[-1])
+
+    @page.callback(Input({"remove": ALL}, "n_clicks"))
+    def remove(session: Session, clicks: list[int | None]) -> None:
+        """Close one of several logs."""
+        if any(clicks):
+            index = get_triggered_part("remove")
+            session.remove_log(int(index) if index.isdecimal() else -1)
+            ui.notify_topic(ui.Topic.LOG)
+            ui.notify("The log is removed")
+
     @page.callback(Input({"file": ALL}, "n_clicks"))
     def open_file(session: Session, clicks: list[int | None]) -> None:
         """Open a listed file of the folder."""
@@ -93,13 +121,13 @@ def _register_opening(page: ui.Page) -> None:
         """Open the sample with its card."""
         session.open_sample()
         ui.notify_topic(ui.Topic.LOG)
-        ui.notify_opened_log("The sample is open with its card", session.work)
+        ui.notify_opened_log("The sample is open with its card", session.work.logs[0])
 
 
 def _open(session: Session, source: Source) -> None:
     session.open_log(source)
     ui.notify_topic(ui.Topic.LOG)
-    ui.notify_opened_log(f"{source.name} is open", session.work)
+    ui.notify_opened_log(f"{source.name} is open", session.work.logs[0])
 
 
 def _build_files(names: list[str]) -> list[Component]:
@@ -110,6 +138,30 @@ def _build_files(names: list[str]) -> list[Component]:
     more = len(names) - len(buttons)
     hint = [ui.make_hint(f"{more} more: type the name.")] if more > 0 else []
     return [html.H3("Logs of the folder"), html.Div(buttons, className="row files"), *hint]
+
+
+def _list_logs(work: SessionState) -> list[Component]:
+    """List the logs where several are open."""
+    if len(work.logs) < 2:
+        return []
+    rows = [
+        [
+            one.source.name,
+            "cannot be read" if one.opened.log is None else str(len(one.opened.log.channels)),
+            str(len(one.shifts)),
+            html.Button(
+                ["Remove", html.Span(f" {one.source.name}", className="unseen")],
+                id={"remove": str(k)},
+                type="button",
+            ),
+        ]
+        for k, one in enumerate(work.logs)
+    ]
+    caption = "Open logs, identified together"
+    return [
+        ui.make_table(("log", "channels", "shifts", ""), rows, caption),
+        html.H3(f"About {work.logs[work.at].source.name}"),
+    ]
 
 
 def _build_content(opened: Opened) -> list[Component]:

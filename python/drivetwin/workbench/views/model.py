@@ -10,9 +10,10 @@ from typing import Any
 from dash import ALL, MATCH, Input, Output, Patch, State, html, no_update
 from dash.development.base_component import Component
 
-from drivetwin.errors import MissingParameterError
+from drivetwin.errors import InputError, MissingParameterError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.validation import Validation
+from drivetwin.report.figures.stack import Panel
 from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.vehicle.locks import can_fix
 from drivetwin.workbench.exports import Record
@@ -20,12 +21,14 @@ from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.steps import Step
-from drivetwin.workbench.views import locks
+from drivetwin.workbench.views import locks, log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import ControlId, Index, parse_positions
+from drivetwin.workbench.views.log_choice import Place, build_log_choice
 from drivetwin.workbench.what_if import (
     FRICTION,
     Slider,
+    build_what_if_panels,
     collect_changes,
     get_display,
     list_sliders,
@@ -56,19 +59,27 @@ def register(page: ui.Page) -> None:
     _register_bench(page)
     _register_sliders(page)
     locks.register(page)
+    log_choice.register(page, Place.MODEL)
+    zooming.register(page, "model-plot", _get_model_panels)
+
+
+def _get_model_panels(session: Session) -> list[Panel]:
+    live = session.get_simulation()
+    return build_what_if_panels(live.identified, live.present)
 
 
 def _register_bench(page: ui.Page) -> None:
     @page.callback(Output("model-content", "children"), Input(ui.make_due_id("model"), "data"))
     def show(session: Session, _: object) -> list[Component]:
         """Render the sliders next to the figure."""
-        if session.work.method is None or not session.work.shifts:
+        work = session.work
+        if work.method is None or not work.all_shifts:
             return []
-        is_first = not session.work.has_viewed
+        is_first = not work.has_viewed
         try:
             live = session.get_simulation()
-        except MissingParameterError as incomplete:
-            return [_build_choices(session.work), ui.make_hint(replace_options(str(incomplete)))]
+        except (MissingParameterError, InputError) as incomplete:
+            return [_build_choices(work), ui.make_hint(replace_options(str(incomplete)))]
         if is_first:
             ui.notify_topic(ui.Topic.STEPS)
         return _build_bench(session, live)
@@ -141,6 +152,7 @@ def _build_choices(work: SessionState) -> Component:
     shifts = {str(k): name for k, name in enumerate(make_shift_labels(work.shifts))}
     shown = work.require_outcome().method.value
     return ui.make_row(
+        *build_log_choice(work, Place.MODEL),
         ui.make_choice("model-method", "Result", methods, shown),
         ui.make_choice("model-shift", "Shift", shifts, str(work.shift)),
         ui.make_button("Reset the sliders", "reset-sliders"),

@@ -11,8 +11,8 @@ from dash.development.base_component import Component
 
 from drivetwin.report.html import read_template
 from drivetwin.workbench.access_control import Access
+from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.session import Session, Sessions
-from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.steps import Step
 from drivetwin.workbench.views import (
     card,
@@ -68,11 +68,11 @@ _MORE = {
 VIEWS = {**{step.value: (TITLES[step], view) for step, view in _STEPS.items()}, **_MORE}
 """Title and module of each view: the steps in order, then those beside them."""
 _TOPICS = {
-    "log": (Topic.LOG,),
-    "channels": (Topic.LOG,),
+    "log": (Topic.LOG, Topic.SELECTION),
+    "channels": (Topic.LOG, Topic.SELECTION),
     "card": (Topic.LOG, Topic.FORM),
     "shifts": (Topic.PHASES,),
-    "identify": (Topic.RESULTS, Topic.PHASES, Topic.LOCKS),
+    "identify": (Topic.RESULTS, Topic.PHASES, Topic.LOCKS, Topic.HELD),
     "model": (Topic.RESULTS, Topic.LIVE),
     "compare": (Topic.RESULTS,),
     "gearbox": (Topic.GEARBOX,),
@@ -193,17 +193,23 @@ def _show_status(app: Dash, sessions: Sessions, access: Access) -> None:
         Output("status", "children"),
         Input(make_topic_id(Topic.LOG), "data"),
         Input(make_topic_id(Topic.RESULTS), "data"),
+        Input(make_topic_id(Topic.SELECTION), "data"),
         State("session", "data"),
         prevent_initial_call=True,
     )
-    def status(_log: object, _results: object, key: object) -> list[Component | str]:
+    def status(
+        _log: object, _results: object, _selection: object, key: object
+    ) -> list[Component | str]:
         """Format the status line: open files, available results, and who may connect."""
         if key not in sessions:
             return []
         work = sessions.get(key).work
         if work.log is None or work.opened is None:
             return [f"no log is open · {access.describe()}"]
+        others = len(work.logs) - 1
         parts: list[Component | str] = [html.B(work.log.name)]
+        if others:
+            parts.append(f" and {others} more {'log' if others == 1 else 'logs'}")
         parts.append(f" · {'no card' if work.card is None else f'card {work.card.name}'}")
         for shift in work.shifts:
             parts.append(f" · shift {shift.start_gear}→{shift.end_gear}")

@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, Literal
 
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import format_significant, get_display_unit
 from drivetwin.findings import render
+from drivetwin.report.figures.shift_phases import build_shift_panels
+from drivetwin.report.figures.stack import Panel
 from drivetwin.report.sections.summary import describe_phases
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.workbench.open_log import OpenLog
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.phases import (
     LABELS,
@@ -24,10 +27,21 @@ from drivetwin.workbench.phases import (
 )
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
+from drivetwin.workbench.views import log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.fields import Index
+from drivetwin.workbench.views.fields import ControlId, Index
+from drivetwin.workbench.views.log_choice import Place, build_log_choice
 
 _SHIFT_HEAD = ("shift", "kind", "elements", "starts", "locks")
+_USES = {"fit": "fit", "hold": "hold out"}
+Use = Literal["fit", "hold"]
+"""Use of a shift in the identification."""
+
+
+_HOLD_OUT = (
+    "Shifts held out take no part in the fit. The model identified from the others predicts them, "
+    "and the step Identify compares the prediction with the measurement."
+)
 
 
 def layout() -> list[Component]:
@@ -39,7 +53,10 @@ def layout() -> list[Component]:
 
 
 def register(page: ui.Page) -> None:
-    """Moving boundaries."""
+    """Moving boundaries, and holding shifts out."""
+    log_choice.register(page, Place.SHIFTS)
+    zooming.register(page, "phases-plot", _get_phase_panels)
+    _register_uses(page)
     _register_figure(page)
     _register_fields(page)
 
@@ -53,7 +70,8 @@ def _register_figure(page: ui.Page) -> None:
     def show(session: Session, _: object) -> tuple[list[Component], list[Component]]:
         """List all shifts, and draw the one that is chosen."""
         work = session.work
-        return _build_shifts(work), _build_content(work) if work.shifts else []
+        content = _build_content(work) if work.shifts else _build_other_log(work)
+        return _build_shifts(work), content
 
     @page.callback(Input("phases-plot", "relayoutData"))
     def drag(session: Session, change: dict[str, Any] | None) -> None:
@@ -66,6 +84,39 @@ def _register_figure(page: ui.Page) -> None:
         if moves:
             session.move_boundaries(work.shift, moves)
             ui.notify("; ".join(f"{LABELS[one]} at {time:.4f} s" for one, time in moves.items()))
+
+
+def _get_phase_panels(session: Session) -> list[Panel]:
+    return build_shift_panels(session.work.require_log(), session.work.require_shift())
+
+
+def _register_uses(page: ui.Page) -> None:
+    @page.callback(
+        Input({"part": "use", "id": ALL}, "data-value"), State({"part": "use", "id": ALL}, "id")
+    )
+    def use(session: Session, uses: Sequence[Use], ids: Sequence[ControlId]) -> None:
+        """Fit a shift, or hold it out."""
+        held = {one.id for one, use in zip(ids, uses, strict=True) if use == "hold"}
+        logs = session.work.logs
+        chosen = [
+            frozenset(k for k in range(len(one.shifts)) if _make_use_id(at, k) in held)
+            for at, one in enumerate(logs)
+        ]
+        if not ids or chosen == [one.held for one in logs]:
+            return
+        session.hold_out(chosen)
+        ui.notify_topic(ui.Topic.HELD)
+        count = len(held)
+        ui.notify(
+            f"The next identification predicts {count} {'shift' if count == 1 else 'shifts'} "
+            "instead of fitting"
+            if held
+            else "The next identification fits all shifts"
+        )
+
+
+def _make_use_id(log: int, shift: int) -> str:
+    return f"{log}:{shift}"
 
 
 def _register_fields(page: ui.Page) -> None:
@@ -100,30 +151,49 @@ def _register_fields(page: ui.Page) -> None:
 
 
 def _build_shifts(work: SessionState) -> list[Component]:
-    """List the shifts, and the reasons why other gear changes are not used."""
-    if work.opened is None or work.opened.found is None:
-        return []
-    found = work.opened.found
-    rows = [
-        (
-            label,
-            one.kind.value,
-            f"{one.offgoing} → {one.oncoming}",
-            f"{one.torque_phase[0]:.3f} s",
-            f"{one.lockup_time:.3f} s",
-        )
-        for label, one in zip(make_shift_labels(work.shifts), work.shifts, strict=True)
-    ]
+    """List the shifts of all logs, and the reasons why other gear changes are not used."""
+    found = [one for one in work.logs if one.opened.found is not None]
+    rows = [row for at, one in enumerate(work.logs) for row in _build_rows(work, at, one)]
+    head = ["shift", *(["log"] if len(work.logs) > 1 else []), *_SHIFT_HEAD[1:]]
+    caption = "Shifts of the log" if len(work.logs) == 1 else "Shifts of all logs"
     rejected = [
-        f"{one.time[0]:.2f} s to {one.time[1]:.2f} s: {replace_options(one.reason)}"
-        for one in found.rejected
+        f"{f'{one.source.name}, ' if len(work.logs) > 1 else ''}"
+        f"{other.time[0]:.2f} s to {other.time[1]:.2f} s: {replace_options(other.reason)}"
+        for one in found
+        for other in (one.opened.found.rejected if one.opened.found is not None else ())
     ]
+    uses = len(rows) > 1
     return [
-        *([ui.make_table(_SHIFT_HEAD, rows, "Shifts of the log")] if rows else []),
+        *([ui.make_hint(_HOLD_OUT)] if uses else []),
+        *([ui.make_table([*head, *(["use"] if uses else [])], rows, caption)] if rows else []),
         ui.make_notes(
             "Not used" if rows else "No usable shift", rejected, "plain" if rows else "doubtful"
         ),
     ]
+
+
+def _build_rows(work: SessionState, at: int, log: OpenLog) -> Iterator[list[ui.Content]]:
+    """Yield the row of each shift of a log, with its use where there are several shifts."""
+    for k, (label, one) in enumerate(zip(make_shift_labels(log.shifts), log.shifts, strict=True)):
+        row: list[ui.Content] = [
+            label,
+            *([log.source.name] if len(work.logs) > 1 else []),
+            one.kind.value,
+            f"{one.offgoing} → {one.oncoming}",
+            f"{one.torque_phase[0]:.3f} s",
+            f"{one.lockup_time:.3f} s",
+        ]
+        if len(work.all_shifts) > 1:
+            name = f"use of shift {label} of {log.source.name}"
+            use = "hold" if k in log.held else "fit"
+            id = {"part": "use", "id": _make_use_id(at, k)}
+            row.append(ui.make_choice(id, name, _USES, use, hidden_label=True))
+        yield row
+
+
+def _build_other_log(work: SessionState) -> list[Component]:
+    """Build the way to the shifts of another log where the selected one has none."""
+    return [ui.make_row(*build_log_choice(work, Place.SHIFTS))] if work.all_shifts else []
 
 
 def _build_content(work: SessionState) -> list[Component]:
@@ -145,7 +215,11 @@ def _build_content(work: SessionState) -> list[Component]:
             "Drag a dashed line to move a phase boundary, or type its time. Boundaries set by hand "
             "are used in the next identification."
         ),
-        ui.make_row(ui.make_choice("phases-shift", "Shift", names, str(work.shift)), *fields),
+        ui.make_row(
+            *build_log_choice(work, Place.SHIFTS),
+            ui.make_choice("phases-shift", "Shift", names, str(work.shift)),
+            *fields,
+        ),
         ui.make_row(
             ui.make_button("Apply times", "apply-phases", main=True),
             ui.make_button("As detected", "reset-phases"),

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
+from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views.fields import UploadField
 
 _UPLOADED = "uploaded: "

@@ -21,9 +21,9 @@ from dash.development.base_component import Component
 
 from drivetwin.errors import DrivetwinError, Where
 from drivetwin.report.figure import Figure
+from drivetwin.workbench.open_log import OpenLog
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Sessions
-from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_fields
 
@@ -46,6 +46,8 @@ class Topic(StrEnum):
     FORM = "form"
     LOCKS = "locks"
     STEPS = "steps"
+    HELD = "held"
+    SELECTION = "selection"
 
 
 _CONCERNED = {
@@ -57,6 +59,8 @@ _CONCERNED = {
     Topic.FORM: (Topic.FORM,),
     Topic.LOCKS: (Topic.LOCKS,),
     Topic.STEPS: (Topic.STEPS,),
+    Topic.HELD: (Topic.HELD, Topic.STEPS),
+    Topic.SELECTION: (Topic.SELECTION, Topic.PHASES, Topic.LIVE, Topic.STEPS),
 }
 
 
@@ -88,9 +92,9 @@ def notify(text: str, *, fault: bool = False) -> None:
     )
 
 
-def notify_opened_log(how: str, work: SessionState) -> None:
+def notify_opened_log(how: str, log: OpenLog) -> None:
     """Show the result of reading a log, `how` in words: its fault, or the number of its shifts."""
-    opened, shifts = work.require_opened(), len(work.shifts)
+    opened, shifts = log.opened, len(log.shifts)
     if opened.fault:
         notify(f"The log cannot be read as mapped. {replace_options(opened.fault)}", fault=True)
     elif opened.card is None:

@@ -48,7 +48,7 @@ def test_percent_torque_becomes_torque(log: Path) -> None:
     actual = found["ActualEngTorque"]
     assert actual.unit == "Nm"
     assert actual.values == pytest.approx(np.full(200, 1500.0))
-    assert actual.notes == ("reference torque 2000 N·m told by EC1 from 0x00",)
+    assert actual.notes == ("reference torque 2000 N·m from EC1 from 0x00",)
     friction = found["NominalFrictionTorque"]
     assert friction.values == pytest.approx(np.full(200, 200.0))
     net = found["EngNetTorque"]

@@ -204,9 +204,9 @@ class BusRecording:
                 except DamagedChannelError:
                     continue
                 if np.ptp(told) == 0.0 and told[0] > 0.0:
-                    return float(told[0]), f"reference torque {told[0]:g} N·m told by {track.group}"
+                    return float(told[0]), f"reference torque {told[0]:g} N·m from {track.group}"
         return None, (
-            "percent torque stays in percent, the bus tells no reference torque (EC1); state it in "
+            "percent torque stays in percent, the bus has no reference torque (EC1); state it in "
             "the channel mapping: bus = { reference_torque_Nm = ... }"
         )
 
