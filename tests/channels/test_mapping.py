@@ -120,7 +120,7 @@ def test_several_candidates_for_another_role_are_a_warning() -> None:
     mapped = resolve_roles(columns([*ENGLISH, "Gang", "gear"]), {}, ELEMENTS, NEEDED, "log.csv")
     assert "gear" not in mapped.channels
     assert render(mapped.findings) == (
-        "Role 'gear' may be any of the columns Gang, gear; none is used. "
+        "Role 'gear' has several candidates: the columns Gang, gear; none is used. "
         "Name one in a channel mapping.",
     )
 

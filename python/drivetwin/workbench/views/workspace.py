@@ -17,7 +17,7 @@ def layout() -> list[Component]:
     return [
         ui.make_hint(
             "A workspace is a JSON file in the folder of the workbench. It contains the paths of "
-            "log and card with their check sums, mapping, phases, locks, twins and sliders, but "
+            "logs and card with check sums, mappings, phases, locks, twins and sliders, but "
             "not the log."
         ),
         html.H3("Save"),
