@@ -69,7 +69,7 @@ def test_a_held_out_log_is_predicted(opened: Page, pictures: Path) -> None:
     expect(content).to_contain_text("consistent with noise")
     show_view(page, "model")
     page.wait_for_selector("#model-plot .js-plotly-plot")
-    page.get_by_label("Log", exact=True).locator("visible=true").select_option("1")
+    page.select_option("#model-log", "1")
     expect(page.locator("#model-content")).to_contain_text("no shift of second.csv was fitted")
     for width in (1440, 900):
         page.set_viewport_size({"width": width, "height": 1000})

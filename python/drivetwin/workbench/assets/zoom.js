@@ -21,6 +21,7 @@
   const overlap = (a, b) => Math.max(0, Math.min(a[1], b[1]) - Math.max(a[0], b[0]));
 
   function note(plot, change) {
+    if (plot.dataset.carrying) return;
     const range = change["xaxis.range"] ?? [change["xaxis.range[0]"], change["xaxis.range[1]"]];
     if (!range.every(Number.isFinite)) {
       if (change["xaxis.autorange"]) zoomed = null;
@@ -36,7 +37,9 @@
     const { range } = zoomed, present = plot._fullLayout.xaxis.range, span = range[1] - range[0];
     const same = range.every((end, k) => Math.abs(end - present[k]) < TOLERANCE * span);
     if (same || overlap(range, extentOf(plot)) < SHARE * span) return;
-    Plotly.relayout(plot, { "xaxis.range": [...range] });
+    plot.dataset.carrying = "yes";
+    Plotly.relayout(plot, { "xaxis.range": [...range] })
+      .then(() => { delete plot.dataset.carrying; });
   }
 
   const look = () => plots().forEach((plot) => {

@@ -60,7 +60,7 @@ def register(page: ui.Page) -> None:
         work = session.work
         candidates = _collect_candidates(work)
         log = work.require_log()
-        work.require_outcome()
+        work.require_twin()
         twins = {
             method.value: one.twins[log.source]
             for method, one in work.results.items()

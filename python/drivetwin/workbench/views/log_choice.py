@@ -27,7 +27,7 @@ def build_log_choice(work: SessionState, place: Place) -> list[Component]:
     if len(work.logs) < 2:
         return []
     names = {str(k): one.source.name for k, one in enumerate(work.logs)}
-    return [ui.make_choice(f"{place}-log", "Log", names, str(work.at))]
+    return [ui.make_choice(f"{place}-log", "Log shown", names, str(work.at))]
 
 
 def register(page: ui.Page, place: Place) -> None:
