@@ -37,13 +37,16 @@ def render_drive(run: DriveRun, title: str) -> str:
     sections = [
         Section("drive", "The drive", "From standstill to the end of the plan.", [motion]),
         Section(
-            "work", "Friction", "What each shift did to its elements.", [_build_shift_table(run)]
+            "work",
+            "Friction",
+            "Friction work and power of the shift elements.",
+            [_build_shift_table(run)],
         ),
         Section("shifts", "Shifts", "Each shift in the order of the drive.", shifts),
         Section(
             "energy",
             "Energy",
-            "Where the work of the engine went.",
+            "Energy balance of the engine work.",
             [FigureBlock(plot_energy(run), "Energy by part, kJ.")],
         ),
     ]

@@ -30,6 +30,6 @@ def _build_section(number: int, one: Observation, log: ShiftLog) -> Section:
         FigureBlock(figure, "Each torque with its 95 % band.", panels)
     ]
     if one.notes:
-        blocks.append(NotesBlock("What the log does not have", one.notes))
+        blocks.append(NotesBlock("Missing in the log", one.notes))
     name = f"Shift {one.shift.start_gear}→{one.shift.end_gear}"
     return Section(f"shift{number}", name, f"A {one.shift.kind}.", blocks)

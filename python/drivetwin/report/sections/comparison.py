@@ -227,5 +227,5 @@ def build_origin_section(candidates: Sequence[Candidate]) -> Section:
     ]
     head = make_cells("identification", "method", "version", "input", "SHA-256")
     return Section(
-        "origin", "Origin", "What each identification was made from.", [TableBlock("", head, rows)]
+        "origin", "Origin", "Inputs of each identification.", [TableBlock("", head, rows)]
     )

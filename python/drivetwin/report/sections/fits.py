@@ -39,9 +39,9 @@ UNEVEN = 1.5
 
 
 FIT_CAPTION = (
-    "Simulation against measurement: fit % = 100·(1 − ‖y − ŷ‖ / ‖y − mean(y)‖), the mean taken "
-    "over the whole log for every phase; root mean square error below. Where a signal hardly "
-    "moves, fit % is low although only noise is left: use the error in its unit."
+    "Simulation against measurement: fit % = 100·(1 − ‖y − ŷ‖ / ‖y − mean(y)‖). The mean is over "
+    "the whole log in each phase. Below is the root mean square error. If a signal hardly moves, "
+    "fit % is low although only noise is left: use the error in its unit."
 )
 
 

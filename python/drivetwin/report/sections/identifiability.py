@@ -33,7 +33,7 @@ _INSEPARABLE = (
     "η and a gain error of the engine torque: only their product acts.",
     "The common scale of all torques rests on the output-torque sensor's gain: an error of it "
     "scales J′, J_vehicle, T_v/i_f, k_o, c_o and μ alike.",
-    "J1·η + J2: the inertias before and behind the input gear act as one number.",
+    "J1·η + J2: the inertias before and behind the input gear have the effect of one number.",
 )
 _CLOSE = 0.9
 """Correlation from which a pair is named."""
@@ -99,7 +99,7 @@ def _build_suggestion_tables(
         Cell("then", number=True, note="± 95 %, to expect"),
     )
     yield TableBlock(
-        "What to record next: each experiment was simulated with this model and the noise of this "
+        "Next recordings: each experiment was simulated with this model and the noise of this "
         "log's sensors, and the information it adds gives the interval to expect.",
         head,
         rows,

@@ -73,7 +73,7 @@ def build_findings_section(found: Identification) -> Section:
         for severity, heading, tone in _SEVERITIES
         if (alike := [one for one in found.findings if one.severity is severity])
     ]
-    intro = "Remarks on log, vehicle card and fit: cause, and what to do."
+    intro = "Remarks on log, vehicle card and fit, with cause and remedy."
     return Section("findings", "Findings", intro, blocks)
 
 

@@ -59,4 +59,6 @@ def _build_validity_table(found: Identification) -> TableBlock:
             )
         )
     head = (Cell("quantity"), Cell("from", number=True), Cell("to", number=True), Cell("unit"))
-    return TableBlock("Range the log covered; the model is not proven outside it.", head, rows)
+    return TableBlock(
+        "Range covered by the log; the model is not validated outside it.", head, rows
+    )

@@ -95,7 +95,7 @@ def build_shift_section(found: Identification, log: ShiftLog) -> Section:
     return Section(
         "shift",
         "The log and its phases",
-        "What was measured, and where the shift was found in it.",
+        "Measured signals with the phases of the shift.",
         blocks,
     )
 

@@ -107,7 +107,9 @@ def _build_log_table(found: Identification, several: Several) -> TableBlock:
                 ),
             )
         )
-    return TableBlock("The logs, what each has of its own, and the fit of the model.", head, rows)
+    return TableBlock(
+        "The logs with their log-specific parameters and the fit of the model.", head, rows
+    )
 
 
 def _find_log_id(plain: str, own: dict[str, tuple[str, int]]) -> str:
@@ -149,7 +151,7 @@ def _build_shared_table(
         Cell("farthest off", number=True, note="a log against the others"),
     )
     return TableBlock(
-        "What the logs share. Farthest off: the largest shift of the value by one log against the "
+        "Shared parameters. Farthest off: the largest shift of the value by one log against the "
         "others, in standard deviations of noise; doubtful beyond "
         f"{CONSISTENCY.far:g}.",
         head,
