@@ -88,6 +88,7 @@ class Code(StrEnum):
     SIMULATION_MISSES = auto()
     SIMULATION_INCOMPLETE = auto()
     SIMULATION_OUTSIDE_SPREAD = auto()
+    GAIN_NOT_DETERMINED = auto()
     FRICTION_IMPLAUSIBLE = auto()
     EFFICIENCY_IMPLAUSIBLE = auto()
     CARD_SUSPECT = auto()

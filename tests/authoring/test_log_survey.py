@@ -104,7 +104,9 @@ def test_a_complete_card_of_a_log_and_options_is_read(made: Synthetic, tmp_path:
         ("PrsBrk2", "bar", "B2"), ("p_K1_ist", "bar", "K1"), ("Druck Bremse 3", "kPa", "B3"),
         ("p2", "bar", "E2"), ("PrsC4", "bar", "C4"), ("PrsClutch", "bar", "K"),
         ("PrsMain", "bar", None), ("PrsBrk2", None, None), ("n2", "rpm", None),
-        ("C03 p", "bar", None),
+        ("C03 p", "bar", "C3"), ("ClutchPressureC4", "bar", "C4"), ("Kupplungsdruck 1", "bar", "K1"),
+        ("BrakePressure2", "bar", "B2"), ("Prs_Clutch_K2", "bar", "K2"), ("p_K1_soll", "bar", None),
+        ("Druck_Kupplung_1", "bar", "K1"), ("C4Pressure", "psi", "C4"), ("Clutch4", "bar", None),
     ],
 )  # fmt: skip
 def test_pressures_are_labelled_after_their_elements(

@@ -14,10 +14,10 @@ from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 
 _GAIN_PARTS = (
-    ("surfaces", "N: friction surfaces, two for each plate with linings on both sides [-]"),
-    ("derating", "D: share of the torque that grooves and uneven pressure leave [-]"),
-    ("area_m2", "A: area on which the pressure acts [m²]"),
-    ("radius_m", "r: effective radius of the lining [m]"),
+    ("surfaces", "N: friction surfaces, two for each plate with linings on both sides, as 14 [-]"),
+    ("derating", "D: share of the torque that grooves and uneven pressure leave, 0.8 to 1 [-]"),
+    ("area_m2", "A: area on which the pressure acts, 0.005 to 0.03 [m²]"),
+    ("radius_m", "r: effective radius of the lining, 0.05 to 0.25 [m]"),
 )
 """Parts of the gain N·D·A·r, with their meanings."""
 
@@ -43,7 +43,9 @@ def _format_element(
     yield from format_entry("kind", kind, meaning)
     yield from _format_ratios(answers, name)
     P0 = answers.get(("elements", name, "P0_bar"), UNKNOWN)
-    yield from format_entry("P0_bar", P0, "gauge pressure at which the fill ends [bar]")
+    yield from format_entry(
+        "P0_bar", P0, "gauge pressure at which the fill ends, usually 0.3 to 2 [bar]"
+    )
     if P0.value is None and survey is not None:
         yield f"# {escape_line(survey.name)} does not show it: P0 is guessed only where the output"
         yield "# torque begins to fall in a power-on upshift to the gear of the element."
@@ -81,7 +83,8 @@ def _format_gain(answers: Answers, name: str) -> Iterator[str]:
         yield from format_entry("gain_m3", gain, meaning)
         return
     if form is None:
-        yield "# The gain N·D·A·r as one number [m³], or by its parts:"
+        yield "# The gain N·D·A·r as one number, about 0.005 for a car's clutch, 0.03 for a truck's"
+        yield "# [m³], or by its parts. Remove the leading # of the lines that you fill in."
         yield "# gain_m3 = ..."
     for part, meaning in _GAIN_PARTS:
         yield from format_entry(part, answers.get(("elements", name, part), UNKNOWN), meaning)

@@ -17,7 +17,7 @@ from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.name_table import load_name_table, normalise_name
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column
-from drivetwin.channels.recognition import infer_candidates
+from drivetwin.channels.recognition import WHOLE_WORD, infer_candidates
 from drivetwin.channels.shiftlog import Quantity, ShiftLog
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import MissingChannelError, TimeError
@@ -35,6 +35,8 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 
 ENGAGED = 0.5
 """Least pressure of an engaged element over the largest mean pressure of its column."""
+MOST_LABEL = 40
+"""Longest label that a pressure without a known form of name gets from its column."""
 LEAST_SAMPLES = 20
 """Fewest samples that two speeds are compared at."""
 
@@ -152,7 +154,10 @@ def make_blank_card(labels: Mapping[str, object]) -> VehicleCard:
 def find_pressure_columns(
     columns: Sequence[Column], stated: Mapping[str, ChannelSpec]
 ) -> dict[str, ChannelSpec]:
-    """Find the pressures of shift elements: as stated in a mapping, else by name and unit."""
+    """Find the pressures of shift elements: as stated in a mapping, else by name and unit.
+
+    Where no name has a known form, all pressures are candidates under their own names.
+    """
     found = {
         label: spec
         for role, spec in stated.items()
@@ -160,31 +165,55 @@ def find_pressure_columns(
     }
     if found:
         return found
-    usable = [column for column in columns if not (column.empty or column.silent or column.aside)]
+    usable = [
+        column
+        for column in columns
+        if not (column.empty or column.silent or column.aside)
+        and _is_pressure(column)
+        and not any(spec.matches(column) for spec in stated.values())
+    ]
     labels: dict[str, list[Column]] = {}
     for column in usable:
-        label = label_pressure(column)
-        if label is not None and not any(spec.matches(column) for spec in stated.values()):
+        if (label := label_pressure(column)) is not None:
             labels.setdefault(label, []).append(column)
+    if not labels:
+        labels = {column.name.strip()[:MOST_LABEL]: [column] for column in usable}
     return {label: make_spec(one[0], columns) for label, one in labels.items() if len(one) == 1}
 
 
 def label_pressure(column: Column) -> str | None:
     """Return the element that a pressure column is named after: `PrsBrk2` -> `B2`; else None."""
-    unit = find_unit(column.unit or "")
-    if unit is None or unit.quantity is not Quantity.PRESSURE:
+    if not _is_pressure(column):
         return None
     plain = normalise_name(re.split(r"[./]", column.name)[-1])
     table = load_name_table()
     pressure, clutch, brake, state = (
         table.make_alternatives(kind) for kind in ("pressure", "clutch", "brake", "state")
     )
-    form = f"(?:{pressure})(?:{state})*?(?P<kind>{brake}|{clutch}|)0*(?P<number>[0-9]+)(?:{state})*"
-    match = re.fullmatch(form, plain)
-    if match is None:
-        return "K" if re.fullmatch(f"(?:{pressure})(?:{clutch})(?:{state})*", plain) else None
-    kind = match["kind"][:1].upper()
-    return f"{kind or 'E'}{int(match['number'])}"
+    whole = "|".join(table.make_alternatives(kind, WHOLE_WORD) for kind in ("clutch", "brake"))
+    number = f"(?P<kind>{brake}|{clutch}|)0*(?P<number>[0-9]+)"
+    forms = (
+        f"(?:{pressure})(?:{state})*?{number}(?:{state})*",
+        # Compounds name the kind in a whole word first: `ClutchPressureC4`, `Kupplungsdruck 1`.
+        f"(?P<whole>{whole})(?:{pressure})(?:{state})*?{number}(?:{state})*",
+        f"(?:{pressure})(?P<whole>{whole}){number}(?:{state})*",
+        f"{number}(?:{pressure})(?:{state})*",
+    )
+    for form in forms:
+        if (match := re.fullmatch(form, plain)) is not None:
+            named = match.groupdict()
+            kind = (named["kind"] or named.get("whole") or "E")[0].upper()
+            return f"{kind}{int(named['number'])}"
+    return "K" if re.fullmatch(f"(?:{pressure})(?:{clutch})(?:{state})*", plain) else None
+
+
+def _is_pressure(column: Column) -> bool:
+    """Return True for a column in a unit of pressure that is not named as a command."""
+    unit = find_unit(column.unit or "")
+    if unit is None or unit.quantity is not Quantity.PRESSURE:
+        return False
+    command = load_name_table().make_alternatives("command", WHOLE_WORD)
+    return re.search(f"({command})$|^({command})", normalise_name(column.name)) is None
 
 
 def _find_gears(log: ShiftLog, speeds: GearboxSpeeds, labels: Sequence[str]) -> list[LogGear]:

@@ -60,7 +60,7 @@ class Draft:
     """Open entries of a mapping: units by role, roles without a column, unit of the time.
 
     `time` is the gap of the time unit; without a readable time column `time_source` is open. With
-    `accept` a unit that is the only proposal becomes an entry.
+    `accept` a unit that is the only proposal becomes an entry. `databases` are proposed DBC files.
     """
 
     units: Mapping[str, UnitGap] = field(default_factory=dict)
@@ -69,6 +69,7 @@ class Draft:
     time_source: bool = False
     remarks: tuple[str, ...] = ()
     accept: bool = False
+    databases: tuple[str, ...] = ()
 
 
 _NOTHING_OPEN = Draft()
@@ -94,6 +95,9 @@ def format_mapping(
             lines += _format_unit_gap(open_unit, draft.accept, ())
     if draft.time_source and "source" not in _list_options(options or ReadOptions())["time"]:
         lines += ["", "# [time]", '# source = "..."', '# unit = "s"']
+    if draft.databases and not (options or ReadOptions()).bus.databases:
+        listed = ", ".join(map(format_text, draft.databases))
+        lines += ["", "# DBC files of a bus log.", "# [bus]", f"# dbc = [{listed}]"]
     if names:
         lines += _format_names(names)
     for role, spec in channels.items():

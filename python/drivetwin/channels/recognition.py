@@ -11,7 +11,7 @@ from drivetwin.channels.name_table import NameTable, load_name_table, normalise_
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.read_options import Column
 
-_WHOLE_WORD = 3
+WHOLE_WORD = 3
 """Fewest letters of a word that is no abbreviation."""
 
 
@@ -145,7 +145,7 @@ def _list_pressure_forms(element: str, kind: str, table: NameTable) -> list[str]
         forms.append(f"({pressure}){state}({numbered}){state}|({numbered})({pressure}){state}")
         # Compounds name kind and pressure before number or label, in whole words: no `Kp2`.
         compound = "".join(
-            f"({table.make_alternatives(one, _WHOLE_WORD)})" for one in (kind, "pressure")
+            f"({table.make_alternatives(one, WHOLE_WORD)})" for one in (kind, "pressure")
         )
         forms.append(f"{compound}({label}|0*{digits}){state}")
         forms.append(f"({pressure})({words})({label}){state}")

@@ -95,6 +95,8 @@ def examine(
         return
     for one in answers:
         print_table(one.table)
+        for note in one.notes:
+            print_paragraph(note)
     for file in files:
         print_line(f"wrote {file}")
 
@@ -112,17 +114,18 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """One answer as a file and as a table; its `twin`, if any, is written as well."""
+    """One answer as a file, a table and notes; its `twin`, if any, is written as well."""
 
     file: str
     text: str
     table: Table
     twin: Twin | None = None
+    notes: Sequence[str] = ()
 
 
 def _iterate_answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
     """Every answer, in the order in which they are printed."""
-    from drivetwin.cli.tables import build_suggestion_table
+    from drivetwin.cli.tables import build_suggestion_table, list_limits
     from drivetwin.estimation.analysis.bootstrap import bootstrap
     from drivetwin.estimation.analysis.experiment_design import compute_rankings
     from drivetwin.estimation.analysis.friction_dependence import estimate_departures
@@ -136,6 +139,7 @@ def _iterate_answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
         SUGGESTIONS,
         analysis_files.format_suggestions(suggestions),
         build_suggestion_table(suggestions, found.estimates),
+        notes=list_limits(suggestions),
     )
     for name in asked.profiles:
         with show_step(f"profile likelihood of {name}"):

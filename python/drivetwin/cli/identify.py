@@ -178,6 +178,7 @@ def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) 
         build_parameter_table,
         build_shift_table,
         build_suggestion_table,
+        list_limits,
         list_remarks,
     )
     from drivetwin.report.model_verdict import explain_identification
@@ -193,8 +194,10 @@ def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) 
     if found.friction:
         print_table(build_friction_table(found.friction))
     suggestions = found.evidence.suggestions
-    if suggestions:
+    if any(one.best is not None for one in suggestions):
         print_table(build_suggestion_table(suggestions, found.estimates))
+    for line in list_limits(suggestions):
+        print_paragraph(line)
     if found.fit:
         print_table(build_fit_table(found.fit, "Simulation over measurement"))
     print_findings(found.findings)

@@ -70,6 +70,7 @@ def inspect(
     from drivetwin.channels.mapping_file import read_mapping
     from drivetwin.channels.mapping_text import format_mapping
     from drivetwin.files.records import dump_findings
+    from drivetwin.logs.formats.can.database import list_databases
     from drivetwin.logs.mapping_draft import draft_mapping
     from drivetwin.vehicle.card import load_card
 
@@ -83,7 +84,7 @@ def inspect(
             seen = _look_at(log, card, stated)
         except DrivetwinError as fault:
             if write_mapping is not None:
-                _write_unread(write_mapping, card, stated, fault)
+                _write_unread(write_mapping, card, stated, fault, list_databases(log))
             raise
     found = seen.survey
     if write_mapping is not None:
@@ -156,7 +157,11 @@ def _find_step(recording: Recording) -> float:
 
 
 def _write_unread(
-    path: Path, card: VehicleCard | None, stated: Mapped, fault: DrivetwinError
+    path: Path,
+    card: VehicleCard | None,
+    stated: Mapped,
+    fault: DrivetwinError,
+    databases: Sequence[str],
 ) -> None:
     """Write a mapping with what is stated and stubs of all roles, for a log that cannot be read."""
     from drivetwin._util.atomic import write_text
@@ -164,7 +169,7 @@ def _write_unread(
     from drivetwin.logs.mapping_draft import draft_unread
 
     elements = None if card is None else tuple(card.elements)
-    draft = draft_unread(elements, stated.channels, fault.what)
+    draft = draft_unread(elements, stated.channels, fault.what, databases)
     write_text(path, format_mapping(stated.channels, stated.options, stated.names, draft))
     print_line(f"wrote {path}", stderr=True)
 

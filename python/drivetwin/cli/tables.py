@@ -126,12 +126,23 @@ def build_suggestion_table(
         right=("now", "then"),
     )  # fmt: skip
     for one in suggestions:
-        estimate = estimates[one.parameter]
-        unit, best = estimate.unit, one.best
-        then = "" if best is None else format_half_width(estimate.value, best.half_width, unit)
+        estimate, best = estimates[one.parameter], one.best
+        if best is None:
+            continue
+        unit = estimate.unit
+        then = format_half_width(estimate.value, best.half_width, unit)
         now = format_half_width(estimate.value, one.half_width, unit)
         table.add_row(one.parameter, now, one.text, then, format_estimate(None, None, unit)[2])
     return table
+
+
+def list_limits(suggestions: Sequence[ExperimentRanking]) -> list[str]:
+    """List why no experiment narrows some parameters, each reason once with its parameters."""
+    reasons: dict[str, list[str]] = {}
+    for one in suggestions:
+        if one.best is None:
+            reasons.setdefault(one.text, []).append(one.parameter)
+    return [f"{', '.join(names)}: {reason}" for reason, names in reasons.items()]
 
 
 def build_friction_table(friction: Mapping[str, FrictionCurve]) -> Table:

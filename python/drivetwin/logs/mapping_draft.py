@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_text import Candidate, Draft, Stub, UnitGap
@@ -27,7 +27,10 @@ _MOST_CANDIDATES = 8
 _MOST_STATE = 20.0
 """Largest number of a gear or flag."""
 
-_NO_CARD = "Without a vehicle card (--vehicle) no pressure is recognised: its elements name them."
+_NO_CARD = (
+    "Pressures are recognised by the elements of a vehicle card: give --vehicle. Without one, add "
+    "an entry [channels.pressure.NAME] for the pressure of each element."
+)
 _TIME_UNKNOWN = "the log names no unit for its time column; state it"
 
 
@@ -57,15 +60,20 @@ def draft_mapping(
     )
 
 
-def draft_unread(elements: tuple[str, ...] | None, mapped: Collection[str], why: str) -> Draft:
+def draft_unread(
+    elements: tuple[str, ...] | None,
+    mapped: Collection[str],
+    why: str,
+    databases: Sequence[str] = (),
+) -> Draft:
     """Return the draft for a log whose columns cannot be read, for the reason `why`.
 
-    Roles that are `mapped` have no stub.
+    Roles that are `mapped` have no stub. `databases` are DBC files that may decode the log.
     """
     roles = [one for one in _list_roles(elements) if one not in mapped]
     remarks = (f"The log cannot be read: {why}", *(() if elements is not None else (_NO_CARD,)))
     stubs = tuple(Stub(one, _describe_role(one)) for one in roles)
-    return Draft(stubs=stubs, time_source=True, remarks=remarks)
+    return Draft(stubs=stubs, time_source=True, remarks=remarks, databases=tuple(databases))
 
 
 def _list_roles(elements: tuple[str, ...] | None) -> list[str]:

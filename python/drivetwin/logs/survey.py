@@ -185,5 +185,8 @@ def _describe_open_roles(
     if missing:
         notes.append(f"no column for {', '.join(missing)}: name it in a channel mapping")
     if card is None:
-        notes.append("without --vehicle no column can be recognised as a pressure")
+        notes.append(
+            "pressures are recognised by the elements of a vehicle card: give --vehicle CARD; "
+            "`drivetwin card new -o CARD.toml --from LOG` writes one"
+        )
     return notes

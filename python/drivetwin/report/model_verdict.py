@@ -136,6 +136,11 @@ def _explain_failure(findings: Sequence[Finding]) -> tuple[str, str]:
     errors = [one for one in findings if one.severity is Severity.ERROR]
     cause = _lead(errors[0]) if errors else "The simulation does not follow the measurement."
     suspects = [one.names["entry"] for one in findings if one.code is Code.CARD_SUSPECT]
+    suspects += [
+        f"gain of {one.names['element']}, whose friction the log does not determine"
+        for one in findings
+        if one.code is Code.GAIN_NOT_DETERMINED
+    ]
     if suspects:
         action = f"Check first: {'; '.join(suspects[:_SHOWN])}. Then identify again."
     elif errors and errors[0].code is not Code.SIMULATION_MISSES and errors[0].remedy:

@@ -20,7 +20,7 @@ from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.estimation.result.verdict import apply_errors
 from drivetwin.findings import Code, Finding, Severity, report
-from drivetwin.validation.suspects import find_suspects
+from drivetwin.validation.suspects import find_suspects, find_undetermined_gains
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,7 @@ def assess_model(found: Identification) -> Identification:
     estimates = apply_errors(found.estimates, failures)
     refuted = bool(failures or found.evidence.gave_up)
     suspects = find_suspects(found, friction=GATE.friction) if refuted or doubts else []
+    suspects += find_undetermined_gains(found, failures)
     if refuted:
         status = ModelStatus.NOT_VALID
     elif not found.evidence.validation:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -44,6 +44,28 @@ def find_suspects(found: Identification, friction: tuple[float, float]) -> list[
         reverse=True,
     )
     return [report(Code.CARD_SUSPECT, entry=entry, size=size) for size, entry in ranked[:SHOWN]]
+
+
+def find_undetermined_gains(found: Identification, failures: Iterable[Finding]) -> list[Finding]:
+    """Name the elements without friction of their own in shifts that the simulation misses.
+
+    Such an element never slips under load in the log. Its torque decides when it breaks away.
+    """
+    missed = {one.names["shift"] for one in failures if one.code is Code.SIMULATION_OUTSIDE_SPREAD}
+    pairs = {
+        (element, other)
+        for shift in found.shifts
+        if f"{shift.start_gear}-{shift.end_gear}" in missed
+        for element, other in (
+            (shift.offgoing, shift.oncoming),
+            (shift.oncoming, shift.offgoing),
+        )
+        if element not in found.friction and other in found.friction
+    }
+    return [
+        report(Code.GAIN_NOT_DETERMINED, element=element, other=other)
+        for element, other in sorted(pairs)
+    ]
 
 
 def _rank_gains(found: Identification, friction: tuple[float, float]) -> Iterator[Suspect]:

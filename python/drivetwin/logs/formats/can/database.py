@@ -38,6 +38,11 @@ def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:
     return tuple(messages)
 
 
+def list_databases(log: Path) -> list[str]:
+    """List the names of the DBC files beside a log."""
+    return sorted(one.name for one in log.parent.glob("*") if one.suffix.casefold() == ".dbc")
+
+
 def _convert_message(source: Any) -> Message:
     by_name = {one.name: one for one in source.signals}
     return Message(

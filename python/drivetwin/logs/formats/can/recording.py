@@ -17,6 +17,7 @@ from drivetwin.errors import DamagedChannelError, MissingChannelError, Where
 from drivetwin.logs.formats.can.database import (
     decode_codes,
     decode_physical,
+    list_databases,
     select_valid_payloads,
 )
 from drivetwin.logs.formats.frames import Frames, Message, Signal
@@ -59,6 +60,15 @@ class _Entry:
     decode: Callable[[], RawChannel]
 
 
+def _advise_database(path: Path) -> str:
+    """Name the DBC files beside a log that its messages are not known without."""
+    names = ", ".join(f'"{name}"' for name in list_databases(path)) or '"..."'
+    return (
+        "state the DBC file of this bus in the channel mapping, as channels.toml beside the log: "
+        f"bus = {{ dbc = [{names}] }}"
+    )
+
+
 class BusRecording:
     """The signals of a bus log. The group is `message from sender`, with the bus where several."""
 
@@ -77,7 +87,7 @@ class BusRecording:
             raise MissingChannelError(
                 f"none of the {len(np.unique(frames.identifier))} identifiers on the bus is in the "
                 "database",
-                'name the DBC file of this bus in the channel mapping: bus = { dbc = ["..."] }',
+                _advise_database(path),
                 Where(file=str(path)),
             )
         faults = ", ".join(f"{count} {why}" for why, count in sorted(transport.faults.items()))
