@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import NM
 from drivetwin.report.figures.stack import Curve, Panel
 from drivetwin.workbench.session import Session
@@ -34,8 +35,8 @@ def test_the_window_of_an_event(change: dict[str, Any], view: tuple[float, float
 
 @pytest.mark.parametrize("start", [0.0, 90_000.0])
 def test_every_sample_in_view_is_sent(start: float) -> None:
-    time = start + np.arange(600_000) * 1e-3
-    curve = Curve("T", time, np.sin(time), "#000")
+    time: FloatArray = start + np.arange(600_000, dtype=np.float64) * 1e-3
+    curve = Curve("T", time, np.sin(time).astype(np.float64), "#000")
     view = (start + 300.0, start + 301.0)
     (sent,) = collect_curves([Panel("torque", NM, [curve])], view).values()
     x = np.frombuffer(base64.b64decode(sent["x"]["bdata"]), sent["x"]["dtype"])

@@ -18,6 +18,7 @@ from drivetwin.cli.output import (
     make_table,
     print_json,
     print_line,
+    print_paragraph,
     print_table,
     show_step,
 )

@@ -144,7 +144,7 @@ def _list_logs(work: SessionState) -> list[Component]:
     """List the logs where several are open."""
     if len(work.logs) < 2:
         return []
-    rows = [
+    rows: list[list[ui.Content]] = [
         [
             one.source.name,
             "cannot be read" if one.opened.log is None else str(len(one.opened.log.channels)),

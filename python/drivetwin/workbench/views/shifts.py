@@ -186,7 +186,7 @@ def _build_rows(work: SessionState, at: int, log: OpenLog) -> Iterator[list[ui.C
         if len(work.all_shifts) > 1:
             name = f"use of shift {label} of {log.source.name}"
             use = "hold" if k in log.held else "fit"
-            id = {"part": "use", "id": _make_use_id(at, k)}
+            id: ui.Id = {"part": "use", "id": _make_use_id(at, k)}
             row.append(ui.make_choice(id, name, _USES, use, hidden_label=True))
         yield row
 
