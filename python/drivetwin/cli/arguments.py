@@ -82,7 +82,12 @@ LogFile = Annotated[
 ]
 VehicleFile = Annotated[
     Path,
-    typer.Option("--vehicle", metavar="CARD", help="Vehicle card (TOML).", callback=require_card),
+    typer.Option(
+        "--vehicle",
+        metavar="CARD",
+        help="Vehicle card (TOML), as `drivetwin card new` writes it.",
+        callback=require_card,
+    ),
 ]
 OptionalVehicleFile = Annotated[
     Path | None,

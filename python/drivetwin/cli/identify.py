@@ -196,8 +196,10 @@ def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) 
     suggestions = found.evidence.suggestions
     if any(one.best is not None for one in suggestions):
         print_table(build_suggestion_table(suggestions, found.estimates))
-    for line in list_limits(suggestions):
+    for line in (limits := list_limits(suggestions)):
         print_paragraph(line)
+    if limits:
+        print_line("")
     if found.fit:
         print_table(build_fit_table(found.fit, "Simulation over measurement"))
     print_findings(found.findings)

@@ -41,7 +41,7 @@ def report(
     logs = [source for source in sources if not _is_identification(source)]
     if not made:
         raise InputError(
-            f"{sources[0].name} is no result of an identification",
+            "this is no result of an identification",
             "name a folder that `drivetwin identify -o` wrote, its result.json or its twin.toml",
             Where(file=str(sources[0])),
         )

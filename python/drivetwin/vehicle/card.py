@@ -43,7 +43,8 @@ def load_card(path: Path | str) -> VehicleCard:
         check_card(document),
         CardError,
         str(path),
-        "correct these keys of the vehicle card; examples/vehicles holds complete cards",
+        "correct these keys of the vehicle card; in a draft, fill in the lines `# KEY = ...` and "
+        "remove their leading #",
     )
     file = CardFile.model_validate(document)
     J_out = file.inertia.J_out_kgm2

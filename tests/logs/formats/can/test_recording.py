@@ -127,7 +127,7 @@ def test_another_bus_by_its_dbc(tmp_path: Path) -> None:
     log.write_text("".join(f"({0.01 * k:.6f}) can0 123#{row}\n" for k, row in enumerate(rows)))
     with pytest.raises(MissingChannelError, match="none of the 1 identifiers") as caught:
         read_raw(log)
-    assert "bus = { dbc = [" in caught.value.remedy
+    assert 'bus = { dbc = ["bus.dbc"] }' in caught.value.remedy
     found = by_name(log, ReadOptions(bus=BusOptions((tmp_path / "bus.dbc",))))
     assert found["n_in"].values == pytest.approx(1000.0 + 0.25 * np.arange(20))
     assert (found["n_ab"].unit, found["n_ab"].group) == ("rpm", "Speeds")
