@@ -96,10 +96,12 @@ def test_an_added_log_has_the_corrections_of_the_selected_one(
     session.open(session.get_folder_source(LOG), session.get_folder_source(CARD))
     rows = list_rows(session.work.require_opened().survey)
     session.correct_mapping(
-        [Entry("" if one.role == "wheel_speed" else one.role, one.unit, False) for one in rows]
+        [Entry(one.role, "1/min" if one.unit == "rpm" else one.unit, False) for one in rows]
     )
     session.add_log(session.get_folder_source(SECOND))
     first, second = session.work.logs
+    assert first.channels == second.channels
+    assert second.channels["wheel_speed"].unit == "1/min"
     assert set(first.require_log().channels) == set(second.require_log().channels)
 
 
