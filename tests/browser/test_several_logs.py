@@ -59,7 +59,7 @@ def test_a_held_out_log_is_predicted(opened: Page, pictures: Path) -> None:
     page = opened
     expect(page.locator("#log-content")).to_contain_text("identified together")
     show_view(page, "shifts")
-    page.get_by_label("use of shift 1→2 of second.csv").select_option("hold")
+    page.get_by_label("use of shift 2→3 of second.csv").select_option("hold")
     expect_message(page, "predicts 1 shift instead of fitting")
     expect(page.locator("#step-shifts")).to_contain_text("2 shifts of 2 logs found, 1 held out.")
     show_view(page, "identify")
@@ -89,7 +89,9 @@ def test_a_zoom_is_carried_between_views(opened: Page) -> None:
     page = opened
     show_view(page, "channels")
     page.select_option("#preview", "1")
+    page.wait_for_selector("#preview-plot .js-plotly-plot")
     area = page.locator("#channels-plot .nsewdrag").first
+    area.scroll_into_view_if_needed()
     box = wait_for_rest(page, area)
     y = box["y"] + 0.5 * box["height"]
     page.mouse.move(box["x"] + 0.30 * box["width"], y)
