@@ -12,6 +12,7 @@ import cantools
 import numpy as np
 import pytest
 from asammdf import MDF, Signal
+from cantools.database.can import Database
 
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.cli import main
@@ -82,6 +83,7 @@ def write_bus_log(path: Path) -> None:
     channels = _record("paper_steps")
     recorded = {name: convert_to_recorded_units(channels[role]) for name, role in BUS_ROLES.items()}
     database = cantools.database.load_string(DBC, "dbc")
+    assert isinstance(database, Database)
     lines = []
     for place, message in enumerate(database.messages):
         for time in np.arange(0.0, 4.9, BUS_STEP) + 2e-4 * place:
