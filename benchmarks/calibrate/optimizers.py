@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -24,9 +24,9 @@ from drivetwin.calibration.calibrate import (
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Objective
-from drivetwin.calibration.profiles import Space
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Purpose, Scenarios
-from drivetwin.calibration.search import search_minima
+from drivetwin.calibration.search import Evaluate, search_minima
 
 _DIFFERENCE = 2e-3
 """Step of the differences of L-BFGS, in shares of the ranges."""
@@ -80,7 +80,7 @@ def run_product(task: Task, fresh: Scenarios, _: float) -> Entry:
 def run_cma(task: Task, fresh: Scenarios, limit: float) -> Entry:
     """Run CMA-ES alone, one start after the other, on the draws of the polish."""
 
-    def search(evaluate: Callable[[FloatArray], float], start: FloatArray) -> None:
+    def search(evaluate: Evaluate, start: FloatArray) -> None:
         seed = 100 * task.seed
         alone = replace(task.settings, starts=1, finalists=1, first_evaluations=4000,
                         evaluations=4000)  # fmt: skip
@@ -98,15 +98,15 @@ def run_lbfgs(task: Task, fresh: Scenarios, limit: float) -> Entry:
     objective = build_objective(task, plant)
     random = np.random.default_rng(task.seed)
 
-    def search(evaluate: Callable[[FloatArray], float], start: FloatArray) -> None:
-        def smooth(at: FloatArray) -> float:
-            outcome = plant.evaluate(space.build_profiles(at), draws)
-            return _soften(objective, outcome)
+    def search(evaluate: Evaluate, start: FloatArray) -> None:
+        def smooth(candidates: Sequence[FloatArray]) -> list[float]:
+            controls = [space.build_control(one) for one in candidates]
+            return [_soften(objective, one) for one in plant.evaluate_all(controls, draws)]
 
         def slope(at: FloatArray) -> tuple[float, FloatArray]:
-            evaluate(at)
-            base, signs = smooth(at), np.where(at < 0.5, 1.0, -1.0)
-            moved = [smooth(at + _DIFFERENCE * one) for one in np.diag(signs)]
+            evaluate([at])
+            signs = np.where(at < 0.5, 1.0, -1.0)
+            base, *moved = smooth([at, *(at + _DIFFERENCE * one for one in np.diag(signs))])
             return base, (np.array(moved) - base) / (_DIFFERENCE * signs)
 
         at = start
@@ -137,7 +137,7 @@ def _run_within(
     task: Task,
     tried: tuple[Plant, Scenarios],
     limit: float,
-    search: Callable[[Callable[[FloatArray], float], FloatArray], None],
+    search: Callable[[Evaluate, FloatArray], None],
 ) -> Entry:
     """Run a search until its CPU time [s] is used up; `tried` are plant and fresh draws."""
     space, (plant, fresh) = Space(task.policy), tried
@@ -145,10 +145,12 @@ def _run_within(
     draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
     objective = build_objective(task, plant)
 
-    def evaluate(coordinates: FloatArray) -> float:
-        value = objective.evaluate(plant.evaluate(space.build_profiles(coordinates), draws))
-        watch.note(value, coordinates)
-        return value
+    def evaluate(candidates: Sequence[FloatArray]) -> list[float]:
+        controls = [space.build_control(one) for one in candidates]
+        values = [objective.evaluate(one) for one in plant.evaluate_all(controls, draws)]
+        for value, coordinates in zip(values, candidates, strict=True):
+            watch.note(value, coordinates)
+        return values
 
     with suppress(OutOfTimeError):
         search(evaluate, space.start)

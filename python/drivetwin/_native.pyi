@@ -17,6 +17,7 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_batch",
+    "simulate_controlled",
     "simulate_network",
 ]
 
@@ -63,6 +64,14 @@ def simulate_batch(
     grid: _Array,
     wanted: tuple[_Array, str],
     into: tuple[tuple[str, int], _Array],
+) -> _Ends: ...
+def simulate_controlled(
+    model: str,
+    start: tuple[float, float, float, float, Sequence[str]],
+    sets: tuple[Sequence[str], _Array],
+    grid: _Array,
+    controlled: tuple[str, str],
+    into: tuple[tuple[str, bool, int], _Array],
 ) -> _Ends: ...
 def batch_sensitivities(
     model: str,

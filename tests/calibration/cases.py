@@ -7,25 +7,38 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
+from drivetwin.actuator.identify import IdentifiedActuator
+from drivetwin.actuator.model import ActuatorModel
 from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.objective import Limit
+from drivetwin.calibration.policy import Space
+from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import (
-    DrawModel,
+    Draw,
     Purpose,
     Scenarios,
     draw_scenarios,
     scale_units,
 )
 from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.slip_policy import SlipPolicy, build_slip_policy
 from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.units import UnitDraws
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad
+from drivetwin.simulation.shift_control import ControlledUnit
 from tests.support.upshift.scenario import build_model
 from tests.support.upshift.statement import BAR, make_problem
 
 SYSTEM = 10.0 * BAR
+ACTUATOR = IdentifiedActuator.from_design(ActuatorModel(0.02, 0.0265, 0.0265, 0.9))
+FILLING = IdentifiedActuator.from_design(
+    ActuatorModel(0.03, 0.02, 0.03, 0.9, 0.9 * BAR, 0.08, 0.05 * BAR)
+)
+"""Actuators without and with a fill time and hysteresis."""
 QUICK = CalibrationSettings(
     starts=2,
     finalists=1,
@@ -57,14 +70,14 @@ def make_downshift() -> Maneuver:
     return Maneuver(model, OperatingPoint(-150.0, 120.0), 0.5)
 
 
-def make_draw(maneuver: Maneuver, spread: Spread | None = None) -> DrawModel:
+def make_draw(maneuver: Maneuver, spread: Spread | None = None) -> Draw:
     """Made units around the driveline of a shift."""
     given = spread or Spread()
 
     def draw(random: np.random.Generator) -> DualClutch:
         return scale_units(maneuver.model, given, random)
 
-    return draw
+    return Draw(draw)
 
 
 def make_draws(maneuver: Maneuver, count: int, seed: int = 1) -> Scenarios:
@@ -79,6 +92,28 @@ def make_task(
     maneuver = make_upshift(step=2e-3)
     policy = build_controller_policy(maneuver, SYSTEM)
     return Task(maneuver, policy, make_draw(maneuver), limits, seed, settings)
+
+
+def build_profiles(space: Space, coordinates: FloatArray) -> Profiles:
+    """Return the profiles of a policy that has no closed loop."""
+    control = space.build_control(coordinates)
+    assert isinstance(control, Profiles)
+    return control
+
+
+def make_slip_policy(maneuver: Maneuver, actuator: IdentifiedActuator = ACTUATOR) -> SlipPolicy:
+    """Policy with a closed slip loop behind two equal actuators."""
+    unit = ControlledUnit(actuator.model, actuator.model, 0.05)
+    return build_slip_policy(maneuver, SYSTEM, unit, 0.01)
+
+
+def make_slip_task(limits: tuple[Limit, ...] = ()) -> Task:
+    """Calibration of the upshift by a controller with a closed slip loop."""
+    maneuver = make_upshift(step=2e-3)
+    policy = make_slip_policy(maneuver)
+    units = UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread())
+    draw = Draw(make_draw(maneuver).model, units)
+    return Task(maneuver, policy, draw, limits, 1, QUICK)
 
 
 def make_plant(maneuver: Maneuver) -> Plant:

@@ -11,7 +11,7 @@ import pytest
 from drivetwin.calibration import evaluate
 from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.profiles import Space
+from drivetwin.calibration.policy import Space
 from tests.calibration.cases import SYSTEM, make_draws, make_plant, make_upshift
 
 
@@ -22,7 +22,7 @@ def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         make_plant(shift),
         make_draws(shift, 7),
     )
-    profiles = space.build_profiles(space.start)
+    profiles = space.build_control(space.start)
     whole = plant.evaluate(profiles, draws)
     monkeypatch.setattr(evaluate, "_CHUNK", 3)
     parts = plant.evaluate(profiles, draws)

@@ -13,7 +13,7 @@ from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.front import Arm, FrontPoint, select_nondominated, trace_front
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit
-from drivetwin.calibration.profiles import Space
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Purpose
 from tests.calibration.cases import make_task
 
@@ -57,7 +57,7 @@ def test_points_have_the_figures_of_fresh_draws(found: Calibration) -> None:
     draws = draw_for(task, task.settings.neighbour_fresh_draws, Purpose.CERTIFICATE)
     space = Space(task.policy)
     for one in front.points[:3]:
-        profiles = space.build_profiles(space.to_coordinates(one.values))
+        profiles = space.build_control(space.to_coordinates(one.values))
         outcome = Plant(task.maneuver, 1).evaluate(profiles, draws)
         assert one.jerk == pytest.approx(np.quantile(outcome.values[Metric.PEAK_JERK], 0.95))
         assert one.energy == pytest.approx(outcome.values[Metric.FRICTION_ENERGY].mean())

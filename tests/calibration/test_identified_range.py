@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.calibration.identified_range import check_identified_range
-from drivetwin.calibration.profiles import Space
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.findings import Code
+from tests.calibration.cases import build_profiles
 from tests.calibration.twins import make_twin
 
 
@@ -19,7 +20,7 @@ def test_says_what_leaves_the_range_and_when() -> None:
     twin = replace(base, validity={**base.validity, "speed": (60.0, 200.0)})
     task = build_task(twin, Request(("2", "3"), 0.5, limits=()))
     space = Space(task.policy)
-    profiles = space.build_profiles(space.start)
+    profiles = build_profiles(space, space.start)
     assert check_identified_range(twin, task.maneuver, profiles) == ()
     narrow = replace(twin, validity={**twin.validity, "torque": (1150.0, 1500.0)})
     (found,) = check_identified_range(narrow, task.maneuver, profiles)

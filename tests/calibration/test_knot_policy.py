@@ -9,8 +9,8 @@ import pytest
 from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.knot_policy import build_knot_policy
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.profiles import Space
-from tests.calibration.cases import SYSTEM, make_downshift, make_upshift
+from drivetwin.calibration.policy import Space
+from tests.calibration.cases import SYSTEM, build_profiles, make_downshift, make_upshift
 
 
 @pytest.mark.parametrize("shift", [make_upshift(), make_downshift()])
@@ -18,10 +18,10 @@ def test_knots_lie_on_the_start_and_pass_through_values(
     shift: Maneuver,
 ) -> None:
     space = Space(build_controller_policy(shift, SYSTEM))
-    start = space.build_profiles(space.start)
+    start = build_profiles(space, space.start)
     policy = build_knot_policy(shift, start, SYSTEM)
     values = np.array([one.start for one in policy.parameters])
-    profiles = policy.build_profiles(values)
+    profiles = policy.build_control(values)
     for one, signal, origin in (
         (policy.oncoming, profiles.oncoming, start.oncoming),
         (policy.offgoing, profiles.offgoing, start.offgoing),

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,11 @@ from drivetwin.simulation.dual_clutch import FloatArray
 DRAWS = np.linspace(-1.0, 1.0, 20)
 
 
-def _run(at: FloatArray) -> Outcome:
+def _run(candidates: Sequence[FloatArray]) -> list[Outcome]:
+    return [_run_one(at) for at in candidates]
+
+
+def _run_one(at: FloatArray) -> Outcome:
     """Peak jerk |40·(x - 0.6) + 4·draw| + 5, shift time 1 - y, which x + y moves no further."""
     peak = 40.0 * (at[0] - 0.6) + 4.0 * DRAWS
     jerk = np.zeros((DRAWS.size, 21))
@@ -44,4 +50,4 @@ def test_keeps_a_limit_that_costs_comfort() -> None:
 def test_never_returns_worse_than_the_start() -> None:
     objective = Objective((), 0.9, 1.0)
     start = np.array([0.61, 0.0])
-    assert polish(_run, start, objective, 3).value <= objective.evaluate(_run(start))
+    assert polish(_run, start, objective, 3).value <= objective.evaluate(_run_one(start))

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.calibration.controller_policy import build_controller_policy
-from drivetwin.calibration.profiles import PolicyParameter, Space, check_parameters, move_start
+from drivetwin.calibration.policy import Space
+from drivetwin.calibration.profiles import PolicyParameter, check_parameters, move_start
 from drivetwin.errors import InputError
 from tests.calibration.cases import SYSTEM, make_upshift
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.controller_policy import build_controller_policy
-from drivetwin.calibration.profiles import Space
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import (
+    Draw,
     Purpose,
     collect_scenarios,
     draw_scenarios,
@@ -21,7 +22,14 @@ from drivetwin.calibration.scenarios import (
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import FrictionTable, Signal, simulate
-from tests.calibration.cases import SYSTEM, make_draw, make_draws, make_plant, make_upshift
+from tests.calibration.cases import (
+    SYSTEM,
+    build_profiles,
+    make_draw,
+    make_draws,
+    make_plant,
+    make_upshift,
+)
 
 
 def test_draws_follow_seed_and_purpose() -> None:
@@ -47,7 +55,7 @@ def test_draws_have_the_stated_spread() -> None:
 def test_a_torque_scale_is_a_scale_of_the_torque() -> None:
     shift = make_upshift()
     space = Space(build_controller_policy(shift, SYSTEM))
-    profiles = space.build_profiles(space.start)
+    profiles = build_profiles(space, space.start)
     unit = scale_units(shift.model, Spread(0.0, 0.05, 0.0), np.random.default_rng(2))
     scale = unit.eta / shift.model.eta
     louder = replace(shift, point=replace(shift.point, engine_torque=1400.0 * scale))
@@ -69,7 +77,7 @@ def test_impossible_draws_are_not_run() -> None:
     shift = make_upshift()
     assert not is_possible(replace(shift.model, J_out=-1.0))
     with pytest.raises(InputError, match="0 of 100 drawn drivelines"):
-        draw_scenarios(shift, lambda _: replace(shift.model, k_o=-1.0), 5, 1, Purpose.SEARCH)
+        draw_scenarios(shift, Draw(lambda _: replace(shift.model, k_o=-1.0)), 5, 1, Purpose.SEARCH)
 
 
 @pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -17,8 +19,8 @@ SETTINGS = CalibrationSettings(
 CENTRE = np.array([0.3, 0.7, 0.0, 0.5])
 
 
-def _bowl(at: FloatArray) -> float:
-    return float(np.sum((at - CENTRE) ** 2))
+def _bowl(candidates: Sequence[FloatArray]) -> list[float]:
+    return [float(np.sum((at - CENTRE) ** 2)) for at in candidates]
 
 
 def test_finds_a_minimum_also_on_a_bound() -> None:

@@ -12,12 +12,14 @@ from drivetwin.calibration.calibrate import draw_for
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.policy_kind import PolicyKind
 from drivetwin.calibration.scenarios import Purpose
+from drivetwin.calibration.slip_policy import SlipPolicy
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.twin_task import Request, build_task
+from drivetwin.calibration.twin_task import Hardware, Request, build_task
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.result.estimate import Verdict
-from tests.calibration.cases import QUICK
-from tests.calibration.twins import STD, make_twin
+from drivetwin.simulation.shift_control import ControlledUnit
+from tests.calibration.cases import ACTUATOR, FILLING, QUICK
+from tests.calibration.twins import STD, make_hydraulic_twin, make_twin
 
 REQUEST = Request(("2", "3"), 0.5, settings=QUICK)
 
@@ -74,14 +76,27 @@ def test_what_the_twin_does_not_say_must_be_given() -> None:
     assert task.maneuver.point.engine_torque == 1000.0
 
 
+def test_a_slip_loop_has_the_actuators_of_the_twin() -> None:
+    asked = replace(REQUEST, policy=PolicyKind.SLIP, hardware=Hardware(0.02, 0.03), limits=())
+    task = build_task(make_hydraulic_twin(), asked)
+    assert isinstance(task.policy, SlipPolicy)
+    assert task.policy.base.task == 0.02
+    assert task.policy.unit == ControlledUnit(ACTUATOR.model, FILLING.model, 0.03)
+    units = draw_for(task, 5, Purpose.SEARCH).units
+    assert len({one.oncoming.fill_time for one in units}) == 5
+    with pytest.raises(InputError, match="no actuator of B2 and B3"):
+        build_task(make_twin(), asked)
+
+
 @pytest.mark.parametrize("kind", list(PolicyKind))
 def test_a_start_by_name(kind: PolicyKind) -> None:
-    name = {"controller": "fill_time", "knots": "oncoming_pressure_1"}[kind.value]
-    task = build_task(make_twin(), replace(REQUEST, policy=kind, start={name: 0.1}, limits=()))
+    names = {"controller": "fill_time", "knots": "oncoming_pressure_1", "slip": "hold_time"}
+    name, twin = names[kind.value], make_hydraulic_twin()
+    task = build_task(twin, replace(REQUEST, policy=kind, start={name: 0.1}, limits=()))
     found = {one.name: one.start for one in task.policy.parameters}
     assert found[name] == 0.1
     with pytest.raises(InputError, match="no parameter wrong"):
-        build_task(make_twin(), replace(REQUEST, policy=kind, start={"wrong": 0.1}, limits=()))
+        build_task(twin, replace(REQUEST, policy=kind, start={"wrong": 0.1}, limits=()))
 
 
 def test_a_downshift_with_power_is_refused() -> None:

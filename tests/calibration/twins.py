@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
+from tests.calibration.cases import ACTUATOR, FILLING
 from tests.support.upshift.statement import make_problem
 
 STD = 0.01
@@ -66,3 +69,8 @@ def make_twin(verdict: Verdict = Verdict.IDENTIFIED) -> Twin:
         covariance_ids=tuple(values),
         covariance=np.diag([(STD * value) ** 2 for value in values.values()]),
     )
+
+
+def make_hydraulic_twin() -> Twin:
+    """Return the same twin with actuators."""
+    return replace(make_twin(), actuators={"B2": ACTUATOR, "B3": FILLING})

@@ -18,7 +18,7 @@ from drivetwin.export.parameters.files import read_parameters
 from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_conversion import save_twin
 from tests.calibration.cases import QUICK
-from tests.calibration.twins import make_twin
+from tests.calibration.twins import make_hydraulic_twin, make_twin
 
 FILES = {
     "calibration.toml",
@@ -107,6 +107,26 @@ def test_starts_from_a_calibration(
     )
     assert main([*given, *SHORT, "--policy", "knots"]) == 2
     assert "policy 'controller', not 'knots'" in capsys.readouterr().err
+
+
+def test_a_slip_loop_is_calibrated_behind_actuators(
+    twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, limits, out = (tmp_path / name for name in ("twin.toml", "limits.toml", "out"))
+    save_twin(source, make_hydraulic_twin())
+    limits.write_text("[limits]\nshift_time_s = 1.4\n[spread]\ndead_time_s = 0.002\n")
+    given = ["--shift", "2-3", "--policy", "slip", "--limits", str(limits), "-o", str(out)]
+    assert main(["calibrate", str(source), *given, *SHORT]) == 0
+    content = read_calibration_file(out / "calibration.toml")
+    assert content.policy == "slip"
+    assert content.spread.dead_time_s == 0.002
+    assert "integral_gain" in content.parameters
+    assert "are commands of the controller" in (out / "calibration.toml").read_text()
+    assert "of the nominal unit" in (out / "report.html").read_text(encoding="utf-8")
+    notes = (out / "calibration.csv").read_text(encoding="utf-8")
+    assert "commands of the controller" in notes
+    assert main(["calibrate", str(twin), *given, *SHORT]) == 2
+    assert "no actuator of B2 and B3" in capsys.readouterr().err
 
 
 def test_limits_out_of_reach_leave_no_files(

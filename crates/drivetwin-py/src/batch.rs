@@ -20,7 +20,7 @@ type Wanted<'py> = (PyReadonlyArray2<'py, f64>, String);
 /// Outputs as a JSON list, threads (0: all).
 type Options = (String, usize);
 /// Numbers of events, times of the last lock [s], failed runs and why.
-type Ends<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>, Vec<(usize, String)>);
+pub type Ends<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>, Vec<(usize, String)>);
 /// Flat values, flat derivatives, derivatives of the last locks, runs with a grazing event and why.
 type Derived<'py> = (
     Bound<'py, PyArray1<f64>>,
@@ -108,15 +108,15 @@ pub fn batch_sensitivities<'py>(
     Ok((ends(py, batch), (values, kept, last_lock, grazing)))
 }
 
-fn refused(error: &dyn std::fmt::Display) -> PyErr {
+pub fn refused(error: &dyn std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-fn outputs_of(json: &str) -> PyResult<Vec<Output>> {
+pub fn outputs_of(json: &str) -> PyResult<Vec<Output>> {
     serde_json::from_str(json).map_err(|e| refused(&e))
 }
 
-fn names_of(names: &[String]) -> Vec<&str> {
+pub fn names_of(names: &[String]) -> Vec<&str> {
     names.iter().map(String::as_str).collect()
 }
 
@@ -143,7 +143,7 @@ fn keep_of<'m>(name: &str, measured: &'m [Vec<f64>]) -> PyResult<Keep<'m>> {
     }
 }
 
-fn ends(py: Python<'_>, batch: Batch) -> Ends<'_> {
+pub fn ends(py: Python<'_>, batch: Batch) -> Ends<'_> {
     let failed = batch.outcomes.iter().enumerate().filter_map(|(i, outcome)| match outcome {
         Outcome::Ran(Status::Completed) => None,
         Outcome::Ran(status) => Some((i, status.to_string())),

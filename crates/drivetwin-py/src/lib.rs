@@ -5,6 +5,7 @@
 
 mod batch;
 mod border;
+mod controlled;
 mod dual_clutch;
 mod gearbox;
 mod linear;
@@ -25,6 +26,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(dual_clutch::sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(batch::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(batch::batch_sensitivities, module)?)?;
+    module.add_function(wrap_pyfunction!(controlled::simulate_controlled, module)?)?;
     module.add_function(wrap_pyfunction!(linear::linearise, module)?)?;
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;

@@ -11,13 +11,15 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import scale_progress
 from drivetwin.calibration.certificate import Certificate, certify
+from drivetwin.calibration.closed_loop import Control, compute_nominal_profiles
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import METRICS, Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
+from drivetwin.calibration.policy import Policy, Space
 from drivetwin.calibration.polish import polish
-from drivetwin.calibration.profiles import Policy, Profiles, Space
-from drivetwin.calibration.scenarios import DrawModel, Purpose, Scenarios, draw_scenarios
+from drivetwin.calibration.profiles import Profiles
+from drivetwin.calibration.scenarios import Draw, Purpose, Scenarios, draw_scenarios
 from drivetwin.calibration.search import Candidate, search_minima
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
@@ -35,7 +37,7 @@ class Task:
 
     maneuver: Maneuver
     policy: Policy
-    draw: DrawModel
+    draw: Draw
     limits: tuple[Limit, ...]
     seed: int = 1
     settings: CalibrationSettings = field(default_factory=CalibrationSettings)
@@ -47,9 +49,13 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """Profiles of one calibration with values (p,), outcome and certificate on fresh draws."""
+    """One calibration with values (p,): control, outcome and certificate on fresh draws.
+
+    `profiles` are those at the clutches of the nominal driveline.
+    """
 
     values: FloatArray
+    control: Control
     profiles: Profiles
     outcome: Outcome
     certificate: Certificate
@@ -112,10 +118,11 @@ def find_best(task: Task, plant: Plant) -> FloatArray:
 def assess(task: Task, plant: Plant, coordinates: FloatArray, scenarios: Scenarios) -> Assessment:
     """Simulate coordinates (q,) over scenarios and certify them."""
     space = Space(task.policy)
-    profiles = space.build_profiles(coordinates)
-    outcome = plant.evaluate(profiles, scenarios)
+    control = space.build_control(coordinates)
+    outcome = plant.evaluate(control, scenarios)
     certificate = certify(outcome, task.limits, task.settings.confidence)
-    return Assessment(space.to_values(coordinates), profiles, outcome, certificate)
+    profiles = compute_nominal_profiles(plant.maneuver, control)
+    return Assessment(space.to_values(coordinates), control, profiles, outcome, certificate)
 
 
 def draw_for(task: Task, count: int, purpose: Purpose) -> Scenarios:
@@ -127,7 +134,7 @@ def build_objective(task: Task, plant: Plant) -> Objective:
     """Build the objective; its penalty is scaled by the tail mean of the start."""
     settings, space = task.settings, Space(task.policy)
     draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
-    start = plant.evaluate(space.build_profiles(space.start), draws)
+    start = plant.evaluate(space.build_control(space.start), draws)
     comfort = compute_tail_mean(start.values[Metric.PEAK_JERK], settings.search_share)
     whole = Objective(task.limits, settings.search_share, settings.penalty * comfort)
     return whole.tighten(settings.margin)
@@ -138,8 +145,8 @@ def polish_from(task: Task, plant: Plant, start: FloatArray) -> Candidate:
     space, settings = Space(task.policy), task.settings
     draws = draw_for(task, settings.neighbour_draws, Purpose.POLISH)
 
-    def run(coordinates: FloatArray) -> Outcome:
-        return plant.evaluate(space.build_profiles(coordinates), draws)
+    def run(candidates: Sequence[FloatArray]) -> list[Outcome]:
+        return plant.evaluate_all([space.build_control(one) for one in candidates], draws)
 
     wider = replace(settings, margin=settings.neighbour_margin)
     objective = build_objective(replace(task, settings=wider), plant)
@@ -151,8 +158,9 @@ def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
     draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
     coarse = set_coarse_step(plant)
 
-    def evaluate(coordinates: FloatArray) -> float:
-        return objective.evaluate(coarse.evaluate(space.build_profiles(coordinates), draws))
+    def evaluate(candidates: Sequence[FloatArray]) -> list[float]:
+        controls = [space.build_control(one) for one in candidates]
+        return [objective.evaluate(one) for one in coarse.evaluate_all(controls, draws)]
 
     return search_minima(evaluate, space.start, settings, task.seed)
 
@@ -164,8 +172,8 @@ def _polish(
     settings, space = task.settings, Space(task.policy)
 
     def improve(start: FloatArray, draws: Scenarios, share: float, iterations: int) -> Candidate:
-        def run(coordinates: FloatArray) -> Outcome:
-            return plant.evaluate(space.build_profiles(coordinates), draws)
+        def run(candidates: Sequence[FloatArray]) -> list[Outcome]:
+            return plant.evaluate_all([space.build_control(one) for one in candidates], draws)
 
         return polish(run, start, objective.set_share(share), iterations)
 

@@ -4,7 +4,7 @@
 Events in the order of time: the on-coming element is filled and held at its kiss pressure; in the
 torque phase its pressure rises to the hand-over value while the off-going element is released; in
 the inertia phase its pressure follows two straight lines while the engine torque is reduced; a
-final ramp locks it. Pressures are those at the clutch: the twin has no model of the actuator.
+final ramp locks it. Pressures are those at the clutch; `slip_policy` commands actuators.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.display_units import format_with_unit
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.profiles import (
     PolicyParameter,
@@ -23,19 +22,16 @@ from drivetwin.calibration.profiles import (
     check_parameters,
     move_start,
 )
-from drivetwin.errors import InputError
+from drivetwin.calibration.torque_balance import (
+    INERTIA_TIME,
+    REDUCTION,
+    PhasePressures,
+    estimate_pressures,
+)
 from drivetwin.simulation.dual_clutch import ShiftElement, Signal
 
 _FILL_PRESSURE = 0.9
 """Starting pressure at the end of the filling, over the contact pressure P0."""
-_INERTIA_TIME = 0.45
-"""Starting duration of the inertia phase [s]."""
-_REDUCTION = 0.15
-"""Starting depth of the torque reduction, over the engine torque."""
-_LOCK_PRESSURE = 1.3
-"""Starting pressure at the end of the inertia phase, over that in its middle."""
-_HOLD_MARGIN = 1.25
-"""Starting pressure of the off-going element before its release, over what carries the torque."""
 _SHORTEST = 1e-3
 """Shortest step of a profile [s]; a jump has no rate."""
 
@@ -62,7 +58,7 @@ class ControllerPolicy:
         """Return the policy with other starting values by name; see `move_start`."""
         return replace(self, parameters=move_start(self.parameters, values))
 
-    def build_profiles(self, values: FloatArray) -> Profiles:
+    def build_control(self, values: FloatArray) -> Profiles:
         """Return the profiles of values (p,) in SI."""
         names = (one.name for one in self.parameters)
         at = dict(zip(names, values.tolist(), strict=True))
@@ -123,28 +119,15 @@ class ControllerPolicy:
 def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> ControllerPolicy:
     """Return the policy of a shift, with a start from the static torque balance.
 
-    At hand-over the on-coming element carries the engine torque alone; in the inertia phase also
-    the torque that changes the engine speed within 0.45 s. `system_pressure` [Pa] is that of a
-    held element. Raises InputError where it cannot carry the engine torque.
+    `system_pressure` [Pa] is that of a held element. Raises InputError where it cannot carry the
+    engine torque.
     """
-    torque = abs(maneuver.point.engine_torque)
-    old, new = maneuver.offgoing, maneuver.oncoming
-    handover = _compute_pressure(new, _compute_handover_torque(maneuver))
-    inertia = _compute_pressure(new, _compute_inertia_torque(maneuver))
-    hold = _compute_pressure(old, _HOLD_MARGIN * _compute_held_torque(maneuver))
-    for name, needed in ((new.name, max(handover, inertia)), (old.name, hold)):
-        if needed >= system_pressure:
-            raise InputError(
-                f"{name} needs {format_with_unit(needed, 'Pa', digits=3)} in this shift, the "
-                f"system pressure is {format_with_unit(system_pressure, 'Pa', digits=3)}",
-                "give a smaller engine torque, or a larger system pressure",
-            )
-    sync = min(_LOCK_PRESSURE * inertia, 0.5 * (inertia + system_pressure))
+    pressures = estimate_pressures(maneuver, system_pressure)
     parameters = (
-        *_list_fill_parameters(new),
-        *_list_torque_phase_parameters(handover, hold, system_pressure),
-        *_list_inertia_parameters((inertia, sync), system_pressure),
-        *_list_torque_parameters(torque),
+        *_list_fill_parameters(maneuver.oncoming),
+        *_list_torque_phase_parameters(pressures),
+        *_list_inertia_parameters(pressures),
+        *_list_torque_parameters(abs(maneuver.point.engine_torque)),
     )
     return ControllerPolicy(
         parameters,
@@ -169,9 +152,8 @@ def _list_fill_parameters(element: ShiftElement) -> tuple[PolicyParameter, ...]:
     )  # fmt: skip
 
 
-def _list_torque_phase_parameters(
-    handover: float, hold: float, highest: float
-) -> tuple[PolicyParameter, ...]:
+def _list_torque_phase_parameters(pressures: PhasePressures) -> tuple[PolicyParameter, ...]:
+    handover, hold, highest = pressures.handover, pressures.hold, pressures.system
     return (
         PolicyParameter("torque_phase_time", "s", 0.05, 0.40, 0.15,
                         "ramp of the on-coming element in the torque phase"),
@@ -186,10 +168,8 @@ def _list_torque_phase_parameters(
     )  # fmt: skip
 
 
-def _list_inertia_parameters(
-    pressures: tuple[float, float], highest: float
-) -> tuple[PolicyParameter, ...]:
-    middle, sync = pressures
+def _list_inertia_parameters(pressures: PhasePressures) -> tuple[PolicyParameter, ...]:
+    middle, sync, highest = pressures.inertia, pressures.sync, pressures.system
     return (
         PolicyParameter("inertia_pressure", "Pa", 0.4 * middle, min(2.0 * middle, highest),
                         middle, "on-coming pressure in the inertia phase"),
@@ -197,7 +177,7 @@ def _list_inertia_parameters(
                         "place of the inertia pressure within the inertia phase"),
         PolicyParameter("sync_pressure", "Pa", 0.4 * middle, highest, sync,
                         "on-coming pressure at the end of the inertia phase"),
-        PolicyParameter("inertia_time", "s", 0.15, 0.90, _INERTIA_TIME,
+        PolicyParameter("inertia_time", "s", 0.15, 0.90, INERTIA_TIME,
                         "end of the torque phase to the begin of the final ramp"),
         PolicyParameter("lock_ramp_time", "s", 0.05, 0.40, 0.15, "final ramp to system pressure"),
     )  # fmt: skip
@@ -205,7 +185,7 @@ def _list_inertia_parameters(
 
 def _list_torque_parameters(torque: float) -> tuple[PolicyParameter, ...]:
     return (
-        PolicyParameter("reduction_depth", "N*m", 0.0, 0.6 * torque, _REDUCTION * torque,
+        PolicyParameter("reduction_depth", "N*m", 0.0, 0.6 * torque, REDUCTION * torque,
                         "engine torque intervention"),
         PolicyParameter("reduction_delay", "s", -0.10, 0.20, 0.0,
                         "end of the torque phase to the begin of the intervention"),
@@ -214,39 +194,3 @@ def _list_torque_parameters(torque: float) -> tuple[PolicyParameter, ...]:
                         "end of the inertia phase to the return of the engine torque"),
         PolicyParameter("return_time", "s", 0.05, 0.50, 0.15, "ramp of the return"),
     )  # fmt: skip
-
-
-def _compute_engine_inertia(maneuver: Maneuver) -> float:
-    model = maneuver.model
-    return model.J1 * model.eta + model.J2e
-
-
-def _compute_held_torque(maneuver: Maneuver) -> float:
-    """Torque [N m] of the off-going element in steady acceleration."""
-    ratio, element = maneuver.ratios[0], maneuver.offgoing
-    torque = maneuver.point.engine_torque
-    rate = ratio * maneuver.compute_acceleration(torque, ratio)
-    free = maneuver.model.eta * torque - _compute_engine_inertia(maneuver) * rate
-    return abs(free * maneuver.model.i_in * element.i_c)
-
-
-def _compute_handover_torque(maneuver: Maneuver) -> float:
-    """Torque [N m] with which the on-coming element alone holds the engine in the old gear."""
-    return _compute_held_torque(maneuver) * abs(maneuver.oncoming.i_c / maneuver.offgoing.i_c)
-
-
-def _compute_inertia_torque(maneuver: Maneuver) -> float:
-    """Torque [N m] of the on-coming element that synchronises the engine in the starting time."""
-    old, new = maneuver.ratios
-    torque, speed = maneuver.point.engine_torque, maneuver.point.engine_speed
-    change = speed * (new / old - 1.0)
-    reduced = torque + maneuver.direction * _REDUCTION * abs(torque)
-    rate = _compute_engine_inertia(maneuver) * change / _INERTIA_TIME
-    free = maneuver.model.eta * reduced - rate
-    return abs(free * maneuver.model.i_in * maneuver.oncoming.i_c)
-
-
-def _compute_pressure(element: ShiftElement, torque: float) -> float:
-    """Pressure [Pa] at which a slipping element carries a torque [N m] of either sign."""
-    friction = float(element.friction.evaluate(np.array([20.0]))[0])
-    return element.P0 + abs(torque) / (friction * element.gain)

@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Simulation of profiles over scenarios."""
+"""Simulation of a control over scenarios."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.closed_loop import ClosedLoop, Control
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics, list_outputs
-from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import Scenario, simulate_batch
+from drivetwin.simulation.shift_control import ControlledPlant, simulate_controlled
 
 _CHUNK = 256
 """Runs of a batch whose columns are in memory at once."""
@@ -27,7 +29,7 @@ class RunCount:
 
 @dataclass(frozen=True)
 class Plant:
-    """The driveline that profiles are tried on, and the metrics to compute.
+    """The driveline that a control is tried on, and the metrics to compute.
 
     `threads` 0 takes all cores.
     """
@@ -37,24 +39,43 @@ class Plant:
     metrics: tuple[Metric, ...] = tuple(Metric)
     count: RunCount = field(default_factory=RunCount)
 
-    def evaluate(self, profiles: Profiles, scenarios: Scenarios) -> Outcome:
-        """Return the metrics of one set of profiles over all scenarios."""
-        parts = [
-            self._evaluate_chunk(profiles, scenarios, slice(first, first + _CHUNK))
-            for first in range(0, scenarios.count, _CHUNK)
-        ]
-        return _join(parts)
+    def evaluate(self, control: Control, scenarios: Scenarios) -> Outcome:
+        """Return the metrics of one control over all scenarios."""
+        return self.evaluate_all([control], scenarios)[0]
+
+    def evaluate_all(self, controls: Sequence[Control], scenarios: Scenarios) -> list[Outcome]:
+        """Return the metrics of each control over all scenarios.
+
+        Controllers with a closed loop run together, so that each scenario is compiled once.
+        """
+        loops = [one for one in controls if isinstance(one, ClosedLoop)]
+        together = len(loops) == len(controls)
+        size = max(1, _CHUNK // len(controls)) if together else _CHUNK
+        parts: list[list[Outcome]] = []
+        for first in range(0, scenarios.count, size):
+            chosen = scenarios.select(slice(first, first + size))
+            outputs = list_outputs(self.maneuver)
+            runs = (
+                self._run_closed_loops(loops, chosen, outputs)
+                if together
+                else (self.simulate(one, chosen, outputs) for one in controls)
+            )
+            parts.append([self._measure(columns, lock, chosen) for columns, lock in runs])
+        return [_join(list(one)) for one in zip(*parts, strict=True)]
 
     def simulate(
-        self, profiles: Profiles, scenarios: Scenarios, outputs: tuple[str, ...]
+        self, control: Control, scenarios: Scenarios, outputs: tuple[str, ...]
     ) -> tuple[FloatArray, FloatArray]:
         """Return outputs (runs, outputs, n) and times of the last lock-up (runs,) [s]."""
+        if isinstance(control, ClosedLoop):
+            return self._run_closed_loops([control], scenarios, outputs)[0]
+        self.count.runs += scenarios.count
         shift = self.maneuver
         pressures = {
-            shift.offgoing.name: profiles.offgoing,
-            shift.oncoming.name: profiles.oncoming,
+            shift.offgoing.name: control.offgoing,
+            shift.oncoming.name: control.oncoming,
         }
-        given = Scenario(profiles.engine_torque, pressures, shift.build_start())
+        given = Scenario(control.engine_torque, pressures, shift.build_start())
         batch = simulate_batch(
             shift.model,
             [given],
@@ -63,14 +84,26 @@ class Plant:
             outputs=outputs,
             threads=self.threads,
         )
-        self.count.runs += scenarios.count
         return batch.values, batch.last_lock
 
-    def _evaluate_chunk(self, profiles: Profiles, scenarios: Scenarios, part: slice) -> Outcome:
-        sets = {name: values[part] for name, values in scenarios.sets.items()}
-        chosen = Scenarios(sets, len(next(iter(sets.values()))))
-        columns, last_lock = self.simulate(profiles, chosen, list_outputs(self.maneuver))
-        vehicle = sets.get("J_v", np.full(chosen.count, self.maneuver.model.J_v))
+    def _run_closed_loops(
+        self, controls: Sequence[ClosedLoop], scenarios: Scenarios, outputs: tuple[str, ...]
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Simulate all controllers on all scenarios together; as `simulate` for each controller."""
+        self.count.runs += len(controls) * scenarios.count
+        shift = self.maneuver
+        plant = ControlledPlant(shift.model, shift.build_start(), scenarios.units, scenarios.sets)
+        batch = simulate_controlled(
+            plant,
+            [one.controller for one in controls],
+            shift.time,
+            outputs=outputs,
+            threads=self.threads,
+        )
+        return [(batch.values[:, k], batch.last_lock[:, k]) for k in range(len(controls))]
+
+    def _measure(self, columns: FloatArray, last_lock: FloatArray, chosen: Scenarios) -> Outcome:
+        vehicle = chosen.sets.get("J_v", np.full(chosen.count, self.maneuver.model.J_v))
         return compute_metrics(self.maneuver, columns, last_lock, vehicle, self.metrics)
 
 

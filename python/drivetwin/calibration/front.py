@@ -28,7 +28,7 @@ from drivetwin.calibration.calibrate import (
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Statistic
-from drivetwin.calibration.profiles import Space
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Purpose, Scenarios
 from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 
@@ -150,7 +150,7 @@ def _assess(
     task: Task, plant: Plant, fresh: Scenarios, place: tuple[Arm, FloatArray]
 ) -> FrontPoint:
     space, (arm, at) = Space(task.policy), place
-    outcome = plant.evaluate(space.build_profiles(at), fresh)
+    outcome = plant.evaluate(space.build_control(at), fresh)
     jerk, time = (
         float(np.quantile(outcome.values[one], 0.95))
         for one in (Metric.PEAK_JERK, Metric.SHIFT_TIME)

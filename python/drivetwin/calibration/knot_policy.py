@@ -102,7 +102,7 @@ class KnotPolicy:
             self.request,
         )
 
-    def build_profiles(self, values: FloatArray) -> Profiles:
+    def build_control(self, values: FloatArray) -> Profiles:
         """Return the profiles of values (p,) in SI."""
         first = len(self.oncoming.times)
         second = first + len(self.offgoing.times)

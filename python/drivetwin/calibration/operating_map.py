@@ -33,7 +33,7 @@ from drivetwin.calibration.calibrate import (
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.profiles import Space
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Purpose
 from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 from drivetwin.errors import InputError

@@ -7,7 +7,12 @@ from enum import StrEnum, auto
 
 
 class PolicyKind(StrEnum):
-    """Kind of a policy: the controller's own parameters, or free knots of the profiles."""
+    """Kind of a policy.
+
+    The controller's own parameters at the clutches; free knots of the profiles; commands of a
+    controller with a closed slip loop, behind the actuators.
+    """
 
     CONTROLLER = auto()
     KNOTS = auto()
+    SLIP = auto()

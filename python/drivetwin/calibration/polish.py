@@ -9,7 +9,7 @@ excess over limits. Source: J. Nocedal and S. J. Wright, Numerical Optimization,
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +22,8 @@ from drivetwin.calibration.metrics import Outcome
 from drivetwin.calibration.objective import Limit, Objective, Statistic
 from drivetwin.calibration.search import Candidate
 
-Run = Callable[[FloatArray], Outcome]
-"""Outcome of coordinates (q,) over the scenarios."""
+Run = Callable[[Sequence[FloatArray]], list[Outcome]]
+"""Outcomes of candidates, coordinates (q,), over the scenarios."""
 
 _DIFFERENCE = 2e-3
 """Step of the differences, in shares of the ranges."""
@@ -52,13 +52,13 @@ class _Linear:
 
 def polish(run: Run, start: FloatArray, objective: Objective, iterations: int) -> Candidate:
     """Improve coordinates (q,) from `start` by at most `iterations` linear programs."""
-    at, outcome = start, run(start)
+    at, outcome = start, run([start])[0]
     best, radius, stalls = objective.evaluate(outcome), _FIRST_RADIUS, 0
     for iteration in range(iterations):
         notify_progress(iteration / iterations)
         step = _solve_program(run, at, outcome, (objective, radius))
         tried = [np.clip(at + share * step, 0.0, 1.0) for share in _STEPS]
-        outcomes = [run(one) for one in tried]
+        outcomes = run(tried)
         values = [objective.evaluate(one) for one in outcomes]
         chosen = int(np.argmin(values))
         gain = best - values[chosen]
@@ -78,8 +78,7 @@ def _solve_program(
     """Step (q,) that the linear program takes; zero where it has no solution."""
     objective, radius = region
     signs = np.where(at < 0.5, 1.0, -1.0)
-    moved = [run(at + _DIFFERENCE * sign * unit) for sign, unit in zip(signs, np.eye(at.size),
-                                                                       strict=True)]  # fmt: skip
+    moved = run([at + _DIFFERENCE * step for step in np.diag(signs)])
     width = _DIFFERENCE * signs
     jerk = _linearise_jerk(outcome, moved, width)
     limits = [_linearise_limit(one, outcome, moved, width) for one in objective.limits]

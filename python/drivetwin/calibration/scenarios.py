@@ -17,6 +17,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.units import DrawUnit
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.parameters import OVER_ETA
@@ -27,6 +28,7 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Stribeck,
 )
+from drivetwin.simulation.shift_control import ControlledUnit
 from drivetwin.twin.twin import Twin
 
 _TRIES = 20
@@ -48,16 +50,33 @@ DrawModel = Callable[[np.random.Generator], DualClutch | None]
 
 @dataclass(frozen=True, eq=False)
 class Scenarios:
-    """Drivelines as parameter sets of one batch: values (runs,) by the core's names."""
+    """Drivelines as parameter sets of one batch: values (runs,) by the core's names.
+
+    `units` are the actuators of each; empty where the control is given at the clutches.
+    """
 
     sets: Mapping[str, FloatArray]
     count: int
+    units: Sequence[ControlledUnit] = ()
+
+    def select(self, part: slice) -> Scenarios:
+        """Return a part of the scenarios."""
+        sets = {name: values[part] for name, values in self.sets.items()}
+        return Scenarios(sets, len(range(self.count)[part]), self.units[part])
+
+
+@dataclass(frozen=True)
+class Draw:
+    """Draws of the driveline, and of its actuators where these are simulated."""
+
+    model: DrawModel
+    unit: DrawUnit | None = None
 
 
 def draw_scenarios(
-    maneuver: Maneuver, draw: DrawModel, count: int, seed: int, purpose: Purpose
+    maneuver: Maneuver, draw: Draw, count: int, seed: int, purpose: Purpose
 ) -> Scenarios:
-    """Draw `count` drivelines with steady starts.
+    """Draw `count` drivelines with steady starts. Actuators have random numbers of their own.
 
     Raises InputError where most draws are impossible (an inertia below zero).
     """
@@ -66,7 +85,7 @@ def draw_scenarios(
     for _ in range(_TRIES * count):
         if len(models) == count:
             break
-        model = draw(random)
+        model = draw.model(random)
         if model is not None and is_possible(model):
             models.append(model)
     if len(models) < count:
@@ -75,7 +94,11 @@ def draw_scenarios(
             "identify from more logs, or fix weak parameters on the vehicle card: the intervals "
             "of the twin reach impossible values",
         )
-    return collect_scenarios(maneuver, models)
+    drawn = collect_scenarios(maneuver, models)
+    if draw.unit is None:
+        return drawn
+    own = np.random.default_rng([seed, int(purpose), 1])
+    return replace(drawn, units=[draw.unit(own) for _ in range(count)])
 
 
 def collect_scenarios(maneuver: Maneuver, models: Sequence[DualClutch]) -> Scenarios:

@@ -18,8 +18,8 @@ from drivetwin._util.optional_dependencies import import_extra
 from drivetwin._util.progress import notify_progress
 from drivetwin.calibration.settings import CalibrationSettings
 
-Evaluate = Callable[[FloatArray], float]
-"""Objective of coordinates (q,) from 0 to 1."""
+Evaluate = Callable[[Sequence[FloatArray]], list[float]]
+"""Objectives of candidates: coordinates (q,) from 0 to 1."""
 
 _EDGE = 1e-3
 """Distance of a start from the bounds: the search has no room on them."""
@@ -73,7 +73,7 @@ def _advance(
     for search in searches:
         while search.countevals < evaluations and not search.stop():
             candidates = search.ask()
-            search.tell(candidates, [evaluate(np.asarray(one)) for one in candidates])
+            search.tell(candidates, evaluate([np.asarray(one) for one in candidates]))
             done += len(candidates)
             notify_progress(done / total)
     return done

@@ -22,6 +22,16 @@ class Spread:
     """Scale of the engine torque, relative."""
     contact_pressure: float = 5e3
     """Contact pressure P0 [Pa], common to both clutches."""
+    dead_time: float = 5e-3
+    """Dead time of the actuators [s], common to both clutches."""
+    actuator_lag: float = 0.10
+    """Lags of the actuators, relative, common to both clutches."""
+    kiss_pressure: float = 5e3
+    """Kiss pressure of each actuator [Pa], independent."""
+    fill_time: float = 0.05
+    """Fill time of each actuator, relative, independent."""
+    engine_lag: float = 0.15
+    """Time constant of the engine torque, relative."""
 
     def __post_init__(self) -> None:
         for one in fields(self):

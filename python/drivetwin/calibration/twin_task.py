@@ -14,11 +14,13 @@ from drivetwin.calibration.knot_policy import build_knot_policy
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.policy import Policy, Space
 from drivetwin.calibration.policy_kind import PolicyKind
-from drivetwin.calibration.profiles import Policy, Space
-from drivetwin.calibration.scenarios import Purpose, TwinDraws
+from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws
 from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.slip_policy import build_slip_policy
 from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.units import UnitDraws
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.twin.nominal_shift import build_nominal_shift
@@ -30,6 +32,14 @@ DEFAULT_LIMITS = {
     Metric.FRICTION_ENERGY: Statistic.MEAN,
 }
 """Limits without a file: no worse than the start."""
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """Controller task and time constant of the engine torque [s], for a closed slip loop."""
+
+    task: float = 0.01
+    engine_lag: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -47,6 +57,7 @@ class Request:
     engine_speed: float | None = None
     system_pressure: float | None = None
     policy: PolicyKind = PolicyKind.CONTROLLER
+    hardware: Hardware = field(default_factory=Hardware)
     limits: tuple[Limit, ...] | None = None
     spread: Spread = field(default_factory=Spread)
     start: Mapping[str, float] = field(default_factory=dict)
@@ -66,8 +77,11 @@ def build_task(twin: Twin, request: Request) -> Task:
     point = _choose_point(twin, request)
     maneuver = Maneuver(model, point, request.wheel_radius)
     check_torque_phase_first(maneuver)
-    policy = _build_policy(twin, maneuver, request)
-    draw = TwinDraws(twin, shift, request.spread)
+    units = None
+    if request.policy is PolicyKind.SLIP:
+        units = _build_unit_draws(twin, maneuver, request)
+    policy = _build_policy(twin, maneuver, request, units)
+    draw = Draw(TwinDraws(twin, shift, request.spread), units)
     task = Task(maneuver, policy, draw, request.limits or (), request.seed, request.settings)
     if request.limits is None:
         task = task.set_limits(derive_limits(task))
@@ -94,7 +108,7 @@ def derive_limits(task: Task) -> tuple[Limit, ...]:
     """Limits at which a calibration is no worse than the start in time, vibration and energy."""
     plant, space = Plant(task.maneuver, task.settings.threads), Space(task.policy)
     draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
-    outcome = plant.evaluate(space.build_profiles(space.start), draws)
+    outcome = plant.evaluate(space.build_control(space.start), draws)
     limits = []
     for metric, statistic in DEFAULT_LIMITS.items():
         found = compute_quantiles(outcome.values[metric], task.settings.confidence)
@@ -125,7 +139,9 @@ def _choose_point(twin: Twin, request: Request) -> OperatingPoint:
     return OperatingPoint(torque, speed)
 
 
-def _build_policy(twin: Twin, maneuver: Maneuver, request: Request) -> Policy:
+def _build_policy(
+    twin: Twin, maneuver: Maneuver, request: Request, units: UnitDraws | None
+) -> Policy:
     pressure = request.system_pressure
     if pressure is None and "pressure" not in twin.validity:
         raise InputError(
@@ -134,9 +150,24 @@ def _build_policy(twin: Twin, maneuver: Maneuver, request: Request) -> Policy:
         )
     if pressure is None:
         pressure = twin.validity["pressure"][1]
+    if units is not None:
+        policy = build_slip_policy(maneuver, pressure, units.nominal, request.hardware.task)
+        return policy.set_start(request.start)
     controller = build_controller_policy(maneuver, pressure)
     if request.policy is PolicyKind.CONTROLLER:
         return controller.set_start(request.start)
-    space = Space(controller)
-    knots = build_knot_policy(maneuver, space.build_profiles(space.start), pressure)
+    start = controller.build_control(Space(controller).to_values(Space(controller).start))
+    knots = build_knot_policy(maneuver, start, pressure)
     return knots.set_start(request.start)
+
+
+def _build_unit_draws(twin: Twin, maneuver: Maneuver, request: Request) -> UnitDraws:
+    names = maneuver.offgoing.name, maneuver.oncoming.name
+    if missing := [name for name in names if name not in twin.actuators]:
+        raise InputError(
+            f"the twin {twin.name!r} has no actuator of {' and '.join(missing)}",
+            "identify a log with the roles pressure_command.ELEMENT, state the actuator on the "
+            "vehicle card, or take another --policy",
+        )
+    old, new = (twin.actuators[name] for name in names)
+    return UnitDraws(old, new, request.hardware.engine_lag, request.spread)

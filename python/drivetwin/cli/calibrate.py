@@ -71,8 +71,22 @@ def calibrate(
     ] = 0.5,
     policy: Annotated[
         PolicyKind,
-        typer.Option("--policy", help="Unknowns: controller parameters, or knots of the profiles."),
+        typer.Option(
+            "--policy",
+            help="Unknowns: controller parameters, knots of the profiles, or commands with a closed "
+            "slip loop behind the actuators.",
+        ),
     ] = PolicyKind.CONTROLLER,
+    task: Annotated[
+        float,
+        typer.Option("--task", metavar="S", min=1e-3, max=0.1, help="Controller task (slip)."),
+    ] = 0.01,
+    engine_lag: Annotated[
+        float,
+        typer.Option(
+            "--engine-lag", metavar="S", min=0.0, max=1.0, help="Lag of the engine torque (slip)."
+        ),
+    ] = 0.05,
     start: Annotated[
         Path | None,
         typer.Option("--start", metavar="FILE", help="Earlier calibration.toml as the start."),
@@ -110,7 +124,7 @@ def calibrate(
     """
     from drivetwin.calibration.identified_range import check_identified_range
     from drivetwin.calibration.settings import CalibrationSettings
-    from drivetwin.calibration.twin_task import Request
+    from drivetwin.calibration.twin_task import Hardware, Request
     from drivetwin.cli.export import parse_gears
     from drivetwin.files.limits_file import Requirements, load_limits
 
@@ -124,6 +138,7 @@ def calibrate(
         engine_speed=None if engine_speed is None else engine_speed * math.pi / 30.0,
         system_pressure=None if system_pressure is None else system_pressure * 1e5,
         policy=policy,
+        hardware=Hardware(task, engine_lag),
         limits=given.limits or None,
         spread=given.spread,
         start=_load_start(start, policy),
@@ -137,6 +152,8 @@ def calibrate(
         "system pressure": repr(system_pressure),
         "wheel radius": repr(wheel_radius),
         "policy": policy.value,
+        "task": repr(task),
+        "engine lag": repr(engine_lag),
         "effort": repr(effort),
         "number of draws": str(draws),
         "seed": str(seed),

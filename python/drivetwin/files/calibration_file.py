@@ -31,10 +31,12 @@ from drivetwin.files.read import read_record
 from drivetwin.files.records import Record, SchemaName
 
 CALIBRATION_SCHEMA = "drivetwin/calibration-1"
-_HEADER = (
-    "Calibration of a shift; written by drivetwin. All values in SI units: s, N*m, Pa, rad/s.",
-    "Pressures are those at the clutch. Times count from the request of the gear.",
-)
+_HEADER = "Calibration of a shift; written by drivetwin. All values in SI units: s, N*m, Pa, rad/s."
+_PLACES = {
+    PolicyKind.CONTROLLER: "Pressures are those at the clutch.",
+    PolicyKind.KNOTS: "Pressures are those at the clutch.",
+    PolicyKind.SLIP: "Pressures are commands of the controller.",
+}
 
 
 class PolicyValueRecord(Record):
@@ -128,11 +130,7 @@ def build_calibration_file(
                 for one, value in values
             },
             "limits": {keys[one.metric, one.statistic]: one.bound for one in task.limits},
-            "spread": {
-                "gain": origin.spread.gain,
-                "engine_torque": origin.spread.engine_torque,
-                "contact_pressure_Pa": origin.spread.contact_pressure,
-            },
+            "spread": SpreadRecord.from_spread(origin.spread).model_dump(mode="json"),
             "settings": asdict(task.settings),
             "front": build_front_records(front, task.policy.parameters),
             "map": build_map_records(mapped),
@@ -143,7 +141,8 @@ def build_calibration_file(
 def write_calibration_file(path: Path, content: CalibrationFile) -> None:
     """Write `calibration.toml`; it appears whole or not at all."""
     document = tomlkit.document()
-    for line in _HEADER:
+    place = f"{_PLACES[content.policy]} Times count from the request of the gear."
+    for line in (_HEADER, place):
         document.add(tomlkit.comment(line))
     for key, value in content.model_dump(mode="json", by_alias=True).items():
         document.add(key, tomlkit.item(value))

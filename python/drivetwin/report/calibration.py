@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitCheck, LimitState
+from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.front import Front
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import OperatingMap
@@ -62,8 +63,9 @@ def render_calibration(
 def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Section]:
     profiles = FigureBlock(
         plot_profiles(found),
-        "Pressures at the clutches and engine torque before (dotted, grey) and after; acceleration "
-        "change of the vehicle and slip with 95 % bands over the units. Time from the request.",
+        f"Pressures at the clutches and engine torque{_name_unit(found)} before (dotted, grey) and "
+        "after; acceleration change of the vehicle and slip with 95 % bands over the units. Time "
+        "from the request.",
         build_profile_panels(found),
     )
     notes: list[Block] = [
@@ -92,6 +94,10 @@ def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Sec
         Section("parameters", "Parameters", "Policy before and after.", [_build_values(found)]),
         Section("definitions", "Metrics", "Definition and source.", [_build_definitions()]),
     ]
+
+
+def _name_unit(found: Calibration) -> str:
+    return " of the nominal unit" if isinstance(found.after.control, ClosedLoop) else ""
 
 
 def _build_tiles(found: Calibration) -> TilesBlock:

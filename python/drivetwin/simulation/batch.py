@@ -212,7 +212,7 @@ class _Asked:
             (list(sets), np.ascontiguousarray(table)),
             run_time(time),
             (np.ascontiguousarray(wanted), keep.value if isinstance(keep, Keep) else "misfit"),
-            json.dumps([_parse_output(name) for name in outputs]),
+            json.dumps([parse_output(name) for name in outputs]),
             shape if keep is Keep.COLUMNS else shape[:2],
         )
 
@@ -237,7 +237,8 @@ def _count_runs(sets: Mapping[str, FloatArray], scenarios: Sequence[Scenario]) -
     return runs
 
 
-def _parse_output(name: str) -> Mapping[str, str]:
+def parse_output(name: str) -> Mapping[str, str]:
+    """Return an output as the core takes it. Raises InputError for an unknown name."""
     kind, _, element = name.partition(".")
     if element and kind in ("torque", "slip"):
         return {"friction_torque" if kind == "torque" else "slip": element}

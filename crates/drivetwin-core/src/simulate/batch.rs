@@ -142,7 +142,7 @@ impl Sets<'_> {
         (model, start)
     }
 
-    fn compile_runs<T: Number>(
+    pub fn compile_runs<T: Number>(
         &self,
         runs: &[usize],
     ) -> Result<(Network<T>, State<T>), SimulateError> {
@@ -253,7 +253,7 @@ impl Work<'_> {
         if plan.check(&network).is_err() {
             return;
         }
-        let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &self.plan(run).inputs).collect();
+        let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &*self.plan(run).inputs).collect();
         let all = std::array::from_fn(|place| inputs[if place < runs.len() { place } else { 0 }]);
         let (cache, mask) = (SolverCache::new(&network), alike & !parting);
         let (points, count) = self.keep.recorded(points, plan.grid.len());

@@ -3,6 +3,8 @@
 
 mod batch;
 mod batch_sensitivity;
+mod controlled_batch;
+mod controlled_run;
 mod dual_clutch;
 mod element_power;
 mod energy_balance;
@@ -20,6 +22,7 @@ pub use batch::{Batch, Keep, Outcome, dual_clutch_batch};
 pub use batch_sensitivity::{
     BatchDerivatives, ParameterSets, Recording, Stated, dual_clutch_batch_sensitivities,
 };
+pub use controlled_batch::{ControlledRuns, controlled_batch};
 pub use dual_clutch::{
     DualClutchRun, DualClutchStart, dual_clutch_outputs, run_dual_clutch, simulate_dual_clutch,
 };

@@ -12,6 +12,7 @@ use crate::solver::{
     InputError, Inputs, Integrator, MAX_SPECTRAL_STEP_SLIPPING, Settings, Signal, SolverCache,
     Status, supports_fixed_step,
 };
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Reason why a scenario cannot be run at all.
@@ -55,7 +56,7 @@ pub struct RunOptions {
 /// outputs found by name.
 #[derive(Clone, Debug)]
 pub struct Plan<T> {
-    pub(super) inputs: Inputs<T>,
+    pub(super) inputs: Arc<Inputs<T>>,
     pub(super) grid: Vec<f64>,
     /// Point of the grid at every knot, see [`Inputs::points`].
     pub(super) points: Option<Vec<usize>>,
@@ -91,6 +92,7 @@ impl<T: Real> Plan<T> {
         let points = inputs.points(grid);
         let settings = Settings { exponential_steps: sprint && points.is_some(), ..settings };
         let (grid, outputs) = (grid.to_vec(), outputs.to_vec());
+        let inputs = Arc::new(inputs);
         Ok(Self { inputs, grid, points, outputs, targets, settings, audit })
     }
 
@@ -106,11 +108,11 @@ impl<T: Real> Plan<T> {
         x: Vec<T>,
         locked: &[usize],
     ) -> Result<Integrator<'r, T>, Status> {
-        Integrator::start(known, &self.inputs, self.settings, x, locked)
+        Integrator::start(known, Arc::clone(&self.inputs), self.settings, x, locked)
     }
 
     /// State at the start, with the prescribed speeds that it is left to.
-    fn begin(&self, network: &Network<T>, start: &State<T>) -> Vec<T> {
+    pub(super) fn begin(&self, network: &Network<T>, start: &State<T>) -> Vec<T> {
         let mut x = start.x.clone();
         for (k, &(_, input)) in network.prescribed.iter().enumerate() {
             let speed = self.inputs.start_value(input);

@@ -5,6 +5,8 @@ use crate::number::{Real, Series};
 use crate::solver::input_error::{InputError, check_times, check_values};
 use crate::solver::sine::{Sine, Wave, fill_sine, sine_series, wave};
 
+mod rewrite;
+
 /// Time history of one input.
 #[derive(Clone, Copy, Debug)]
 pub enum Signal<'a, T> {

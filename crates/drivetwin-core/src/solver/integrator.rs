@@ -16,6 +16,7 @@ use crate::solver::settings::{Settings, Step};
 use crate::solver::single::SampleSink;
 use crate::solver::status::Status;
 use crate::solver::tolerances::STALL_NUDGE;
+use std::sync::Arc;
 
 /// A run in progress.
 pub struct Integrator<'a, T: Real> {
@@ -23,13 +24,15 @@ pub struct Integrator<'a, T: Real> {
     pub state: HybridState<'a, T>,
     /// Time [s] and element of the first event that only grazed its guard.
     pub grazing: Option<(f64, String)>,
-    pub(crate) inputs: &'a Inputs<T>,
+    pub(crate) inputs: Arc<Inputs<T>>,
     pub(crate) settings: Settings,
     /// True if propagators pass whole samples.
     uses_fixed_step: bool,
     /// Working space of fixed steps.
     pub(crate) trail: Vec<SampleColumn<T>>,
     pub(crate) segment: usize,
+    /// True until the run advances with other inputs.
+    continued: bool,
     /// Propagators, including those of this run.
     pub(crate) propagators: PropagatorCache<T>,
     pending: Option<EventCause>,
@@ -41,7 +44,7 @@ impl<'a, T: Real> Integrator<'a, T> {
     /// decided by their capacities.
     pub fn start(
         cache: SolverCache<'a, T>,
-        inputs: &'a Inputs<T>,
+        inputs: Arc<Inputs<T>>,
         settings: Settings,
         x: Vec<T>,
         locked: &[usize],
@@ -55,14 +58,15 @@ impl<'a, T: Real> Integrator<'a, T> {
         Ok(Self {
             grazing: None,
             propagators,
-            inputs,
             uses_fixed_step: settings.exponential_steps
                 && inputs.has_samples()
                 && supports_fixed_step(state.network),
+            inputs,
             settings,
             state,
             trail: Vec::new(),
             segment: 0,
+            continued: false,
             pending: None,
             progress: StallDetector::from(from),
         })
@@ -72,6 +76,13 @@ impl<'a, T: Real> Integrator<'a, T> {
     pub fn into_cache(self) -> SolverCache<'a, T> {
         let HybridState { network, modes, .. } = self.state;
         SolverCache { network, modes, propagators: self.propagators }
+    }
+
+    /// Continue a run at its end with other inputs, which begin there.
+    pub(crate) fn continue_with(&mut self, rewrite: impl FnOnce(&mut Inputs<T>)) {
+        rewrite(Arc::make_mut(&mut self.inputs));
+        (self.segment, self.continued) = (0, true);
+        self.load_inputs();
     }
 
     /// Time reached, s.
@@ -145,7 +156,8 @@ impl<'a, T: Real> Integrator<'a, T> {
 
     /// Step into the next segment where the present one is used up; false at the end.
     fn enter_segment(&mut self) -> Result<bool, Status> {
-        let (mut entered, mut jumped) = (false, false);
+        let mut entered = std::mem::take(&mut self.continued);
+        let mut jumped = false;
         while self.state.t.re() >= self.inputs.span(self.segment).1 {
             if self.segment + 1 == self.inputs.segments() {
                 return Ok(false);
@@ -205,7 +217,7 @@ impl<'a, T: Real> Integrator<'a, T> {
     }
 
     /// Times of all knots of the inputs, s; they have one more than segments.
-    pub fn knots(&self) -> &'a [f64] {
+    pub fn knots(&self) -> &[f64] {
         self.inputs.knots()
     }
 

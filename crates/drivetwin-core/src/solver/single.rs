@@ -17,6 +17,7 @@ use crate::solver::integrator::Integrator;
 use crate::solver::interrupt::is_interrupted;
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::status::Status;
+use std::sync::Arc;
 
 /// Consumer of the samples that fixed steps pass in one mode.
 pub trait SampleSink<T: Real> {
@@ -134,11 +135,11 @@ impl<T: Real, S: SampleSink<T>, const N: usize, const A: usize> Kernel
 
     #[inline(always)]
     fn run<const F: bool>(self) -> bool {
-        let inputs = self.run.inputs;
+        let inputs = Arc::clone(&self.run.inputs);
         if T::DERIVATIVES && inputs.jumps() {
-            self.pass::<F, _>(&DelayedInputs(inputs))
+            self.pass::<F, _>(&DelayedInputs(&inputs))
         } else {
-            self.pass::<F, _>(&SharedInputs(inputs))
+            self.pass::<F, _>(&SharedInputs(&inputs))
         }
     }
 }

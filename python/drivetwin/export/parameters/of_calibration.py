@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivetwin.calibration.calibrate import Calibration
+from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.simulation.dual_clutch import Signal
@@ -39,9 +40,20 @@ def collect_calibration(
         notes=(
             f"engine torque {task.maneuver.point.engine_torque:.6g} N*m, engine speed "
             f"{task.maneuver.point.engine_speed:.6g} rad/s at the request",
-            "pressures are those at the clutch, not commands: dead time, lag and filling of the "
-            "actuator are not in the twin",
+            _describe_pressures(found),
         ),
+    )
+
+
+def _describe_pressures(found: Calibration) -> str:
+    if isinstance(found.after.control, ClosedLoop):
+        return (
+            "pressures of parameters are commands of the controller; profiles are those at the "
+            "clutches of the nominal unit"
+        )
+    return (
+        "pressures are those at the clutch, not commands: dead time, lag and filling of the "
+        "actuator are not subtracted"
     )
 
 

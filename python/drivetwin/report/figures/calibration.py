@@ -12,7 +12,6 @@ from drivetwin.calibration.calibrate import Assessment, Calibration
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import Statistic
-from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.report.figure import Entry, Figure, make_subplots, make_trace
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import ACCENT, MEASURED, MUTED, SIMULATED, make_axis, make_layout
@@ -123,11 +122,10 @@ def _sample(signal: Signal, time: FloatArray) -> FloatArray:
 def _simulate_bands(found: Calibration, one: Assessment) -> tuple[_Band, _Band]:
     """Bands of the vehicle's acceleration change and of the on-coming element's slip."""
     shift = found.task.maneuver
-    chosen = {name: values[:_DRAWN] for name, values in found.fresh.sets.items()}
-    draws = Scenarios(chosen, min(_DRAWN, found.fresh.count))
+    draws = found.fresh.select(slice(0, _DRAWN))
     outputs = ("shaft_torque", f"slip.{shift.oncoming.name}")
-    columns, _ = Plant(shift, found.task.settings.threads).simulate(one.profiles, draws, outputs)
-    vehicle = chosen.get("J_v", np.full(draws.count, shift.model.J_v))
+    columns, _ = Plant(shift, found.task.settings.threads).simulate(one.control, draws, outputs)
+    vehicle = draws.sets.get("J_v", np.full(draws.count, shift.model.J_v))
     scale = (shift.wheel_radius * shift.model.i_f / vehicle)[:, None]
     torque = columns[:, 0]
     return _compute_band(scale * (torque - torque[:, :1])), _compute_band(columns[:, 1])

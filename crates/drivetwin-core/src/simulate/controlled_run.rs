@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+//! One run of the dual-clutch driveline whose inputs a controller determines task by task.
+
+use super::run::Plan;
+use super::start::State;
+use super::trajectory::Recorder;
+use crate::control::{Commands, ControlledUnit, Drive, ShiftController, Slips};
+use crate::model::dual_clutch::ENGINE_TORQUE;
+use crate::network::Network;
+use crate::network::nonlinear_torque::form;
+use crate::solver::{Event, Inputs, Integrator, SolverCache, Status};
+use std::sync::Arc;
+
+/// Number of recorded inputs: engine torque, pressures of both elements, then their commands, which have held
+/// until the sample.
+pub(super) const INPUTS: usize = 6;
+
+/// Tasks of a controller over the knots of a plan, and the quantities of a network that it handles.
+pub(super) struct Tasks {
+    /// First knot of each task, and the last of all.
+    first: Vec<usize>,
+    places: Places,
+}
+
+/// What a controlled run gives.
+pub(super) struct ControlledRun {
+    pub columns: Vec<Vec<f64>>,
+    /// Inputs and commands on the grid, see [`INPUTS`].
+    pub inputs: Vec<Vec<f64>>,
+    pub events: Vec<Event<f64>>,
+    pub status: Status,
+}
+
+/// Places of the controlled quantities in a network.
+#[derive(Clone, Copy)]
+struct Places {
+    /// Friction elements: off-going, on-coming.
+    frictions: [usize; 2],
+    /// Inputs: engine torque, off-going, on-coming.
+    inputs: [usize; 3],
+}
+
+impl Tasks {
+    /// Tasks of a controller from the first knot on; a task begins at the knot nearest to its time. None where the
+    /// network lacks an element of the controller.
+    pub fn new(
+        network: &Network<f64>,
+        inputs: &Inputs<f64>,
+        given: &ShiftController,
+    ) -> Option<Self> {
+        let (knots, duration) = (inputs.knots(), given.task);
+        let last = knots.len() - 1;
+        let mut first = vec![0];
+        for (i, knot) in knots.iter().enumerate().skip(1) {
+            let due = knots[0] + duration * first.len() as f64;
+            if i == last || *knot >= due - 0.5 * (knots[i + 1] - knot) {
+                first.push(i);
+            }
+        }
+        Some(Self { first, places: Places::find(network, given)? })
+    }
+}
+
+impl Places {
+    fn find(network: &Network<f64>, given: &ShiftController) -> Option<Self> {
+        let friction = |name: &str| network.frictions.iter().position(|f| f.element == *name);
+        let input = |name: &str| network.mechanism.inputs.iter().position(|i| i == name);
+        Some(Self {
+            frictions: [friction(&given.offgoing)?, friction(&given.oncoming)?],
+            inputs: [input(ENGINE_TORQUE)?, input(&given.offgoing)?, input(&given.oncoming)?],
+        })
+    }
+
+    fn slips(&self, network: &Network<f64>, x: &[f64]) -> Slips {
+        let slip = |place: usize| form(&network.frictions[self.frictions[place]].slip, x);
+        Slips { offgoing: slip(0), oncoming: slip(1) }
+    }
+}
+
+/// Inputs of one task over its knots, and of all on the grid.
+struct InputTrace<'p> {
+    plan: &'p Plan<f64>,
+    places: Places,
+    /// Of the task, knots × inputs.
+    values: Vec<f64>,
+    grid: Vec<Vec<f64>>,
+    next: usize,
+}
+
+impl InputTrace<'_> {
+    /// Let the drive pass a task from its first to its last knot.
+    fn pass_task(&mut self, drive: &mut Drive<'_>, commands: Commands, first: usize, last: usize) {
+        self.values.clear();
+        self.note(drive.inputs(), commands, first);
+        for knot in first + 1..=last {
+            let inputs = drive.advance(self.plan.inputs.knot(knot));
+            self.note(inputs, commands, knot);
+        }
+    }
+
+    fn note(&mut self, inputs: Commands, commands: Commands, knot: usize) {
+        let [torque, off, on] = self.places.inputs;
+        let (at, width) = (self.values.len(), self.places.inputs.len());
+        self.values.resize(at + width, 0.0);
+        self.values[at + torque] = inputs.engine_torque;
+        self.values[at + off] = inputs.offgoing;
+        self.values[at + on] = inputs.oncoming;
+        if self.plan.grid.get(self.next) == Some(&self.plan.inputs.knot(knot)) {
+            self.next += 1;
+            let both = [inputs, commands];
+            let all = both.iter().flat_map(|one| [one.engine_torque, one.offgoing, one.oncoming]);
+            self.grid.iter_mut().zip(all).for_each(|(column, value)| column.push(value));
+        }
+    }
+}
+
+/// Run a plan with the inputs of a controller; those of the plan count for their knots alone.
+pub(super) fn run_controlled<'n>(
+    plan: &Plan<f64>,
+    tasks: &Tasks,
+    known: &mut SolverCache<'n, f64>,
+    start: &State<f64>,
+    given: &ShiftController,
+    unit: &ControlledUnit,
+) -> ControlledRun {
+    let (network, places) = (known.network, tasks.places);
+    let grid = vec![Vec::with_capacity(plan.grid.len()); INPUTS];
+    let mut trace = InputTrace { plan, places, values: Vec::new(), grid, next: 0 };
+    let (begin, step) = (plan.inputs.knot(0), plan.inputs.knot(1) - plan.inputs.knot(0));
+    let mut drive = Drive::new(given, unit, begin, step);
+    let mut recorder = Recorder::new(network, &plan.targets, &plan.grid);
+    let mut events = Vec::new();
+    let mut integrate = || -> Result<(), Status> {
+        let x = plan.begin(network, start);
+        let slips = trace.places.slips(network, &x);
+        let (first, last) = (tasks.first[0], tasks.first[1]);
+        let mut inputs = Inputs::part_of(&plan.inputs, first, last);
+        let commands = drive.command(slips);
+        trace.pass_task(&mut drive, commands, first, last);
+        inputs.rewrite(&plan.inputs, first, last, &trace.values);
+        let cache = std::mem::replace(known, SolverCache::new(network));
+        let inputs = Arc::new(inputs);
+        let mut run = Integrator::start(cache, inputs, plan.settings, x, &start.locked)?;
+        let outcome = pass_tasks(&mut run, &mut recorder, tasks, &mut trace, &mut drive);
+        events = std::mem::take(&mut run.state.events);
+        *known = run.into_cache();
+        outcome
+    };
+    let status = integrate().err().unwrap_or(Status::Completed);
+    let (columns, _) = recorder.finish();
+    for column in &mut trace.grid {
+        column.resize(plan.grid.len(), f64::NAN);
+    }
+    ControlledRun { columns, inputs: trace.grid, events, status }
+}
+
+/// Run to the end of the first task, and through all others.
+fn pass_tasks(
+    run: &mut Integrator<'_, f64>,
+    recorder: &mut Recorder<'_, f64>,
+    tasks: &Tasks,
+    trace: &mut InputTrace<'_>,
+    drive: &mut Drive<'_>,
+) -> Result<(), Status> {
+    recorder.run_to_end(run)?;
+    for span in tasks.first.windows(2).skip(1) {
+        let commands = drive.command(trace.places.slips(run.state.network, &run.state.x));
+        trace.pass_task(drive, commands, span[0], span[1]);
+        run.continue_with(|inputs| {
+            inputs.rewrite(&trace.plan.inputs, span[0], span[1], &trace.values);
+        });
+        recorder.run_to_end(run)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""Pressures of the phases of a shift by the static torque balance, where policies start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.display_units import format_with_unit
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.errors import InputError
+from drivetwin.simulation.dual_clutch import ShiftElement
+
+INERTIA_TIME = 0.45
+"""Starting duration of the inertia phase [s]."""
+REDUCTION = 0.15
+"""Starting depth of the torque reduction, over the engine torque."""
+_LOCK_PRESSURE = 1.3
+"""Starting pressure at the end of the inertia phase, over that in its middle."""
+_HOLD_MARGIN = 1.25
+"""Starting pressure of the off-going element before its release, over what carries the torque."""
+
+
+@dataclass(frozen=True)
+class PhasePressures:
+    """Pressures [Pa]: on-coming at hand-over, in the middle and at the end of the inertia phase.
+
+    `hold` is that of the off-going element before its release, `system` that of a held element.
+    """
+
+    handover: float
+    inertia: float
+    sync: float
+    hold: float
+    system: float
+
+
+def estimate_pressures(maneuver: Maneuver, system_pressure: float) -> PhasePressures:
+    """Estimate the pressures of a shift.
+
+    At hand-over the on-coming element carries the engine torque alone; in the inertia phase also
+    the torque that changes the engine speed within 0.45 s. Raises InputError where
+    `system_pressure` [Pa] cannot carry the engine torque.
+    """
+    old, new = maneuver.offgoing, maneuver.oncoming
+    handover = _compute_pressure(new, _compute_handover_torque(maneuver))
+    inertia = _compute_pressure(new, _compute_inertia_torque(maneuver))
+    hold = _compute_pressure(old, _HOLD_MARGIN * _compute_held_torque(maneuver))
+    for name, needed in ((new.name, max(handover, inertia)), (old.name, hold)):
+        if needed >= system_pressure:
+            raise InputError(
+                f"{name} needs {format_with_unit(needed, 'Pa', digits=3)} in this shift, the "
+                f"system pressure is {format_with_unit(system_pressure, 'Pa', digits=3)}",
+                "give a smaller engine torque, or a larger system pressure",
+            )
+    sync = min(_LOCK_PRESSURE * inertia, 0.5 * (inertia + system_pressure))
+    return PhasePressures(handover, inertia, sync, hold, system_pressure)
+
+
+def _compute_engine_inertia(maneuver: Maneuver) -> float:
+    model = maneuver.model
+    return model.J1 * model.eta + model.J2e
+
+
+def _compute_held_torque(maneuver: Maneuver) -> float:
+    """Torque [N m] of the off-going element in steady acceleration."""
+    ratio, element = maneuver.ratios[0], maneuver.offgoing
+    torque = maneuver.point.engine_torque
+    rate = ratio * maneuver.compute_acceleration(torque, ratio)
+    free = maneuver.model.eta * torque - _compute_engine_inertia(maneuver) * rate
+    return abs(free * maneuver.model.i_in * element.i_c)
+
+
+def _compute_handover_torque(maneuver: Maneuver) -> float:
+    """Torque [N m] with which the on-coming element alone holds the engine in the old gear."""
+    return _compute_held_torque(maneuver) * abs(maneuver.oncoming.i_c / maneuver.offgoing.i_c)
+
+
+def _compute_inertia_torque(maneuver: Maneuver) -> float:
+    """Torque [N m] of the on-coming element that synchronises the engine in the starting time."""
+    old, new = maneuver.ratios
+    torque, speed = maneuver.point.engine_torque, maneuver.point.engine_speed
+    change = speed * (new / old - 1.0)
+    reduced = torque + maneuver.direction * REDUCTION * abs(torque)
+    rate = _compute_engine_inertia(maneuver) * change / INERTIA_TIME
+    free = maneuver.model.eta * reduced - rate
+    return abs(free * maneuver.model.i_in * maneuver.oncoming.i_c)
+
+
+def _compute_pressure(element: ShiftElement, torque: float) -> float:
+    """Pressure [Pa] at which a slipping element carries a torque [N m] of either sign."""
+    friction = float(element.friction.evaluate(np.array([20.0]))[0])
+    return element.P0 + abs(torque) / (friction * element.gain)

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""Draws of actuators: identified covariance, and the spread of made units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.actuator.identify import IdentifiedActuator
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.calibration.spread import Spread
+from drivetwin.simulation.shift_control import ControlledUnit
+
+DrawUnit = Callable[[np.random.Generator], ControlledUnit]
+"""Draws the actuators of a made unit."""
+
+_DEAD_TIMES = (0.25, 2.0)
+"""Range of drawn dead times, over the nominal one."""
+
+
+@dataclass(frozen=True)
+class UnitDraws:
+    """Draws of actuators with identified values, and of the engine's lag [s] around `engine_lag`.
+
+    Parameters that the twin's log does not determine stay at their assumed values.
+    """
+
+    offgoing: IdentifiedActuator
+    oncoming: IdentifiedActuator
+    engine_lag: float
+    spread: Spread
+
+    @property
+    def nominal(self) -> ControlledUnit:
+        """Nominal unit."""
+        return ControlledUnit(self.offgoing.model, self.oncoming.model, self.engine_lag)
+
+    def __call__(self, random: np.random.Generator) -> ControlledUnit:
+        """Draw a unit."""
+        identified = ControlledUnit(
+            _draw_actuator(self.offgoing, random),
+            _draw_actuator(self.oncoming, random),
+            self.engine_lag,
+        )
+        return scale_unit(identified, self.spread, random)
+
+
+def scale_unit(unit: ControlledUnit, spread: Spread, random: np.random.Generator) -> ControlledUnit:
+    """Draw a made unit around `unit`: dead time and lags common to both clutches, fill of each."""
+    late = spread.dead_time * float(random.standard_normal())
+    slow = float(np.exp(spread.actuator_lag * random.standard_normal()))
+    engine = float(np.exp(spread.engine_lag * random.standard_normal()))
+
+    def scale(model: ActuatorModel) -> ActuatorModel:
+        kiss = spread.kiss_pressure * float(random.standard_normal())
+        fill = float(np.exp(spread.fill_time * random.standard_normal()))
+        least, largest = (model.dead_time * one for one in _DEAD_TIMES)
+        return _limit(
+            model,
+            dead_time=min(max(model.dead_time + late, least), largest),
+            rising_lag=slow * model.rising_lag,
+            falling_lag=slow * model.falling_lag,
+            kiss_pressure=model.kiss_pressure + (kiss if model.fill_time > 0.0 else 0.0),
+            fill_time=fill * model.fill_time,
+        )
+
+    return ControlledUnit(scale(unit.offgoing), scale(unit.oncoming), engine * unit.engine_lag)
+
+
+def _draw_actuator(one: IdentifiedActuator, random: np.random.Generator) -> ActuatorModel:
+    finite = np.isfinite(one.std)
+    covariance = np.where(np.outer(finite, finite), one.covariance, 0.0)
+    drawn = random.multivariate_normal(one.model.values, covariance, method="eigh")
+    return ActuatorModel.from_values(_clip(drawn))
+
+
+def _limit(model: ActuatorModel, **changed: float) -> ActuatorModel:
+    values = {name: changed.get(name, getattr(model, name)) for name in QUANTITIES}
+    return ActuatorModel.from_values(_clip(np.array(list(values.values()))))
+
+
+def _clip(values: FloatArray) -> FloatArray:
+    low = [one.lower for one in QUANTITIES.values()]
+    high = [one.upper for one in QUANTITIES.values()]
+    return np.clip(values, low, high)

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""Shifts in closed loop: a controller that commands by slip, and actuators, in many runs.
+
+The core simulates the controller at its sample time: a run costs about as much as one with given
+inputs. Equations of the controller and of the actuator as in docs/explanation/actuator.md and
+docs/howto/calibrate.md.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._native import simulate_controlled as native_simulate_controlled
+from drivetwin.actuator.model import ActuatorModel
+from drivetwin.errors import InputError, Where
+from drivetwin.simulation.batch import parse_output
+from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, State, run_time, to_core_start
+from drivetwin.simulation.serialize import as_array, as_json, as_names
+
+INPUTS = (
+    *("engine_torque", "pressure.offgoing", "pressure.oncoming"),
+    *("command.engine_torque", "command.offgoing", "command.oncoming"),
+)
+"""Recorded inputs of a controlled run: those of the driveline, then the commands; N·m and Pa.
+
+A command is the one that has held until the sample.
+"""
+
+
+@dataclass(frozen=True)
+class ShiftController:
+    """Controller of a shift whose torque phase comes first, with a closed loop of the slip.
+
+    Times [s] count from the request where nothing else is said; pressures in Pa, torques in N·m.
+
+    `offgoing` and `oncoming` name the elements; `task` is the time between two commands, `request`
+    the time of the request in the run. `engine_torque` is the driver's demand, `direction` the sign
+    of the torque intervention, `system_pressure` that of a held element.
+
+    Preparation: the on-coming command is `fill_pressure` until `fill_time`, then rises from
+    `kiss_pressure` to `handover_pressure` within `torque_phase_time`. The off-going command falls
+    to `hold_pressure` at `hold_time`, and to zero within `release_time` after it.
+
+    The inertia phase begins where the off-going element slips. The slip of the on-coming element
+    follows a reference to zero within `inertia_time`, of which the share `end_slope` is a straight
+    line: PI controller with `gain` [Pa·s/rad] and `integral_gain` [Pa/rad] about a feed-forward
+    that goes from `inertia_pressure` to `sync_pressure`. The engine torque changes by
+    `reduction_depth`, `reduction_delay` after its begin, within `reduction_time`; it returns within
+    `return_time` from the slip `return_slip`, over that at its begin. A final ramp of `lock_rate`
+    [Pa/s] locks.
+    """
+
+    offgoing: str
+    oncoming: str
+    task: float
+    request: float
+    engine_torque: float
+    direction: float
+    system_pressure: float
+    fill_pressure: float
+    fill_time: float
+    kiss_pressure: float
+    torque_phase_time: float
+    handover_pressure: float
+    hold_time: float
+    hold_pressure: float
+    release_time: float
+    inertia_pressure: float
+    sync_pressure: float
+    inertia_time: float
+    end_slope: float
+    gain: float
+    integral_gain: float
+    reduction_depth: float
+    reduction_delay: float
+    reduction_time: float
+    return_slip: float
+    return_time: float
+    lock_rate: float
+
+    def __post_init__(self) -> None:
+        if not self.task > 0.0:
+            raise InputError(
+                f"a controller task of {self.task:g} s",
+                "give a time above 0",
+                Where(key="task"),
+            )
+
+
+@dataclass(frozen=True)
+class ControlledUnit:
+    """Actuators of a made unit, and the time constant of its engine torque [s]."""
+
+    offgoing: ActuatorModel
+    oncoming: ActuatorModel
+    engine_lag: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.engine_lag < float("inf"):
+            raise InputError(
+                f"an engine lag of {self.engine_lag:g} s",
+                "give a time from 0 on",
+                Where(key="engine_lag"),
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class ControlledBatch:
+    """Result: `values` (units, controllers, outputs, n), SI; NaN for runs that failed.
+
+    `inputs` (units, controllers, 6, n) are those of INPUTS, empty where not asked for. `last_lock`
+    (units, controllers) [s] is the time of the last lock-up, NaN without one. `failed` holds the
+    reason by the number of the run.
+    """
+
+    values: FloatArray
+    inputs: FloatArray
+    last_lock: FloatArray
+    failed: Mapping[int, str]
+
+
+@dataclass(frozen=True, eq=False)
+class ControlledPlant:
+    """Made units of a driveline: actuators, and values (units,) by the names of `parameters`.
+
+    `start` is the state at the first sample.
+    """
+
+    model: DualClutch
+    start: State
+    units: Sequence[ControlledUnit]
+    parameters: Mapping[str, FloatArray]
+
+
+def simulate_controlled(
+    plant: ControlledPlant,
+    controllers: Sequence[ShiftController],
+    time: FloatArray,
+    *,
+    outputs: Sequence[str] = ("shaft_torque",),
+    with_inputs: bool = False,
+    threads: int = 0,
+) -> ControlledBatch:
+    """Simulate all controllers on all units on `time` (n,) [s].
+
+    Outputs are named as in `simulate_batch`. The controllers share elements, task and request.
+    `threads` 0 takes all cores. Raises InputError for an inconsistent description.
+    """
+    outputs = as_names(outputs)
+    units, rows = len(plant.units), len(outputs)
+    table = [as_array(values) for values in plant.parameters.values()]
+    _check(plant, controllers, threads)
+    more = len(INPUTS) if with_inputs else 0
+    values = np.empty((units, len(controllers), rows + more, len(time)))
+    sets = np.stack(table, axis=1) if table else np.empty((units, 0))
+    try:
+        _, last_lock, failed = native_simulate_controlled(
+            as_json(plant.model),
+            to_core_start(plant.start),
+            (list(plant.parameters), np.ascontiguousarray(sets)),
+            run_time(time),
+            (as_json(list(controllers)), as_json(list(plant.units))),
+            (
+                (json.dumps([parse_output(name) for name in outputs]), with_inputs, threads),
+                values.reshape(-1),
+            ),
+        )
+    except ValueError as error:
+        raise InputError(str(error), "correct the model, its inputs or the names") from error
+    shape = values.shape[:2]
+    return ControlledBatch(
+        values[:, :, :rows], values[:, :, rows:], last_lock.reshape(shape), dict(failed)
+    )
+
+
+def _check(plant: ControlledPlant, controllers: Sequence[ShiftController], threads: int) -> None:
+    lengths = {len(values) for values in plant.parameters.values()} | {len(plant.units)}
+    common = {(one.offgoing, one.oncoming, one.task, one.request) for one in controllers}
+    if len(lengths) != 1 or 0 in lengths or len(common) != 1 or threads < 0:
+        raise InputError(
+            f"{len(plant.units)} units, parameters of {sorted(lengths)} values, {len(common)} "
+            f"kinds of controllers and {threads} threads make no batch",
+            "give a unit for every value, controllers of the same elements, task and request, and "
+            "threads from 1 or 0 for all cores",
+        )

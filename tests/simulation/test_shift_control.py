@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Shifts in closed loop: the actuators and the driveline of the core, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivetwin.actuator.held_signal import HeldSignal
+from drivetwin.actuator.model import ActuatorModel
+from drivetwin.errors import InputError
+from drivetwin.simulation.dual_clutch import Signal, simulate
+from drivetwin.simulation.shift_control import (
+    INPUTS,
+    ControlledBatch,
+    ControlledPlant,
+    ControlledUnit,
+    simulate_controlled,
+)
+from tests.calibration.cases import make_slip_policy, make_upshift
+
+SHIFT = make_upshift()
+POLICY = make_slip_policy(SHIFT)
+CONTROLLER = POLICY.base
+OUTPUTS = ("shaft_torque", "slip.2", "slip.3")
+ACTUATORS = st.builds(
+    ActuatorModel,
+    dead_time=st.floats(0.0, 0.05),
+    rising_lag=st.floats(2e-3, 0.08),
+    falling_lag=st.floats(2e-3, 0.08),
+    damping=st.one_of(st.floats(0.3, 2.0), st.just(1.0)),
+    kiss_pressure=st.floats(0.5e5, 2e5),
+    fill_time=st.one_of(st.just(0.0), st.floats(0.01, 0.15)),
+    hysteresis=st.floats(0.0, 3e4),
+)
+
+
+def run(unit: ControlledUnit, step: float = 1e-3) -> ControlledBatch:
+    shift = SHIFT.set_step(step)
+    plant = ControlledPlant(shift.model, shift.build_start(), [unit], {})
+    return simulate_controlled(
+        plant, [CONTROLLER], shift.time, outputs=OUTPUTS, with_inputs=True, threads=1
+    )
+
+
+@settings(max_examples=12, deadline=None)
+@given(ACTUATORS, ACTUATORS, st.sampled_from([1e-3, 2e-3]))
+def test_pressures_follow_commands_as_the_actuator_model_says(
+    old: ActuatorModel, new: ActuatorModel, step: float
+) -> None:
+    batch = run(ControlledUnit(old, new, 0.05), step)
+    time = SHIFT.set_step(step).time
+    columns = dict(zip(INPUTS, batch.inputs[0, 0], strict=True))
+    tasks = slice(None, None, round(CONTROLLER.task / step))
+    for name, model in (("offgoing", old), ("oncoming", new)):
+        # The command at a sample has held until it.
+        held = HeldSignal(time[tasks][:-1], columns[f"command.{name}"][1:][tasks])
+        expected = model.compute_pressure(held, time)
+        assert columns[f"pressure.{name}"] == pytest.approx(expected, abs=1.0)
+
+
+def test_motion_is_that_of_the_same_inputs_without_controller() -> None:
+    batch = run(POLICY.unit)
+    columns = dict(zip(INPUTS, batch.inputs[0, 0], strict=True))
+    signals = {name: Signal(SHIFT.time, values) for name, values in columns.items()}
+    pressures = {"2": signals["pressure.offgoing"], "3": signals["pressure.oncoming"]}
+    start = SHIFT.build_start()
+    exact = simulate(SHIFT.model, signals["engine_torque"], pressures, start, SHIFT.time)
+    assert not batch.failed
+    largest = np.abs(exact.shaft_torque).max()
+    assert batch.values[0, 0, 0] == pytest.approx(exact.shaft_torque, abs=1e-5 * largest)
+    assert batch.values[0, 0, 2] == pytest.approx(exact.slip["3"], abs=1e-4)
+    locks = [one.time for one in exact.events if one.kind == "lock" and one.element == "3"]
+    assert batch.last_lock[0, 0] == pytest.approx(locks[-1], abs=1e-6)
+
+
+def test_runs_do_not_depend_on_their_neighbours_and_threads() -> None:
+    units = [replace(POLICY.unit, engine_lag=lag) for lag in (0.02, 0.05, 0.1)]
+    gains = SHIFT.oncoming.gain * np.array([0.95, 1.0, 1.05])
+    controllers = [CONTROLLER, replace(CONTROLLER, gain=2.0 * CONTROLLER.gain)]
+    whole = ControlledPlant(SHIFT.model, SHIFT.build_start(), units, {"3.gain": gains})
+    together = simulate_controlled(whole, controllers, SHIFT.time, outputs=OUTPUTS)
+    for k, unit in enumerate(units):
+        one = replace(whole, units=[unit], parameters={"3.gain": gains[k : k + 1]})
+        alone = simulate_controlled(one, controllers[1:], SHIFT.time, outputs=OUTPUTS, threads=1)
+        assert np.array_equal(alone.values[0, 0], together.values[k, 1])
+        assert alone.last_lock[0, 0] == together.last_lock[k, 1]
+
+
+def test_what_makes_no_batch_is_refused() -> None:
+    plant = ControlledPlant(SHIFT.model, SHIFT.build_start(), [POLICY.unit], {})
+    with pytest.raises(InputError, match="make no batch"):
+        simulate_controlled(plant, [], SHIFT.time)
+    other = replace(CONTROLLER, request=0.2)
+    with pytest.raises(InputError, match="make no batch"):
+        simulate_controlled(plant, [CONTROLLER, other], SHIFT.time)
+    with pytest.raises(InputError, match="unknown"):
+        simulate_controlled(replace(plant, parameters={"B9.gain": np.ones(1)}), [CONTROLLER],
+                            SHIFT.time)  # fmt: skip
+    with pytest.raises(InputError, match="no signal"):
+        simulate_controlled(plant, [replace(CONTROLLER, oncoming="4")], SHIFT.time)
+    with pytest.raises(InputError, match="not a finite number"):
+        simulate_controlled(plant, [replace(CONTROLLER, gain=float("nan"))], SHIFT.time)
+    with pytest.raises(InputError, match="controller task"):
+        replace(CONTROLLER, task=0.0)
+    with pytest.raises(InputError, match="engine lag"):
+        replace(POLICY.unit, engine_lag=-1.0)
