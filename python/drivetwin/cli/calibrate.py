@@ -73,8 +73,8 @@ def calibrate(
         PolicyKind,
         typer.Option(
             "--policy",
-            help="Unknowns: controller parameters, knots of the profiles, or commands with a closed "
-            "slip loop behind the actuators.",
+            help="Unknowns: controller parameters, knots of the profiles, or commands with a "
+            "closed slip loop behind the actuators.",
         ),
     ] = PolicyKind.CONTROLLER,
     task: Annotated[

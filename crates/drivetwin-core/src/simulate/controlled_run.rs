@@ -124,7 +124,7 @@ pub(super) fn run_controlled<'n>(
     unit: &ControlledUnit,
 ) -> ControlledRun {
     let (network, places) = (known.network, tasks.places);
-    let grid = vec![Vec::with_capacity(plan.grid.len()); INPUTS];
+    let grid = (0..INPUTS).map(|_| Vec::with_capacity(plan.grid.len())).collect::<Vec<_>>();
     let mut trace = InputTrace { plan, places, values: Vec::new(), grid, next: 0 };
     let (begin, step) = (plan.inputs.knot(0), plan.inputs.knot(1) - plan.inputs.knot(0));
     let mut drive = Drive::new(given, unit, begin, step);
