@@ -50,9 +50,8 @@ class Extension:
     ) -> Trajectory:
         """Simulate `model` with the part on `time` (n,) [s].
 
-        `values` (k,) are those of the unknowns; `inputs` are the torque and pressures that act.
-
-        The twist of `start` is the one that makes torque: that of a gap is added.
+        `values` (k,) are those of the unknowns; `inputs` are the torque and pressures that act. The
+        twist of `start` is the one that makes torque: that of a gap is added.
         Raises InputError where the description is inconsistent.
         """
         departure = self._build_departure(model, *values.tolist())

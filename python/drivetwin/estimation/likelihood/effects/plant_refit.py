@@ -54,7 +54,6 @@ class PlantSettings:
     mode_spread: float = 0.5
     """Prior standard deviation of the logarithm of a mode's frequency: 0.4 to 2.7 times the usual
     one hold 95 % [-]."""
-
     share: float = 0.5
     """Usual share of J1 in front of an input shaft: flywheel and crankshaft against pump, converter
     or primary masses [-]."""
@@ -95,8 +94,8 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     """Choose the plant that the log supports; `fit` is that of the dual clutch.
 
     A part is kept where the card states its size, or where its evidence is enough and no other
-    effect has more. Otherwise the
-    covariance grows by the move that the part would cause, times its odds.
+    effect has more. Otherwise the covariance grows by the move that the part would cause, times its
+    probability.
     """
     if not fit.problem.parts[0].scale_known or fit.plant is not None:
         return fit

@@ -19,7 +19,7 @@ from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.plant_refit import compare_plants, extend_problem
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.optimize.staged_start import (
     find_staged_start,
     fit_lower_gear_only,
@@ -128,12 +128,15 @@ def _fit_lower_gears(
 
 
 def _compare(found: LikelihoodFit, priors: Sequence[PriorValue]) -> PlantEvidence:
-    """Compare a fit with the dual clutch, sought from the same unknowns with the same weighting."""
+    """Compare a fit with the dual clutch, sought from the same unknowns with the same weighting.
+
+    Where that cannot be simulated it counts as far as a search may be from the measurement.
+    """
     plain = found.problem.drop_extension()
     count = plain.lower.size
     start = ParameterVector(found.point.names[:count], found.point.values[:count])
     other = minimise(plain, start)
     if other is None:
-        nothing = np.zeros_like(found.point.values)
-        return PlantEvidence(EffectId.BACKLASH, np.inf, nothing, count)
+        nats = 0.5 * (MULTI_START.far_chi2 * found.problem.size - found.normal.cost)
+        return PlantEvidence(EffectId.BACKLASH, nats, np.zeros_like(found.point.values), count)
     return compare_plants(other, found, found.chi2, priors)
