@@ -175,7 +175,7 @@ def test_options_leave_nothing_open(tmp_path: Path) -> None:
     [
         ({"--ratios": "1.41,1.86"}, [], [], "must be below"),
         ({"--ratios": "1,86;1,41"}, [], [], "comma"),
-        ({"--gearbox": "zf-9"}, [], [], "none of"),
+        ({"--gearbox": "zf-9"}, [], [], "not one of"),
         ({"--gearbox": "manual-6", "--gears": "2,3"}, [], [], "dog"),
         ({"--gearbox": "zf-8hp70", "--gears": "1,2,3"}, [], [], "LOW,HIGH"),
         ({"--gearbox": "three-set-3000", "--ratios": "2,1"}, [], [], "state the same"),

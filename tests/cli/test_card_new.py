@@ -114,7 +114,7 @@ def test_a_damaged_log_is_refused(tmp_path: Path) -> None:
 QUESTIONS = (
     ("Name of the vehicle", b'my "truck"\n'),
     ("Built-in gearbox", b"zf-9\n"),
-    ("none of", b"\n"),
+    ("not one of", b"\n"),
     ("Ratios of the gears", b"1.43 1.91\n"),
     ("must be below", b"1.91 1.43\n"),
     ("Names of these gears", b"\n"),

@@ -32,7 +32,7 @@ def test_unknown_or_impossible_shifts_are_refused() -> None:
     with pytest.raises(InputError, match="held by the same element"):
         build_subject(twin(), ("2", "2"))
     bare = replace(twin(), friction={})
-    with pytest.raises(InputError, match="known friction curve"):
+    with pytest.raises(InputError, match="identified friction curve"):
         build_subject(bare)
 
 

@@ -21,7 +21,7 @@ _DEAD_TIMES = (0.25, 2.0)
 """Range of drawn dead times, over the nominal one."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UnitDraws:
     """Draws of actuators with identified values, and of the engine's lag [s] around `engine_lag`.
 

@@ -18,9 +18,13 @@ from drivetwin.errors import InputError
 
 @dataclass(eq=False)
 class CardForm:
-    """Fields of a form: the texts typed so far, and the questions that follow from them."""
+    """Fields of a form: the texts typed so far, and the questions that follow from them.
+
+    `file_name` is the name under which the card is written.
+    """
 
     survey: LogSurvey
+    file_name: str = "vehicle.toml"
     texts: Mapping[Key, str] = field(default_factory=dict)
     entries: list[FormEntry] = field(default_factory=list)
     _estimates: dict[object, LogEstimates] = field(default_factory=dict)

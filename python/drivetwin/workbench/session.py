@@ -199,6 +199,7 @@ class Session:
             if self.form is None:
                 raise InputError("no card is begun", "press Begin a card from the log first")
             path = self.folder.make_new_path(name, ".toml")
+            self.form.file_name = path.name
             self.form.fill_in(texts)
             text = self.form.format_card(path.name)
             if path.exists() and not can_replace:

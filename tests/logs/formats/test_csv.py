@@ -142,7 +142,7 @@ def test_the_time_column_can_be_stated() -> None:
         ("hello world\n", FileFormatError, "no columns found"),
         ("time,x\n", FileFormatError, "names but no samples"),
         ("time,x\ns,Nm\n", FileFormatError, "names but no samples"),
-        ("0,1\n1,2\n", FileFormatError, "numbers where the names should stand"),
+        ("0,1\n1,2\n", FileFormatError, "holds numbers in place of names"),
         ("time,x\ns,Nm\n0,1\n1\n2,3\n", FileFormatError, "line 4 has 1 fields, the names have 2"),
         ("time,x\ns,Nm\n0,1\n1,2,9\n2,3\n", FileFormatError, "line 4 has 3 fields"),
         ("time;x\ns;Nm\n0.5;1.000,5\n1.5;2,5\n", FileFormatError, "with point ('0.5')"),
@@ -264,7 +264,7 @@ def test_a_unit_below_counts_where_brackets_in_the_name_hold_none() -> None:
     ],
 )
 def test_commas_that_may_group_thousands_are_refused(rows: list[str]) -> None:
-    with pytest.raises(FileFormatError, match="may stand for decimals or for thousands"):
+    with pytest.raises(FileFormatError, match="may separate decimals or thousands"):
         read("\n".join(["time,x", "ms,Nm", *rows]))
 
 

@@ -147,7 +147,7 @@ def build_form(form: CardForm) -> list[Component]:
         html.P(_describe_state(form), id="form-state", className="hint"),
         ui.make_row(
             html.Div(
-                ui.make_field("new-card-name", "File name", type="text", value="vehicle.toml"),
+                ui.make_field("new-card-name", "File name", type="text", value=form.file_name),
                 className="wide",
             ),
             ui.make_choice("replace-card", "If the file exists", _EXISTING, "keep"),
