@@ -88,7 +88,7 @@ def test_figures_are_json_with_units_on_their_axes(page: str) -> None:
 
 
 def test_plotly_knows_every_entry_of_the_figures(found: Identification) -> None:
-    """The page has what plotly.js is not told to be wrong; its Python library refuses it."""
+    """The Python library refuses a wrong entry that plotly.js ignores."""
     blocks = [one for section in build_report_sections(found, log()) for one in section.blocks]
     figures = [one.figure for one in blocks if isinstance(one, FigureBlock)]
     for figure in figures:

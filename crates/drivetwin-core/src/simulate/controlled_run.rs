@@ -22,7 +22,7 @@ pub(super) struct Tasks {
     places: Places,
 }
 
-/// What a controlled run gives.
+/// Result of a controlled run.
 pub(super) struct ControlledRun {
     pub columns: Vec<Vec<f64>>,
     /// Inputs and commands on the grid, see [`INPUTS`].

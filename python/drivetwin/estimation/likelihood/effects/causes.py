@@ -66,7 +66,7 @@ def find_cause(correction: Correction) -> Cause | None:
 def _compute_cosine(one: GroupEvidence, other: GroupEvidence) -> float:
     """Compute the cosine between the fitted effects of two groups in the weighted samples.
 
-    A part of the plant has no columns and is told from all others by its own fit.
+    A part of the plant has no columns; its own fit distinguishes it from all others.
     """
     if not (one.columns and other.columns):
         return 0.0

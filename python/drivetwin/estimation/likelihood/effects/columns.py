@@ -279,22 +279,26 @@ def _number_columns(
 def _build_random(
     at: OperatingPoint, priors: EffectPriors, sizes: Mapping[EffectId, float]
 ) -> Iterator[tuple[Group, Disturbance]]:
-    extension = at.part.structure.extension
     for name, effect in EFFECTS.items():
         prior = priors.get_prior(name, at.part.structure.driveline)
-        in_plant = extension is not None and extension.effect is name
-        if prior.std > 0.0 and not in_plant:
+        if prior.std > 0.0 and not _is_in_plant(at, name):
             for one in effect.build(at, sizes.get(name, 1.0) * prior.std):
                 yield Group(name, one.subject), one
     for one in build_sensor_columns(at, priors.sensors):
         yield Group(None, one.subject), one
 
 
+def _is_in_plant(at: OperatingPoint, effect: EffectId) -> bool:
+    """Return whether the run itself has an effect, so that a column would count it twice."""
+    extension = at.part.structure.extension
+    return extension is not None and extension.effect is effect
+
+
 def _build_known(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Disturbance, float]]:
     """Yield the disturbances of effects with a stated value, of that size."""
     for name, effect in EFFECTS.items():
         value = priors.get_prior(name, at.part.structure.driveline).value
-        if value:
+        if value and not _is_in_plant(at, name):
             for one in effect.build(at, abs(value)):
                 yield one, float(np.sign(value))
 

@@ -139,7 +139,7 @@ def _iterate_refits(
         stated = priors.get_prior(effect, driveline)
         if stated.std > 0.0 or stated.value:
             own = build_plant_priors(effect, priors, driveline)
-            start = own[0].value + (0.0 if amount is None else float(np.log(amount)))
+            start = own[0].value if amount is None else float(np.log(amount * stated.std))
             refit = _refit(fit, effect, own, start)
             if refit is not None:
                 yield refit
