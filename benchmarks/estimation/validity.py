@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 
 FAR = 4.0
 """Error in standard deviations from which a value is called far off."""
@@ -69,12 +70,20 @@ def make_log(seed: int, effect: EffectId | None, factor: float) -> tuple[Mismatc
     return make_mismatch_log(seed, effect, size, rates, tolerances=seed % 3 == 0), size
 
 
-def study_log(seed: int, effect: EffectId | None, factor: float = 1.0) -> StudyLog:
-    """Identify the log of one vehicle and hold the result against its truth."""
+def study_log(
+    seed: int, effect: EffectId | None, factor: float = 1.0, *, withheld: bool = False
+) -> StudyLog:
+    """Identify the log of one vehicle and hold the result against its truth.
+
+    A `withheld` effect is switched off on the card: a cause that the table does not list.
+    """
     name = "" if effect is None else effect.value
     try:
         made, size = make_log(seed, effect, factor)
-        found = identify(made.log, made.card, detect_shifts(made.log, made.card))
+        card = made.card
+        if withheld and effect is not None:
+            card = replace(card, effects={**card.effects, effect: EffectPrior(0.0)})
+        found = identify(made.log, card, detect_shifts(made.log, card))
     except DrivetwinError as error:
         return StudyLog(seed, name, 0.0, {}, {}, (), 0.0, False, error.what)
     truth = dict(made.recorded.truth.parameters)
@@ -109,13 +118,34 @@ def judge(
 
 
 def run_study(
-    seeds: Iterable[int], effects: Sequence[EffectId | None], factor: float
+    seeds: Iterable[int],
+    effects: Sequence[EffectId | None],
+    factor: float,
+    *,
+    withheld: bool = False,
+    processes: int | None = None,
 ) -> list[StudyLog]:
-    """Study one log for each seed; the effects take turns."""
-    chosen = [(seed, effects[k % len(effects)]) for k, seed in enumerate(seeds)]
-    with ProcessPoolExecutor() as pool:
-        jobs = [pool.submit(partial(study_log, seed, effect, factor)) for seed, effect in chosen]
-        return [job.result() for job in jobs]
+    """Study one log for each seed; the effects take turns. Print each log as it is done."""
+    study = partial(study_log, factor=factor, withheld=withheld)
+    logs = []
+    with ProcessPoolExecutor(processes) as pool:
+        jobs = [pool.submit(study, one, effects[k % len(effects)]) for k, one in enumerate(seeds)]
+        for job in jobs:
+            logs.append(job.result())
+            print(_format_log(logs[-1]), file=sys.stderr, flush=True)
+    return logs
+
+
+def _format_log(one: StudyLog) -> str:
+    """Format the row of one log: what its values are called, and the errors of those outside."""
+    outside = {
+        key: round(error, 1)
+        for key, error in {**one.identified, **one.weak}.items()
+        if abs(error) > Z95
+    }
+    counts = f"{len(one.identified):2d} identified, {len(one.weak):2d} weak"
+    cause = f"{', '.join(one.named)} {one.evidence:.1f}" if one.named else ""
+    return f"{one.seed} {one.effect} {one.size:.3g}: {counts} {outside} {cause} {one.failure[:60]}"
 
 
 def summarise(logs: Sequence[StudyLog]) -> list[str]:
@@ -156,12 +186,17 @@ def main() -> None:
     parser.add_argument("--obeying", type=int, default=60, help="logs that obey the model")
     parser.add_argument("--first", type=int, default=1000, help="first seed")
     parser.add_argument("--factor", type=float, default=1.0, help="factor of all sizes")
+    parser.add_argument("--withheld", action="store_true", help="switch each true effect off")
+    parser.add_argument("--processes", type=int, help="processes; default one for each core")
     parser.add_argument("-o", "--output", type=Path, help="write the results as JSON")
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.logs)
-    logs = run_study(seeds, list(EFFECTS), given.factor)
+    study = partial(
+        run_study, factor=given.factor, withheld=given.withheld, processes=given.processes
+    )
+    logs = study(seeds, list(EFFECTS))
     seeds = range(given.first + given.logs, given.first + given.logs + given.obeying)
-    logs += run_study(seeds, [None], given.factor)
+    logs += study(seeds, [None])
     print("\n".join(summarise(logs)))
     if given.output:
         given.output.write_text(json.dumps([asdict(one) for one in logs]), encoding="utf-8")
