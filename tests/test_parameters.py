@@ -6,7 +6,8 @@ from __future__ import annotations
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.parameters import get_parameter_spec, split_log_number
+from drivetwin.estimation.result.verdict import get_experiment
+from drivetwin.parameters import SPECS, get_parameter_spec, split_log_number
 
 
 @pytest.mark.parametrize(
@@ -23,6 +24,10 @@ from drivetwin.parameters import get_parameter_spec, split_log_number
 def test_the_number_of_a_log_is_taken_off(name: str, plain: str, number: int) -> None:
     assert split_log_number(name) == (plain, number)
     assert get_parameter_spec(name).stem == get_parameter_spec(plain).stem
+
+
+def test_every_parameter_has_an_experiment_that_narrows_it() -> None:
+    assert all(get_experiment(stem).endswith(".") for stem in SPECS)
 
 
 @pytest.mark.parametrize("name", ["eta.1", "k_o.2", "nonsense"])

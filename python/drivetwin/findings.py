@@ -94,6 +94,7 @@ class Code(StrEnum):
     CARD_SUSPECT = auto()
     RESIDUAL_UNEXPLAINED = auto()
     EFFECT_FOUND = auto()
+    EFFECT_IN_PLANT = auto()
     EFFECT_POSSIBLE = auto()
     EFFECT_LARGE = auto()
     EFFECT_NOT_LINEAR = auto()

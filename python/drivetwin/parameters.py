@@ -92,6 +92,19 @@ _SPECS = (
         "te_delay", "engine torque delay", "τ_e", "s", "engine-torque signal delay", -1.0,
         1.0, "log",
     ),
+    ParameterSpec(
+        "mode_frequency", "input-shaft frequency", "f_s", "Hz",
+        "frequency of the engine's share of J1 on the input shaft, with the gearbox held", 0.0, 1e3,
+    ),
+    ParameterSpec(
+        "mode_share", "input-shaft share", "s_1", "1", "share of J1 in front of the input shaft",
+        0.0, 1.0,
+    ),
+    ParameterSpec(
+        "mode_damping", "input-shaft damping", "ζ_s", "1",
+        "damping ratio of the engine's share of J1 on the input shaft", 0.0, 1.0,
+    ),
+    ParameterSpec("backlash", "backlash", "δ", "rad", "play of the output shaft", 0.0, 1.0),
 )  # fmt: skip
 
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}

@@ -36,6 +36,15 @@ def test_unknown_or_impossible_shifts_are_refused() -> None:
         build_subject(bare)
 
 
+def test_a_plant_with_a_part_is_refused() -> None:
+    plain = twin()
+    play = replace(plain.parameters["eta"], id="backlash", value=0.01)
+    parted = replace(plain, parameters={**plain.parameters, "backlash": play})
+    with pytest.raises(InputError, match=r"backlash of 0\.01 rad"):
+        build_subject(parted)
+    assert build_subject(parted.drop_part()).model == build_subject(plain).model
+
+
 def test_rolling_resistance_opposes_the_motion() -> None:
     model = replace(paper_model(), load=RoadLoad(rolling=8000.0, aero=20.0))
     ahead, back = (compute_steady_start(model, "B2", speed).twist for speed in (150.0, -150.0))

@@ -295,3 +295,18 @@ def test_incomplete_model_leaves_a_warning_and_no_fit(
     assert "No validation" in render(incomplete.findings)[-1]
     assert "k_o" in render(incomplete.findings)[-1]
     assert attach_validation(found, twin, log).fit["output_torque"]["all"].fit_percent > 99.8
+
+
+def test_the_part_of_the_plant_is_simulated(twin: Twin, log: ShiftLog, shift: Shift) -> None:
+    """A soft input shaft swings beside the dual clutch; a rigid one leaves its run."""
+
+    def simulate_with(frequency: float) -> FloatArray:
+        values = {"mode_frequency": frequency, "mode_share": 0.5, "mode_damping": 0.05}
+        own = {k: Estimate(k, v, 0.0, Verdict.IDENTIFIED, "given") for k, v in values.items()}
+        made = replace(twin, parameters={**twin.parameters, **own})
+        return simulate_shift(made, log, shift).trajectory.shaft_torque
+
+    plain = simulate_shift(twin, log, shift).trajectory.shaft_torque
+    largest = float(np.max(np.abs(plain)))
+    assert np.max(np.abs(simulate_with(5e3) - plain)) < 1e-3 * largest
+    assert np.max(np.abs(simulate_with(15.0) - plain)) > 0.02 * largest

@@ -98,6 +98,13 @@ OptionalVehicleFile = Annotated[
         callback=require_card,
     ),
 ]
+DropPart = Annotated[
+    bool,
+    typer.Option(
+        "--drop-part",
+        help="Leave out the part that the twin's plant has beside the dual clutch.",
+    ),
+]
 ChannelsFile = Annotated[
     Path | None,
     typer.Option(
@@ -114,6 +121,14 @@ def find_mapping(channels: Path | None, log: Path) -> Path | None:
     from drivetwin.channels.mapping_file import find_project_mapping
 
     return channels if channels is not None else find_project_mapping(log)
+
+
+def load_plant(path: Path, *, drop_part: bool) -> Twin:
+    """Load a twin, with `drop_part` without the part of its plant beside the dual clutch."""
+    from drivetwin.files.twin_conversion import load_twin
+
+    twin = load_twin(path)
+    return twin.drop_part() if drop_part else twin
 
 
 def _load_twin_card(twin: Twin, vehicle: Path | None) -> VehicleCard:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.calibration.policy_kind import PolicyKind
-from drivetwin.cli.arguments import RESULT, TWIN, TwinFile
+from drivetwin.cli.arguments import RESULT, TWIN, DropPart, TwinFile
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -115,6 +115,7 @@ def calibrate(
         bool,
         typer.Option("--resume", help="Continue an interrupted calibration from DIR.resume.json."),
     ] = False,
+    drop_part: DropPart = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Find shift profiles with a small peak jerk over the spread of made units.
@@ -130,6 +131,7 @@ def calibrate(
 
     given = Requirements(()) if limits is None else load_limits(limits)
     model = _load_valid_twin(twin)
+    model = model.drop_part() if drop_part else model
     gears = parse_gears(shift)
     request = Request(
         gears=gears,
@@ -154,6 +156,7 @@ def calibrate(
         "policy": policy.value,
         "task": repr(task),
         "engine lag": repr(engine_lag),
+        "drop part": str(drop_part),
         "effort": repr(effort),
         "number of draws": str(draws),
         "seed": str(seed),

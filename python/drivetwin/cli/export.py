@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, TwinFile, read_twin_log
+from drivetwin.cli.arguments import ChannelsFile, DropPart, TwinFile, load_plant, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
 from drivetwin.errors import InputError
 from drivetwin.export.fmu.version import FmiVersion
@@ -85,6 +85,7 @@ def export(
         FmiVersion, typer.Option("--fmi", help="For fmu: version of the standard.")
     ] = FmiVersion.FMI2,
     platforms: _Platforms = None,
+    drop_part: DropPart = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Write the identified model for another program.
@@ -93,9 +94,7 @@ def export(
     components of the Standard Library. ssv, cdfx, dcm, m, json, csv: parameter files with units and
     intervals.
     """
-    from drivetwin.files.twin_conversion import load_twin
-
-    model = load_twin(twin)
+    model = load_plant(twin, drop_part=drop_part)
     path = output or Path(f"{twin.stem}.{to.ending}")
     with show_step(f"writing {path.name}"):
         match to:

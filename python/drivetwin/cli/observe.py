@@ -12,9 +12,11 @@ import typer
 
 from drivetwin.cli.arguments import (
     ChannelsFile,
+    DropPart,
     LogFile,
     OptionalVehicleFile,
     TwinFile,
+    load_plant,
     read_twin_log,
 )
 from drivetwin.cli.output import (
@@ -62,6 +64,7 @@ def observe(
         Path | None,
         typer.Option("--figure", metavar="FILE.html", help="Page with the figures."),
     ] = None,
+    drop_part: DropPart = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Estimate torques of output shaft and clutches in the shifts of a log, with 95 % bands.
@@ -69,12 +72,11 @@ def observe(
     The log needs no output torque; if it has one, it is not used.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.files.twin_conversion import load_twin
     from drivetwin.observer.observe import estimate_torques
     from drivetwin.report.observer import render_observations
     from drivetwin.shifts.detect import require_shifts
 
-    model = load_twin(twin)
+    model = load_plant(twin, drop_part=drop_part)
     recording, card = read_twin_log(model, log, vehicle, channels)
     shifts = require_shifts(recording, card)
     found, left_out = _observe_shifts(

@@ -28,9 +28,11 @@ def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
     """The model of the shift between two gears of a twin; by default its first upshift.
 
     It starts in the old gear at the mean engine speed of the twin's logs, without acceleration.
-    Raises InputError for a shift that the twin does not have and MissingParameterError where a
+    Raises InputError for a shift that the twin does not have and for a plant with a part beside the
+    dual clutch, MissingParameterError where a
     parameter that the simulation needs was not identified.
     """
+    twin.require_dual_clutch("the export")
     shift = build_nominal_shift(twin, gears)
     model = twin.build_dual_clutch(shift)
     return Subject(

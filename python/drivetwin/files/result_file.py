@@ -78,6 +78,7 @@ class CauseRecord(Record):
     equivalent: list[GroupRecord]
     next_evidence: FiniteFloat
     is_certain: bool
+    in_plant: bool = False
 
 
 class ResultFile(Record):

@@ -21,7 +21,8 @@ from drivetwin.observer.kind import Observer
 from drivetwin.observer.propagate import sample_friction, select_uncertain
 from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory, simulate
+from drivetwin.simulation.added_part import AddedPart, simulate_plant
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import simulate_shift
 
@@ -74,6 +75,7 @@ def simulate_observed(
         model = replace(model, elements=sample_friction(model, twin, rng))
         one = _simulate_member(
             model,
+            twin.part,
             _sample_signal(torque, known.to_named(values)["te_delay"], rng),
             {name: _sample_signal(signal, 0.0, rng) for name, signal in noise.items()},
             _sample_start(model, run, (shift, unrest), rng),
@@ -126,6 +128,7 @@ def _sample_start(
 
 def _simulate_member(
     model: DualClutch,
+    part: AddedPart | None,
     torque: Signal,
     pressures: Mapping[str, Signal],
     start: State,
@@ -133,7 +136,7 @@ def _simulate_member(
 ) -> Trajectory | None:
     """A run of the ensemble; None where drawn values make none."""
     try:
-        found = simulate(model, torque, pressures, start, time)
+        found = simulate_plant(model, part, torque, pressures, start, time)
     except InputError:
         return None
     return found if found.status == "completed" else None

@@ -30,10 +30,13 @@ def estimate_torques(
     If the converter is open and the twin has its map, the turbine torque replaces the engine
     torque. The gears before and after the shift are used as far as the inputs were recorded, and
     for FAR at most; the notes contain any cut.
-    Raises MissingParameterError where the twin is incomplete, MissingChannelError and InputError
-    where the log is, DamagedChannelError where an input has a gap in the shift, SimulationError
+    Raises MissingParameterError where the twin is incomplete, InputError for the smoother where
+    its plant has a part beside the dual clutch, MissingChannelError and InputError where the log is
+    incomplete, DamagedChannelError where an input has a gap in the shift, SimulationError
     where the twin's own run fails.
     """
+    if by is Observer.SMOOTHER:
+        twin.require_dual_clutch("the smoother")
     log = refer_to_turbine(log, twin.build_card(), shift)
     fills = {one.name: PriorValue(one.P0) for one in twin.build_dual_clutch(shift).elements}
     whole = trim_to_window(trim_to_recorded(log, shift, fills, twin.i_in), (FAR, FAR))

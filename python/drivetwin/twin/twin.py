@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from drivetwin.estimation.result.estimate import (
 from drivetwin.estimation.result.method import Method
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.added_part import BACKLASH_ID, MODE_IDS, AddedPart, build_part
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
@@ -160,6 +161,28 @@ class Twin(DisplayMixin):
                 )
             ),
         )
+
+    @property
+    def part(self) -> AddedPart | None:
+        """Part of the plant beside the dual clutch; None where it has none."""
+        ids = (*MODE_IDS, BACKLASH_ID)
+        known = {name: value for name in ids if (value := self._is_known(name)) is not None}
+        return build_part(known)
+
+    def drop_part(self) -> Twin:
+        """Return the twin with the dual clutch alone as its plant."""
+        ids = (*MODE_IDS, BACKLASH_ID)
+        kept = {name: one for name, one in self.parameters.items() if name not in ids}
+        return replace(self, parameters=kept)
+
+    def require_dual_clutch(self, purpose: str) -> None:
+        """Raise InputError for a plant with a part that `purpose` would leave out."""
+        if self.part is not None:
+            raise InputError(
+                f"{purpose} holds the dual clutch alone, and the twin {self.name!r} also has "
+                f"{self.part.label}",
+                "use --drop-part to leave that out",
+            )
 
     def list_model_ids(self, shift: Shift) -> tuple[str, ...]:
         """Ids of the parameters that the model of a shift is made from."""

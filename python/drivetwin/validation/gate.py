@@ -67,7 +67,8 @@ def assess_model(found: Identification) -> Identification:
 def _has_limits(found: Identification) -> bool:
     """Return whether an effect that the simulation lacks, a finding or a verdict restricts the
     use of the model."""
-    if found.evidence.cause is not None:
+    cause = found.evidence.cause
+    if cause is not None and not cause.in_plant:
         return True
     return any(one.severity is Severity.ERROR for one in found.findings) or any(
         one.verdict in (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE) for one in found.estimates.values()

@@ -20,7 +20,8 @@ from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory, simulate
+from drivetwin.simulation.added_part import simulate_plant
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.gate import assess_model
 from drivetwin.validation.identified_range import (
@@ -93,7 +94,7 @@ def _simulate_window(
     count = int((window[1] - window[0]) / _GRID + 1e-6)
     time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
     start = state or estimate_start_state(model, log, shift, window[0])
-    trajectory = simulate(model, engine_torque, pressures, start, time)
+    trajectory = simulate_plant(model, twin.part, engine_torque, pressures, start, time)
     traces = _build_traces(model, log, trajectory)
     phases = clip_phases(shift, window)
     validation = Validation(

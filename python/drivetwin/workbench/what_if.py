@@ -19,6 +19,7 @@ from drivetwin.report.labels import get_parameter_name
 from drivetwin.report.sections.blocks import make_link
 from drivetwin.report.style import COMPARED
 from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.added_part import BACKLASH_ID, MODE_IDS
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FrictionTable,
@@ -29,6 +30,8 @@ from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
 from drivetwin.workbench.zoom import View, encode_curves
 
+BESIDE_MODEL = ("te_delay", *MODE_IDS, BACKLASH_ID)
+"""Parameters of a simulation that the dual-clutch model does not have."""
 FRICTION = "mu."
 """Prefix of the slider that scales the friction of an element; 1 as identified."""
 _SPAN, _SIGMAS = 0.4, 6.0
@@ -71,7 +74,7 @@ def list_sliders(twin: Twin, shift: Shift) -> list[Slider]:
     inertia = f"J_prime_{twin.select_inertia_gear(shift)}"
     names = ("eta", inertia, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
     elements = (shift.offgoing, shift.oncoming)
-    ids = (*names, "te_delay", *(f"P0.{element}" for element in elements))
+    ids = (*names, *BESIDE_MODEL, *(f"P0.{element}" for element in elements))
     told = [_build_slider(twin, name) for name in ids]
     laws = [
         Slider.from_range(
@@ -97,7 +100,7 @@ def build_model(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualC
     overrides = {
         name: value
         for name, value in changes.items()
-        if name != "te_delay" and not name.startswith(FRICTION)
+        if name not in BESIDE_MODEL and not name.startswith(FRICTION)
     }
     model = twin.build_dual_clutch(shift, overrides=overrides)
     elements = tuple(
@@ -126,7 +129,7 @@ def simulate_changes(
 ) -> Validation:
     """The shift of `before` with parameters changed."""
     model = build_model(twin, before.shift, changes)
-    return rerun_shift(before, _apply_delays(twin, changes), log, model)
+    return rerun_shift(before, _replace_values(twin, changes), log, model)
 
 
 def plot_what_if(identified: Validation, present: Validation) -> Figure:
@@ -185,12 +188,14 @@ def _scale_friction(element: ShiftElement, factor: float) -> ShiftElement:
     )
 
 
-def _apply_delays(twin: Twin, changes: Mapping[str, float]) -> Twin:
-    """Return the twin with the engine-torque signal delay of the sliders."""
-    if "te_delay" not in changes or "te_delay" not in twin.parameters:
-        return twin
-    estimate = replace(twin.parameters["te_delay"], value=changes["te_delay"])
-    return replace(twin, parameters={**twin.parameters, "te_delay": estimate})
+def _replace_values(twin: Twin, changes: Mapping[str, float]) -> Twin:
+    """Return the twin with the sliders' values of the parameters beside the model."""
+    changed = {
+        name: replace(twin.parameters[name], value=changes[name])
+        for name in BESIDE_MODEL
+        if name in changes and name in twin.parameters
+    }
+    return replace(twin, parameters={**twin.parameters, **changed})
 
 
 def _add_identified(panel: Panel, identified: Validation) -> Panel:

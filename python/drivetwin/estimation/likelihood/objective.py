@@ -39,11 +39,11 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import (
 from drivetwin.estimation.likelihood.parametrization import TE_OFFSET, ShiftModel, retract
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.simulation.added_part import simulate_plant
 from drivetwin.simulation.dual_clutch import (
     Sensitivities,
     Signal,
     Trajectory,
-    simulate,
     simulate_sensitivities,
 )
 from drivetwin.vehicle.spec import PriorValue
@@ -108,11 +108,8 @@ class ShiftTerm:
         """
         model, start = self.structure.build_model(point), self.structure.build_start(point)
         torque, pressures = self.get_acting_torque(point), self.get_pressures()
-        extension = self.structure.extension
-        if extension is None:
-            return simulate(model, torque, pressures, start, time)
-        values = np.array([point[name] for name in extension.unknowns])
-        return extension.simulate(model, values, (torque, pressures), start, time)
+        part = self.structure.build_part(point, model)
+        return simulate_plant(model, part, torque, pressures, start, time)
 
     def drop_extension(self) -> ShiftTerm:
         """Return the part with the dual clutch alone as its plant."""

@@ -23,6 +23,7 @@ from drivetwin.estimation.likelihood.extension import Extension
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.simulation.added_part import AddedPart
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     LossLaw,
@@ -132,6 +133,13 @@ class ShiftModel:
                 *(self._build_drum(point, one) for one in self.spinning),
             ),
         )
+
+    def build_part(self, point: ParameterVector, model: DualClutch) -> AddedPart | None:
+        """Build the part beside `model` at `point`; None for the dual clutch alone."""
+        if self.extension is None:
+            return None
+        values = {name: point[name] for name in self.extension.unknowns}
+        return self.extension.build_part(model, values)
 
     def _build_load(self, point: ParameterVector) -> RoadLoad:
         aero = self.get_value(point, AERO)

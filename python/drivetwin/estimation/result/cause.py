@@ -38,6 +38,8 @@ class Cause:
     std: float | None
     equivalent: tuple[Group, ...]
     next_evidence: float
+    in_plant: bool = False
+    """True for a part that the identified plant has beside the dual clutch."""
 
     @property
     def is_certain(self) -> bool:

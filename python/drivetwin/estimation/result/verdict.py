@@ -33,6 +33,7 @@ VERDICT = VerdictSettings()
 
 
 _HOLD_STILL = "Hold the pedal still for a second after a firm lock-up."
+_EXCITE_ENGINE = "Record fast steps of the engine torque in gear."
 _EXPERIMENT = {
     "eta": "Step the pedal in the lower gear.",
     "J_prime": "Step the pedal in the lower gear, or record a shift with a longer inertia phase.",
@@ -47,6 +48,10 @@ _EXPERIMENT = {
     "mu": "Record shifts whose inertia phase covers this slip.",
     "drum": "Enter narrower drum inertias in the vehicle card.",
     "te_delay": "Step the pedal in gear.",
+    "mode_frequency": _EXCITE_ENGINE,
+    "mode_share": _EXCITE_ENGINE,
+    "mode_damping": _EXCITE_ENGINE,
+    "backlash": "Tip the pedal into overrun and back.",
 }
 
 

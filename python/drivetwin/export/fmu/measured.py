@@ -21,8 +21,10 @@ def build_measured_subject(
 ) -> tuple[Subject, Experiment]:
     """Model of the first shift of a log between `gears` (None: any), and that shift's inputs.
 
-    Raises NoShiftError where there is none, and what the validation of a shift raises.
+    Raises InputError for a plant with a part beside the dual clutch, NoShiftError where there is
+    no such shift, and what the validation of a shift raises.
     """
+    twin.require_dual_clutch("the export")
     found = require_shifts(log, twin.build_card()).shifts
     wanted = [one for one in found if gears in (None, (one.start_gear, one.end_gear))]
     if not wanted:

@@ -18,9 +18,11 @@ from drivetwin.estimation.likelihood.effects.plant_refit import (
     select_plant,
 )
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
+from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.result.cause import Group
+from drivetwin.findings import Code
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from tests.estimation.likelihood.fixtures import ROUGH, bench, fitted, problem
 from tests.support.bench import Bench, record_bench
@@ -57,6 +59,23 @@ def test_a_mode_of_the_input_side_is_found_and_the_stiffness_is_true() -> None:
     truth = made.run.scenario.model.k_o
     assert _count_deviations(plain, "k_o", truth) > 4.0
     assert _count_deviations(found, "k_o", truth) < 3.0
+
+
+def test_a_part_of_the_plant_is_named_and_reported_as_parameters() -> None:
+    made, plain = swinging()
+    found = build_estimates(
+        select_plant(plain, EffectPriors()), [made.signals], [made.driveline], {}, EffectPriors()
+    )
+    assert found.cause is not None
+    assert found.cause.in_plant
+    assert Code.EFFECT_IN_PLANT in [one.code for one in found.findings]
+    frequency = found.estimates["mode_frequency"]
+    assert frequency.value is not None
+    assert frequency.std_total is not None
+    assert abs(frequency.value - FREQUENCY) < 3.0 * frequency.std_total
+    share = found.estimates["mode_share"]
+    assert share.std_total is not None
+    assert share.std_total < PLANT.share_std
 
 
 def test_a_log_without_a_mode_keeps_the_dual_clutch_and_widens() -> None:

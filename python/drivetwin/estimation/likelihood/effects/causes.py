@@ -60,6 +60,7 @@ def find_cause(correction: Correction) -> Cause | None:
         std,
         tuple(one for one, _ in ranked if one in named),
         max(rest, default=0.0),
+        in_plant=not best.columns,
     )
 
 
@@ -105,13 +106,19 @@ def report_cause(
         if abs(move) > one
     ]
     return report(
-        Code.EFFECT_FOUND if cause.is_certain else Code.EFFECT_POSSIBLE,
+        _select_code(cause),
         effect=" or ".join(describe_group(one) for one in (cause.group, *cause.equivalent)),
         size=_format_size(cause, EFFECTS[effect].unit),
         evidence=cause.evidence,
         changes=", ".join(changes) or "no value by more than its interval",
         advice=_capitalise(EFFECTS[effect].remedy),
     )
+
+
+def _select_code(cause: Cause) -> Code:
+    if cause.in_plant:
+        return Code.EFFECT_IN_PLANT
+    return Code.EFFECT_FOUND if cause.is_certain else Code.EFFECT_POSSIBLE
 
 
 def _capitalise(text: str) -> str:

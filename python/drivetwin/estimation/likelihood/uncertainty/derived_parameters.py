@@ -18,6 +18,7 @@ from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.parametrization import LOG_SPECIFIC, ShiftModel
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.simulation.added_part import get_part_values
 from drivetwin.simulation.dual_clutch import compute_series_inertia
 
 TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "drum")
@@ -47,6 +48,7 @@ def compute_parameters(
             values[f"P0.{element.name}"] = structure.get_value(point, f"{element.name}.P0")
     for element in structures[0].driveline.drums:
         values[f"drum.{element.name}"] = first.get_value(point, f"{element.name}.drum")
+    values |= get_part_values(first.build_part(point, first.build_model(point)))
     return values if signals[0].scale_known else _rename_over_eta(values)
 
 

@@ -23,9 +23,8 @@ from drivetwin.estimation.result.spread import PredictedSpread
 def predict_spread(fit: LikelihoodFit, told: Correction) -> tuple[dict[str, PredictedSpread], ...]:
     """Predict the distribution of measured less simulated signals, for each shift by signal.
 
-    The simulation is that of the dual clutch with the corrected unknowns and none of the effects. A
-    shift that cannot be
-    simulated with them has no prediction.
+    The simulation is that of the chosen plant with the corrected unknowns and none of the other
+    effects. A shift that cannot be simulated with them has no prediction.
     """
     found: list[dict[str, PredictedSpread]] = []
     joint = told.joint_covariance
@@ -36,7 +35,7 @@ def predict_spread(fit: LikelihoodFit, told: Correction) -> tuple[dict[str, Pred
         told.residuals,
         strict=True,
     ):
-        run = part.drop_extension().simulate(told.mean)
+        run = part.simulate(told.mean)
         if run is None:
             found.append({})
             continue
