@@ -26,10 +26,10 @@ class Group:
 class Cause:
     """Cause that the log shows.
 
-    `evidence` is the log evidence against its absence, `size` its estimate alone in the unit of
-    the effect with `std`; for a random effect `size` is its root mean square in stated sizes and
-    `std` None. `equivalent` are causes that the log cannot tell from it, `next_evidence` that of
-    the best other one. `is_certain` is False where another cause comes near.
+    `evidence` is the log evidence against its absence, `size` its estimate beside the other
+    effects in its unit with `std`; for a random effect `size` is its root mean square in stated
+    sizes and `std` None. `equivalent` are causes that the log cannot tell from it, `next_evidence`
+    that of the best other one. `is_certain` is False where another cause comes near.
     """
 
     group: Group

@@ -14,7 +14,7 @@ from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.effect import Effect
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS, describe_group
-from drivetwin.estimation.result.cause import Cause
+from drivetwin.estimation.result.cause import Cause, Group
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
@@ -52,7 +52,7 @@ def find_cause(correction: Correction) -> Cause | None:
     rest = [one.nats for other, one in ranked[1:] if other not in similar]
     assert group.effect is not None, "tolerances of sensors are no candidates"
     effect = EFFECTS[group.effect]
-    size, std = _estimate_size(effect, correction.step.columns.stds.get(group, 1.0), best)
+    size, std = _estimate_size(effect, correction, group)
     return Cause(
         group,
         best.nats,
@@ -76,13 +76,23 @@ def _compute_cosine(one: GroupEvidence, other: GroupEvidence) -> float:
     return float(abs(product) / scale) if scale > 0.0 else 0.0
 
 
-def _estimate_size(effect: Effect, unit: float, one: GroupEvidence) -> tuple[float, float | None]:
-    """Estimate the size of a cause alone, with its standard deviation; `unit` is its stated one."""
-    if effect.random or one.amounts.size > 1:
-        return float(np.sqrt(np.mean(one.amounts**2))), None
-    amount = float(one.amounts[0])
-    size = float(np.sign(amount) * abs(amount) ** (1.0 / effect.power)) * unit
-    return size, float(one.std[0]) * unit
+def _estimate_size(
+    effect: Effect, correction: Correction, group: Group
+) -> tuple[float, float | None]:
+    """Estimate the size of a cause with its standard deviation: beside all others, and of a part
+    of the plant alone."""
+    step, columns = correction.step, correction.step.columns.find_columns(group)
+    if not columns:
+        own = correction.evidence[group]
+        return float(own.amounts[0]), float(own.std[0])
+    amounts = step.amounts[columns] * step.columns.scale[columns]
+    if effect.random or len(columns) > 1:
+        return float(np.sqrt(np.mean(amounts**2))), None
+    unit, amount = step.columns.stds.get(group, 1.0), float(amounts[0])
+    size = effect.scale_amount(amount, unit)
+    spread = float(step.std[columns[0]] * step.columns.scale[columns[0]])
+    slope = abs(size / amount) / effect.power if amount else unit
+    return size, spread * slope
 
 
 def report_cause(
@@ -99,7 +109,8 @@ def report_cause(
     """
     effect = cause.group.effect
     assert effect is not None, "tolerances of sensors are no candidates"
-    moves = jacobian @ correction.evidence[cause.group].moves[: jacobian.shape[1]]
+    own = correction.evidence[cause.group].moves
+    moves = jacobian @ correction.step.contributions.get(cause.group, own)[: jacobian.shape[1]]
     changes = [
         f"{name} by {format_with_unit(float(move), get_parameter_spec(name).unit, digits=2)}"
         for name, move, one in zip(values, moves, std, strict=True)

@@ -25,8 +25,9 @@ from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import SensorTolerance
 
-CURVED_SIZES = (0.05, 5.0)
-"""Sizes, in stated ones, between which the column of a curved effect is formed."""
+CURVED_AMOUNTS = (0.05, 5.0)
+"""Magnitudes of the amount, of the stated size, between which the column of a curved effect is
+formed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,12 +116,14 @@ class EffectColumns:
 
     def form_again(self, amounts: FloatArray) -> FormedAgain:
         """Describe the columns of a second step after `amounts` (q,) of these."""
-        sizes = {
-            group.effect: float(np.clip(abs(amount) * scale, *CURVED_SIZES))
+        found = {
+            group.effect: amount * scale
             for group, amount, scale in zip(self.groups, amounts, self.scale, strict=True)
             if group.effect is not None and EFFECTS[group.effect].curved
         }
-        return FormedAgain(set(self.groups), sizes)
+        return FormedAgain(
+            set(self.groups), {one: _limit_amount(one, amount) for one, amount in found.items()}
+        )
 
     def find_columns(self, group: Group) -> list[int]:
         """Return the numbers of the columns of a group."""
@@ -187,13 +190,19 @@ def build_columns(
     )
 
 
+def _limit_amount(effect: EffectId, amount: float) -> float:
+    """Limit the amount at which the column of a curved effect is formed."""
+    size = float(np.clip(abs(amount), *CURVED_AMOUNTS))
+    return -size if EFFECTS[effect].signed and amount < 0.0 else size
+
+
 @dataclass(frozen=True, eq=False)
 class FormedAgain:
-    """Columns of a second step: the `groups` of the first (None for all), and by curved effect the
-    size at which its column is formed, in stated ones."""
+    """Columns of a further step: the `groups` of the first (None for all), and by curved effect the
+    amount at which its column is formed, of the stated size."""
 
     groups: Collection[Group] | None = None
-    sizes: Mapping[EffectId, float] = field(default_factory=dict)
+    amounts: Mapping[EffectId, float] = field(default_factory=dict)
 
 
 _Key = tuple[Group, int]
@@ -237,22 +246,23 @@ def _build_shift_columns(
     groups = again.groups
     named = [
         one
-        for one in _number_columns(at, priors, again.sizes)
+        for one in _number_columns(at, priors, again.amounts)
         if groups is None or one[0][0] in groups
     ]
     disturbances = [one for _, one in named]
-    sizes = np.array([_get_size(again.sizes, key[0]) for key, _ in named])
-    matrix = observe(at, disturbances) / sizes
+    amounts = np.array([_get_amount(again.amounts, key[0]) for key, _ in named])
+    matrix = observe(at, disturbances) / amounts
     finite = np.all(np.isfinite(matrix), axis=0)
     named = [one for one, kept in zip(named, finite, strict=True) if kept]
     disturbances, matrix = [one for _, one in named], matrix[:, finite]
+    amounts = amounts[finite]
     stated = list(_build_known(at, priors))
     known = observe(at, [one for one, _ in stated]) @ np.array([sign for _, sign in stated])
     inputs: dict[str, FloatArray] = {}
     for k, one in enumerate(disturbances):
         for name, values in one.inputs.items():
             nothing = np.zeros((at.middle.size, len(disturbances)))
-            inputs.setdefault(name, nothing)[:, k] = values
+            inputs.setdefault(name, nothing)[:, k] = values / amounts[k]
     keys = tuple(key for key, _ in named)
     stds = {
         group: priors.get_prior(group.effect, at.part.structure.driveline).std
@@ -262,27 +272,28 @@ def _build_shift_columns(
     return _ShiftColumns(keys, matrix, known, at.middle, inputs, stds)
 
 
-def _get_size(sizes: Mapping[EffectId, float], group: Group) -> float:
-    """Return the size at which the columns of a group are formed, in stated ones."""
-    return 1.0 if group.effect is None else sizes.get(group.effect, 1.0)
+def _get_amount(amounts: Mapping[EffectId, float], group: Group) -> float:
+    """Return the amount at which the columns of a group are formed, of the stated size."""
+    return 1.0 if group.effect is None else amounts.get(group.effect, 1.0)
 
 
 def _number_columns(
-    at: OperatingPoint, priors: EffectPriors, sizes: Mapping[EffectId, float]
+    at: OperatingPoint, priors: EffectPriors, amounts: Mapping[EffectId, float]
 ) -> Iterator[tuple[_Key, Disturbance]]:
     """Yield the disturbances of one prior standard deviation with their group and number."""
-    found = list(_build_random(at, priors, sizes))
+    found = list(_build_random(at, priors, amounts))
     keys = number_groups([group for group, _ in found])
     yield from zip(keys, (one for _, one in found), strict=True)
 
 
 def _build_random(
-    at: OperatingPoint, priors: EffectPriors, sizes: Mapping[EffectId, float]
+    at: OperatingPoint, priors: EffectPriors, amounts: Mapping[EffectId, float]
 ) -> Iterator[tuple[Group, Disturbance]]:
     for name, effect in EFFECTS.items():
         prior = priors.get_prior(name, at.part.structure.driveline)
         if prior.std > 0.0 and not _is_in_plant(at, name):
-            for one in effect.build(at, sizes.get(name, 1.0) * prior.std):
+            size = effect.scale_amount(amounts.get(name, 1.0), prior.std)
+            for one in effect.build(at, size):
                 yield Group(name, one.subject), one
     for one in build_sensor_columns(at, priors.sensors):
         yield Group(None, one.subject), one

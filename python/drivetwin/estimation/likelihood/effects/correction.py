@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,9 +41,17 @@ class CorrectionSettings:
     linear_moves: float = 0.5
     """Largest move of an unknown, in its new standard deviations, up to which one step is taken:
     the error of a linear step is of second order in it."""
-    more_steps: int = 2
-    """Greatest number of steps after the first: the third changes values by a tenth of the second,
-    unless the effects are beyond a linear correction."""
+    settled: float = 0.1
+    """Change of an unknown by a further step, in its new standard deviations, from which on the
+    steps end: it is small beside any interval."""
+    more_steps: int = 8
+    """Greatest number of steps after the first: with extrapolation five are enough, unless the
+    effects are beyond a linear correction."""
+    memory: int = 3
+    """Number of earlier steps from which a step is extrapolated: as many directions as may
+    converge slowly."""
+    extrapolation: float = 10.0
+    """Largest factor by which a step is extrapolated: changes that shrink by a tenth a step."""
     shortest_step: float = 0.1
     """Share of the first step below which the second is not tried."""
 
@@ -88,7 +96,8 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     Effects with evidence move the values. The others have a posterior mean too; it is not applied,
     and the variance grows by its square. The first step is from the minimum of the fit. Where it
     leaves the range in which the columns are linear, they are formed anew where it ends, and
-    another step is taken from there.
+    another step is taken from there. A step holds the columns fixed while the unknowns move, so
+    that steps may shrink slowly: they are extrapolated (Anderson, Journal of the ACM 12, 1965).
     """
     found = expand_effects(fit, priors)
     if found is None:
@@ -98,19 +107,23 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
         evidence |= _describe_plant(fit, fit.plant, sums.pull.size)
     base = _Expansion(fit.problem, fit.normal, fit.point, sums)
     step = base.take_step(shown)
-    size, total = step.moves.size, step.moves
-    change, last = total, np.zeros_like(total)
+    moves, amounts = step.moves, base.spread_amounts(step, shown)
+    change, last, limit = moves, np.zeros_like(moves), CORRECTION.linear_moves
+    answers: list[_Answer] = []
     for _ in range(CORRECTION.more_steps):
-        std = np.sqrt(np.diag(step.covariance)[:size])
-        if np.max(np.abs(change) / std) <= CORRECTION.linear_moves:
+        std = np.sqrt(np.diag(step.covariance)[: moves.size])
+        if np.max(np.abs(change) / std) <= limit:
             break
-        again = _expand_again(fit, total, priors, base.spread_amounts(step, shown))
+        again = _expand_again(fit, moves, priors, amounts)
         if again is None:
-            last = np.full_like(total, np.inf)
+            last = np.full_like(moves, np.inf)
             break
         base, step = again, again.take_step(shown)
-        change = base.point.values + step.moves - fit.point.values - total
-        total, last = total + change, change
+        end = base.point.values + step.moves - fit.point.values
+        change = last = end - moves
+        answers.append(_Answer(end, base.spread_amounts(step, shown), change / std))
+        moves, amounts = _extrapolate(answers[-CORRECTION.memory - 1 :])
+        limit = CORRECTION.settled
     return _conclude(fit, base, shown, last, evidence)
 
 
@@ -174,6 +187,34 @@ class _Amounts:
 
     columns: EffectColumns
     values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """End of a step: `moves` (p,) of the unknowns from the minimum, amounts of the effects, and the
+    `change` (p,) of the moves by the step, in standard deviations."""
+
+    moves: FloatArray
+    amounts: _Amounts
+    change: FloatArray
+
+
+def _extrapolate(answers: Sequence[_Answer]) -> tuple[FloatArray, _Amounts]:
+    """Return moves and amounts to which the answers of consecutive steps lead.
+
+    The combination of the answers whose change is least; the last one alone where the steps do not
+    have the same columns.
+    """
+    *before, last = answers
+    values = last.amounts.values
+    if not before or any(one.amounts.values.size != values.size for one in before):
+        return last.moves, last.amounts
+    apart = np.column_stack([last.change - one.change for one in before])
+    factors, *_ = np.linalg.lstsq(apart, -last.change, rcond=None)
+    factors *= min(1.0, CORRECTION.extrapolation / max(float(np.max(np.abs(factors))), 1e-300))
+    moves = np.column_stack([last.moves - one.moves for one in before]) @ factors
+    ahead = np.column_stack([values - one.amounts.values for one in before]) @ factors
+    return last.moves + moves, replace(last.amounts, values=values + ahead)
 
 
 def _conclude(

@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
 from drivetwin.vehicle.effects import EffectId
@@ -40,8 +42,9 @@ class Effect:
     `std` is the default standard deviation of its normal prior about zero in `unit`, `source` the
     reason for it. `meaning` completes "the log shows ..."; `remedy` is advice where it is found.
     A `random` effect is a sample of a random process: no single value of it can be stated.
-    The columns grow with the `power` of the size. A `curved` effect is not proportional to its
-    size: a second step forms its column at the size found by the first.
+    The columns grow with the `power` of the size, of which the amount has the sign. A `curved`
+    effect is not proportional to that: a further step forms its column at the size found before,
+    with the sign of that if the effect is `signed`.
     """
 
     id: EffectId
@@ -54,3 +57,8 @@ class Effect:
     random: bool = False
     power: float = 1.0
     curved: bool = False
+    signed: bool = False
+
+    def scale_amount(self, amount: float, std: float) -> float:
+        """Return the size of an `amount`, in units of the columns, of the stated size `std`."""
+        return std * float(np.sign(amount) * np.abs(amount) ** (1.0 / self.power))

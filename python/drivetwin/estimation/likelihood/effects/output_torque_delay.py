@@ -26,4 +26,5 @@ EFFECT = Effect(
     "set channels.output_torque.time_shift_s in the channel mapping and compare",
     build,
     curved=True,
+    signed=True,
 )

@@ -51,6 +51,10 @@ class PlantSettings:
     """Log evidence from which a plant is chosen: odds of 150, as for a cause that is named [-]."""
     max_work: float = 600.0
     """Work of one refit: it takes 3 to 6 expansions of about 30 passes [passes]."""
+    starts: tuple[float, ...] = (-1.0, 0.0)
+    """Initial values of the logarithm of a mode's frequency, in standard deviations from its prior
+    mean. Q has several minima; a low mode is not found from a usual one, and a high one moves
+    little [-]."""
     mode_spread: float = 0.5
     """Prior standard deviation of the logarithm of a mode's frequency: 0.4 to 2.7 times the usual
     one hold 95 % [-]."""
@@ -113,7 +117,7 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     most = max([0.0, *rivals])
     if stated or best.plant.nats > max(PLANT.evidence, most):
         return best
-    return _widen(fit, [one for one in refits if one.plant is not None], most)
+    return _widen(fit, [one for one in refits if one.plant is not None])
 
 
 def get_nats(fit: LikelihoodFit) -> float:
@@ -139,10 +143,14 @@ def _iterate_refits(
         stated = priors.get_prior(effect, driveline)
         if stated.std > 0.0 or stated.value:
             own = build_plant_priors(effect, priors, driveline)
-            start = own[0].value if amount is None else float(np.log(amount * stated.std))
-            refit = _refit(fit, effect, own, start)
-            if refit is not None:
-                yield refit
+            starts = _list_starts(own[0]) if amount is None else [np.log(amount * stated.std)]
+            refits = [_refit(fit, effect, own, float(start)) for start in starts]
+            yield from sorted((one for one in refits if one), key=get_nats)[-1:]
+
+
+def _list_starts(prior: PriorValue) -> list[float]:
+    """Return the initial values of the logarithm of a mode's frequency."""
+    return [prior.value + start * prior.std for start in PLANT.starts]
 
 
 def build_plant_priors(
@@ -246,18 +254,17 @@ def _build_fit(
     )
 
 
-def _widen(fit: LikelihoodFit, refits: list[LikelihoodFit], most: float) -> LikelihoodFit:
+def _widen(fit: LikelihoodFit, refits: list[LikelihoodFit]) -> LikelihoodFit:
     """Widen the covariance by the moves to refits whose effect no column describes.
 
-    The weight is the probability of the part beside the dual clutch and the effect with the `most`
-    evidence.
+    The weight is the probability of the part against the dual clutch alone: other effects do not
+    exclude it.
     """
     covariance = fit.covariance
     for one in refits:
         if one.plant is None or one.plant.effect in BY_EVIDENCE:
             continue
-        against = np.logaddexp(0.0, most)
-        weight = float(np.exp(-np.logaddexp(0.0, against - one.plant.nats)))
+        weight = float(np.exp(-np.logaddexp(0.0, -one.plant.nats)))
         far = one.plant.moves[: one.plant.index]
         covariance = covariance + weight * np.outer(far, far)
     return replace(fit, covariance=covariance)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""First-order lag of the engine torque, beside its delay."""
+"""First-order lag between logged and acting engine torque, beside their delay."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy import signal
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
@@ -11,37 +12,46 @@ from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
 from drivetwin.vehicle.effects import EffectId
 
-STEP_S = 5e-3
-"""Raster [s] on which the curvature of the torque is formed."""
-WIDTHS = (9, 7)
-"""Points of the moving means in turn: they keep lags of 10 ms and remove noise."""
+STEP_S = 2e-3
+"""Raster [s] of the torque: a tenth of the usual lag."""
+SMOOTHED = 0.5
+"""Width of the moving mean before a torque is differentiated, over the lag: it removes noise and
+hardly changes the response to a lag."""
 
 
 def build(at: OperatingPoint, std: float) -> list[Disturbance]:
-    """Change the acting torque as a filter of time constant `std` does beyond a pure delay.
+    """Change the acting torque as a lag of `std` [s] does beyond a pure delay.
 
-    A measured torque that lags by τ acts as T + τ·T'. With the delay τ, which is an unknown of
-    its own, T(t + τ) = T + τ·T' + τ²/2·T'' remains: the difference is -τ²/2·T''.
+    With s the derivative by time, an acting torque that lags by τ > 0 is T/(1 + τs), one whose
+    logged value lags by -τ is T·(1 - τs). The delay τ is an unknown of its own, so the change is
+    (e^τs/(1 + τs) - 1)·T or ((1 - τs)·e^τs - 1)·T. To second order both are ±τ²/2·T''.
     """
-    if at.record.of_speeds is not None:
-        return []
     steady = at.record.steady_torque
     raster = np.arange(steady.time[0], steady.time[-1], STEP_S)
-    if raster.size < sum(WIDTHS):
+    if at.record.of_speeds is not None or raster.size < 2:
         return []
-    smooth = np.interp(raster, steady.time, steady.values)
-    for width in WIDTHS:
-        smooth = _average(smooth, width)
-    curvature = np.gradient(np.gradient(smooth, raster), raster)
+    torque = np.interp(raster, steady.time, steady.values)
+    lagged = _apply_lag(torque, std) if std > 0.0 else _remove_lag(torque, -std)
     age = at.part.structure.get_value(at.point, "te_delay")
-    change = -0.5 * std**2 * np.interp(at.middle + age, raster, curvature)
-    return [Disturbance(inputs={TORQUE: change})]
+    change = np.interp(raster + std, raster, lagged) - torque
+    return [Disturbance(inputs={TORQUE: np.interp(at.middle + age, raster, change)})]
 
 
-def _average(values: FloatArray, width: int) -> FloatArray:
-    """Average (n,) over an odd number of points, with the ends held."""
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.convolve(padded, np.ones(width) / width, "valid")
+def _apply_lag(torque: FloatArray, lag: float) -> FloatArray:
+    """Apply a first-order lag [s] to a torque (n,), linear between samples and at rest before."""
+    decay = np.exp(-STEP_S / lag)
+    mean = lag / STEP_S * (1.0 - decay)
+    b, a = np.array([1.0 - mean, mean - decay]), np.array([1.0, -decay])
+    lagged, _ = signal.lfilter(b, a, torque, zi=signal.lfilter_zi(b, a) * torque[0])
+    return np.asarray(lagged)
+
+
+def _remove_lag(torque: FloatArray, lag: float) -> FloatArray:
+    """Remove a first-order lag [s] from a torque (n,)."""
+    width = 2 * int(0.5 * SMOOTHED * lag / STEP_S) + 1
+    padded = np.pad(torque, width // 2, mode="edge")
+    smooth = np.convolve(padded, np.ones(width) / width, "valid")
+    return np.asarray(torque + lag * np.gradient(smooth, STEP_S))
 
 
 EFFECT = Effect(
@@ -53,4 +63,6 @@ EFFECT = Effect(
     "record the engine torque unfiltered, or at a faster rate",
     build,
     power=2.0,
+    curved=True,
+    signed=True,
 )
