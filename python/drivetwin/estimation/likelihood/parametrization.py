@@ -238,7 +238,8 @@ def retract(point: ParameterVector, step: FloatArray) -> FloatArray:
 
     The four coefficients of a Stribeck law nearly compensate each other if v_s is as large as the
     slips that occur. The valley of Q is then curved in the coefficients, and straight in the
-    values of the law at three slips with ln v_s as the fourth coordinate.
+    values of the law at three slips with ln v_s as the fourth coordinate. A step to a v_s at which
+    the law does not change over these slips stays straight in the coefficients.
     """
     values = point.values + step
     for name in point.names:
@@ -249,7 +250,9 @@ def retract(point: ParameterVector, step: FloatArray) -> FloatArray:
         mu, slopes = evaluate_stribeck(point.values[index], RETRACTION_SLIPS)
         target = mu + slopes.T @ step[index]
         _, linear = evaluate_stribeck(values[index], RETRACTION_SLIPS)
-        values[index[:-1]] = np.linalg.solve(linear[:-1].T, target)
+        matrix = linear[:-1].T
+        if np.all(np.isfinite(matrix)) and np.linalg.matrix_rank(matrix) == matrix.shape[0]:
+            values[index[:-1]] = np.linalg.solve(matrix, target)
     return values
 
 

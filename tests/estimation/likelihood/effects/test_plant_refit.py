@@ -29,7 +29,7 @@ from tests.support.bench import Bench, record_bench
 from tests.support.shared_results import shared
 
 MODE = EffectId.INPUT_SHAFT_MODE
-FREQUENCY = 40.0
+FREQUENCY = 29.0
 
 
 @shared

@@ -30,6 +30,10 @@ CURVED_AMOUNTS = (0.05, 5.0)
 formed."""
 
 
+CURVED_STEP = 0.05
+"""Relative change of that amount for the slope of the column."""
+
+
 @dataclass(frozen=True, eq=False)
 class EffectPriors:
     """Statements of the card on effects and sensors; what is not stated has the default prior."""
@@ -119,7 +123,7 @@ class EffectColumns:
         found = {
             group.effect: amount * scale
             for group, amount, scale in zip(self.groups, amounts, self.scale, strict=True)
-            if group.effect is not None and EFFECTS[group.effect].curved
+            if group.effect is not None and EFFECTS[group.effect].curved and amount != 0.0
         }
         return FormedAgain(
             set(self.groups), {one: _limit_amount(one, amount) for one, amount in found.items()}
@@ -249,15 +253,17 @@ def _build_shift_columns(
         for one in _number_columns(at, priors, again.amounts)
         if groups is None or one[0][0] in groups
     ]
-    disturbances = [one for _, one in named]
     amounts = np.array([_get_amount(again.amounts, key[0]) for key, _ in named])
-    matrix = observe(at, disturbances) / amounts
-    finite = np.all(np.isfinite(matrix), axis=0)
-    named = [one for one, kept in zip(named, finite, strict=True) if kept]
-    disturbances, matrix = [one for _, one in named], matrix[:, finite]
-    amounts = amounts[finite]
+    matrix = observe(at, [one for _, one in named]) / amounts
+    for k, (key, one) in enumerate(named):
+        effect = key[0].effect
+        if one.inputs and effect is not None and effect in again.amounts:
+            matrix[:, k] = _differentiate_curved(at, priors, effect, amounts[k])
+    finite = np.flatnonzero(np.all(np.isfinite(matrix), axis=0))
     stated = list(_build_known(at, priors))
     known = observe(at, [one for one, _ in stated]) @ np.array([sign for _, sign in stated])
+    named, matrix, amounts = [named[k] for k in finite], matrix[:, finite], amounts[finite]
+    disturbances = [one for _, one in named]
     inputs: dict[str, FloatArray] = {}
     for k, one in enumerate(disturbances):
         for name, values in one.inputs.items():
@@ -270,6 +276,62 @@ def _build_shift_columns(
         if group.effect is not None
     }
     return _ShiftColumns(keys, matrix, known, at.middle, inputs, stds)
+
+
+def _differentiate_curved(
+    at: OperatingPoint, priors: EffectPriors, effect: EffectId, amount: float
+) -> FloatArray:
+    """Differentiate the changes (n,) by a curved effect in the inputs at an `amount` of it.
+
+    The run is driven by its whole change there, so a further step is along the slope.
+    """
+    step = CURVED_STEP * amount
+    near = [_build_curved(at, priors, effect, amount + sign * step) for sign in (1.0, -1.0)]
+    changes = observe(at, near)
+    return np.asarray((changes[:, 0] - changes[:, 1]) / (2.0 * step))
+
+
+def _build_curved(
+    at: OperatingPoint, priors: EffectPriors, effect: EffectId, amount: float
+) -> Disturbance:
+    """Build the only disturbance of a curved effect at an `amount` of its stated size; one without
+    action where a shift has none."""
+    std = priors.get_prior(effect, at.part.structure.driveline).std
+    found = EFFECTS[effect].build(at, EFFECTS[effect].scale_amount(amount, std))
+    return found[0] if found else Disturbance()
+
+
+def form_inputs(
+    problem: LikelihoodObjective,
+    point: ParameterVector,
+    priors: EffectPriors,
+    first: EffectColumns,
+    amounts: FloatArray,
+) -> list[dict[str, Signal]] | None:
+    """Form the changes of the inputs by name for `amounts` (q,) of the columns `first`, by shift.
+
+    A curved effect acts with its whole change at its amount. None where a run does not complete.
+    """
+    curved = {
+        group.effect: k
+        for k, group in enumerate(first.groups)
+        if group.effect is not None and EFFECTS[group.effect].curved and amounts[k] != 0.0
+    }
+    linear = amounts.copy()
+    linear[list(curved.values())] = 0.0
+    found = first.compute_inputs(linear)
+    for part, changes in zip(problem.parts, found, strict=True):
+        at = evaluate_operating_point(part, point) if curved else None
+        if curved and at is None:
+            return None
+        for effect, k in curved.items():
+            assert at is not None, "checked above"
+            one = _build_curved(at, priors, effect, float(amounts[k] * first.scale[k]))
+            for name, values in one.inputs.items():
+                old = changes.get(name, Signal(at.middle, np.zeros_like(values)))
+                total = np.interp(at.middle, old.time, old.values) + values
+                changes[name] = Signal(at.middle, total)
+    return found
 
 
 def _get_amount(amounts: Mapping[EffectId, float], group: Group) -> float:

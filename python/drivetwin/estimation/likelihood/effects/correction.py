@@ -14,6 +14,7 @@ from drivetwin.estimation.likelihood.effects.columns import (
     EffectColumns,
     EffectPriors,
     build_columns,
+    form_inputs,
 )
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import (
@@ -50,8 +51,12 @@ class CorrectionSettings:
     memory: int = 3
     """Number of earlier steps from which a step is extrapolated: as many directions as may
     converge slowly."""
-    extrapolation: float = 10.0
-    """Largest factor by which a step is extrapolated: changes that shrink by a tenth a step."""
+    reach: float = 10.0
+    """Largest extrapolation of a step, in the largest change by that step: changes that shrink by a
+    tenth a step."""
+    condition: float = 1e-3
+    """Least singular value of the changes of these steps, over the largest, that is used: below it
+    is what steps miss of a linear iteration."""
     shortest_step: float = 0.1
     """Share of the first step below which the second is not tried."""
 
@@ -121,7 +126,7 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
         base, step = again, again.take_step(shown)
         end = base.point.values + step.moves - fit.point.values
         change = last = end - moves
-        answers.append(_Answer(end, base.spread_amounts(step, shown), change / std))
+        answers.append(_Answer(end, base.spread_amounts(step, shown), std, change / std))
         moves, amounts = _extrapolate(answers[-CORRECTION.memory - 1 :])
         limit = CORRECTION.settled
     return _conclude(fit, base, shown, last, evidence)
@@ -191,11 +196,13 @@ class _Amounts:
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """End of a step: `moves` (p,) of the unknowns from the minimum, amounts of the effects, and the
-    `change` (p,) of the moves by the step, in standard deviations."""
+    """End of a step: `moves` (p,) of the unknowns from the minimum, amounts of the effects, the
+    standard deviations `std` (p,) of the unknowns, and the `change` (p,) of the moves by the step
+    in these."""
 
     moves: FloatArray
     amounts: _Amounts
+    std: FloatArray
     change: FloatArray
 
 
@@ -210,11 +217,12 @@ def _extrapolate(answers: Sequence[_Answer]) -> tuple[FloatArray, _Amounts]:
     if not before or any(one.amounts.values.size != values.size for one in before):
         return last.moves, last.amounts
     apart = np.column_stack([last.change - one.change for one in before])
-    factors, *_ = np.linalg.lstsq(apart, -last.change, rcond=None)
-    factors *= min(1.0, CORRECTION.extrapolation / max(float(np.max(np.abs(factors))), 1e-300))
+    factors, *_ = np.linalg.lstsq(apart, -last.change, rcond=CORRECTION.condition)
     moves = np.column_stack([last.moves - one.moves for one in before]) @ factors
     ahead = np.column_stack([values - one.amounts.values for one in before]) @ factors
-    return last.moves + moves, replace(last.amounts, values=values + ahead)
+    farthest = float(np.max(np.abs(moves / last.std)))
+    share = min(1.0, CORRECTION.reach * float(np.max(np.abs(last.change))) / max(farthest, 1e-300))
+    return last.moves + share * moves, replace(last.amounts, values=values + share * ahead)
 
 
 def _conclude(
@@ -271,7 +279,9 @@ def _expand_with_inputs(
     """
     first = amounts.columns
     acting = amounts.values * first.acts_on_inputs
-    changes = first.compute_inputs(acting)
+    changes = form_inputs(problem, point, priors, first, acting)
+    if changes is None:
+        return None
     parts = [
         part.add_to_inputs(point, one) for part, one in zip(problem.parts, changes, strict=True)
     ]

@@ -21,7 +21,7 @@ from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.expansion import expand_effects
+from drivetwin.estimation.likelihood.effects.expansion import SHOWN, expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import SIZES, GroupEvidence
 from drivetwin.estimation.likelihood.extension import (
     DAMPING,
@@ -117,7 +117,8 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     most = max([0.0, *rivals])
     if stated or best.plant.nats > max(PLANT.evidence, most):
         return best
-    return _widen(fit, [one for one in refits if one.plant is not None])
+    shown = most if most > SHOWN else 0.0
+    return _widen(fit, [one for one in refits if one.plant is not None], shown)
 
 
 def get_nats(fit: LikelihoodFit) -> float:
@@ -254,17 +255,19 @@ def _build_fit(
     )
 
 
-def _widen(fit: LikelihoodFit, refits: list[LikelihoodFit]) -> LikelihoodFit:
+def _widen(fit: LikelihoodFit, refits: list[LikelihoodFit], shown: float) -> LikelihoodFit:
     """Widen the covariance by the moves to refits whose effect no column describes.
 
-    The weight is the probability of the part against the dual clutch alone: other effects do not
-    exclude it.
+    The weight is the probability of the part against the dual clutch alone, and against the effect
+    with most evidence where the log shows one: a part may stand in for that effect. `shown` is its
+    evidence, 0 without one.
     """
     covariance = fit.covariance
     for one in refits:
         if one.plant is None or one.plant.effect in BY_EVIDENCE:
             continue
-        weight = float(np.exp(-np.logaddexp(0.0, -one.plant.nats)))
+        against = np.logaddexp(0.0, shown) if shown else 0.0
+        weight = float(np.exp(-np.logaddexp(0.0, against - one.plant.nats)))
         far = one.plant.moves[: one.plant.index]
         covariance = covariance + weight * np.outer(far, far)
     return replace(fit, covariance=covariance)
