@@ -119,7 +119,13 @@ def test_what_is_called_required_is(kind: str) -> None:
             assert run(rest) == "completed"
 
 
-NESTED = [("gear", "loss"), ("torque_converter", "map"), ("engine_map", "map")]
+NESTED = [
+    ("gear", "loss"),
+    ("gear", "losses"),
+    ("clutch", "drag"),
+    ("torque_converter", "map"),
+    ("engine_map", "map"),
+]
 
 
 @pytest.mark.parametrize(("kind", "group"), NESTED)

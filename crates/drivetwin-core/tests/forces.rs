@@ -181,6 +181,7 @@ fn a_torque_on_a_planetary_set_splits_by_willis() {
             carrier: "carrier".into(),
             z: 1.5,
             planet_inertia: None,
+            losses: None,
         }),
         Element::Clutch(clutch("brake", "ring", "ground")),
     ]);
@@ -211,6 +212,7 @@ fn repeated_couplings_are_named() {
             b: "c".into(),
             ratio: 4.0,
             loss: None,
+            losses: None,
         }),
     ];
     let error = drivetwin_core::network::Network::compile(&drivetwin_core::model::Driveline {
@@ -304,7 +306,7 @@ fn members_of_next_to_no_mass_are_told_from_rigid_ones_whatever_the_numbers() {
                         inertia("c", 1.0),
                         Element::Clutch(clutch("B", "a", "ground")),
                         Element::Clutch(clutch("C", "a", "c")),
-                        Element::Gear(Gear { name, a, b, ratio, loss }),
+                        Element::Gear(Gear { name, a, b, ratio, loss, losses: None }),
                         drive.clone(),
                     ]);
                     let start = start(&[("a", 7.0), ("c", 2.0)], &[]);

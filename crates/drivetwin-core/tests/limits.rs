@@ -211,7 +211,7 @@ fn of_two_drags_that_no_efficiency_tells_apart_the_larger_counts_either_way() {
             inertia("a", 1.0),
             inertia("b", 1.0),
             torque("a", "T"),
-            Element::Gear(Gear { name, a, b, ratio: 1.0, loss: Some(loss) }),
+            Element::Gear(Gear { name, a, b, ratio: 1.0, loss: Some(loss), losses: None }),
         ]);
         for settings in [Settings::default(), Settings::exact()] {
             for (drive, rest) in [(10.0, 3.0), (0.0, -2.0), (-10.0, -7.0), (1.0, -1.5)] {

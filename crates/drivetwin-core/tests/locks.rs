@@ -391,6 +391,7 @@ fn what_swings_through_a_lossy_gear_comes_to_rest() {
                 b: "f".into(),
                 ratio,
                 loss: Some(loss),
+                losses: None,
             }),
         ]);
         let start = start(&[("a", between(8, -50.0, 50.0)), ("f", between(9, -50.0, 50.0))], &[]);
@@ -421,7 +422,14 @@ fn a_start_locks_as_a_clutch_that_is_strong_beyond_measure_does() {
     ] {
         let loss = |eta| Some(GearLoss::by_efficiency(law, eta));
         let gear = |name: &str, a: &str, b: &str, ratio, loss| {
-            Element::Gear(Gear { name: name.into(), a: a.into(), b: b.into(), ratio, loss })
+            Element::Gear(Gear {
+                name: name.into(),
+                a: a.into(),
+                b: b.into(),
+                ratio,
+                loss,
+                losses: None,
+            })
         };
         let network = compile(vec![
             inertia("input", 20.3),

@@ -12,7 +12,7 @@ use drivetwin_core::model::elements::{
     Bearing, Clutch, Element, Gear, GearLoss, OneWayClutch, Planetary,
 };
 use drivetwin_core::model::mechanism::LossLaw;
-use drivetwin_core::model::{FrictionLaw, Name, Stribeck};
+use drivetwin_core::model::{FrictionLaw, LossTable, Name, Stribeck};
 use drivetwin_core::simulate::{Output, RunOptions, Start, Trajectory, run};
 use drivetwin_core::solver::{EventKind, Settings, Signal, Status};
 use proptest::prelude::*;
@@ -33,11 +33,14 @@ struct RandomClutch {
     pressure: Vec<f64>,
 }
 
+/// Loss torque at the largest speed without torque [N·m], and loss per torque.
+type TableSize = (f64, f64);
+
 #[derive(Clone, Debug)]
 enum RandomElement {
     Shaft(usize, usize, f64, f64),
-    Gear(usize, f64, Option<(f64, f64)>),
-    Planetary(f64),
+    Gear(usize, f64, Option<(f64, f64)>, Option<TableSize>),
+    Planetary(f64, Option<TableSize>),
     OneWay(usize, usize),
     Bearing(usize, f64),
     Load(usize, f64, f64, f64),
@@ -72,13 +75,15 @@ fn clutch() -> impl Strategy<Value = RandomClutch> {
 
 fn element() -> impl Strategy<Value = RandomElement> {
     let loss = prop::option::of((0.3..1.0, 0.3..1.0));
+    let table = || prop::option::of((prop_oneof![Just(0.0), 0.0..10.0], 0.0..0.5));
     prop_oneof![
         (0..4usize, 0..4usize, 10.0..1e4, 0.0..20.0)
             .prop_filter("different ends", |s| s.0 != s.1)
             .prop_map(|(a, b, k, c)| RandomElement::Shaft(a, b, k, c)),
-        (0..4usize, prop_oneof![-4.0..-0.3, 0.3..4.0], loss)
-            .prop_map(|(a, ratio, loss)| RandomElement::Gear(a, ratio, loss)),
-        prop_oneof![-3.0..-1.3, 1.2..4.0].prop_map(RandomElement::Planetary),
+        (0..4usize, prop_oneof![-4.0..-0.3, 0.3..4.0], loss, table())
+            .prop_map(|(a, ratio, loss, table)| RandomElement::Gear(a, ratio, loss, table)),
+        (prop_oneof![-3.0..-1.3, 1.2..4.0], table())
+            .prop_map(|(z, table)| RandomElement::Planetary(z, table)),
         (0..4usize, 0..5usize)
             .prop_filter("different sides", |s| s.0 != s.1)
             .prop_map(|(a, b)| RandomElement::OneWay(a, b)),
@@ -127,8 +132,9 @@ fn case_by_hand() -> impl Strategy<Value = Case> {
         (0..4usize, 0..4usize, pick(&[100.0, 1000.0]), pick(&[0.0, 1.0, 100.0]))
             .prop_filter("different ends", |s| s.0 != s.1)
             .prop_map(|(a, b, k, c)| RandomElement::Shaft(a, b, k, c)),
-        (0..4usize, pick(&[-1.0, 1.0, 2.0])).prop_map(|(a, z)| RandomElement::Gear(a, z, None)),
-        pick(&[-2.0, 2.0, 3.0]).prop_map(RandomElement::Planetary),
+        (0..4usize, pick(&[-1.0, 1.0, 2.0]), prop::option::of(Just((5.0, 0.1))))
+            .prop_map(|(a, z, table)| RandomElement::Gear(a, z, None, table)),
+        pick(&[-2.0, 2.0, 3.0]).prop_map(|z| RandomElement::Planetary(z, None)),
         (0..4usize, 0..5usize)
             .prop_filter("different sides", |s| s.0 != s.1)
             .prop_map(|(a, b)| RandomElement::OneWay(a, b)),
@@ -153,6 +159,15 @@ fn friction(stribeck: bool) -> FrictionLaw<f64> {
     }
 }
 
+/// Losses that grow with speed and torque, with breakpoints at round numbers.
+fn losses((churning, share): TableSize) -> LossTable {
+    let speed = vec![1.0, 10.0, 50.0];
+    let torque = vec![0.0, 10.0, 50.0, 100.0];
+    let row = |torque: &f64| speed.iter().map(|w| churning * w / 50.0 + share * torque).collect();
+    let loss = torque.iter().map(row).collect();
+    LossTable { speed, torque, loss }
+}
+
 fn elements(case: &Case) -> Vec<Element<f64>> {
     let mut all: Vec<Element<f64>> = (0..4).map(|i| inertia(NODES[i], case.inertias[i])).collect();
     all.push(torque("a", "drive"));
@@ -167,7 +182,7 @@ fn elements(case: &Case) -> Vec<Element<f64>> {
         let name: Name = format!("element {i}").into();
         let element = match *other {
             RandomElement::Shaft(a, b, k, c) => renamed(shaft(NODES[a], NODES[b], k, c), name),
-            RandomElement::Gear(a, ratio, loss) => {
+            RandomElement::Gear(a, ratio, loss, table) => {
                 let far = format!("far {i}");
                 all.push(renamed(inertia(&far, 0.3), format!("J {i}").into()));
                 let loss = loss.map(|(eta, eta_backward)| GearLoss {
@@ -175,15 +190,16 @@ fn elements(case: &Case) -> Vec<Element<f64>> {
                     ..GearLoss::by_efficiency(LossLaw::Dissipative, eta)
                 });
                 let Element::Gear(plain) = gear(NODES[a], &far, ratio) else { unreachable!() };
-                Element::Gear(Gear { name, loss, ..plain })
+                Element::Gear(Gear { name, loss, losses: table.map(losses), ..plain })
             }
-            RandomElement::Planetary(z) => Element::Planetary(Planetary {
+            RandomElement::Planetary(z, table) => Element::Planetary(Planetary {
                 name,
                 sun: "a".into(),
                 ring: format!("ring {i}").into(),
                 carrier: "b".into(),
                 z,
                 planet_inertia: None,
+                losses: table.map(losses),
             }),
             RandomElement::OneWay(a, b) => Element::OneWayClutch(OneWayClutch {
                 name,

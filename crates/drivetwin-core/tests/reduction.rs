@@ -35,6 +35,7 @@ fn set<T: Real>(name: &str, [sun, ring, carrier]: [&str; 3], z: T) -> Element<T>
         carrier: carrier.into(),
         z,
         planet_inertia: None,
+        losses: None,
     };
     Element::Planetary(planetary)
 }
@@ -283,6 +284,7 @@ fn ratios_carry_derivatives() {
             peak: Dual::of(1.0),
             pressure: "P".into(),
             drum_inertia: Dual::of(0.0),
+            drag: None,
         }),
     ];
     let m = Driveline { elements }.mechanism().unwrap();

@@ -48,9 +48,10 @@ class ElementMethods:
         *,
         ratio: float,
         loss: Mapping[str, Any] | None = None,
+        losses: Mapping[str, Any] | None = None,
     ) -> Part:
-        """Add a gear, ω_a = ratio · ω_b, with the fields of a loss law or none."""
-        return self._add("gear", name, {"a": a, "b": b}, ratio=ratio, loss=loss)
+        """Add a gear, ω_a = ratio · ω_b, with the fields of a loss law and of a table, or none."""
+        return self._add("gear", name, {"a": a, "b": b}, ratio=ratio, loss=loss, losses=losses)
 
     def planetary(
         self,
@@ -61,10 +62,15 @@ class ElementMethods:
         *,
         z: float,
         planet_inertia: float = 0.0,
+        losses: Mapping[str, Any] | None = None,
     ) -> Part:
-        """Add a planetary set with ring over sun teeth `z`; inertia of its planets [kg·m²]."""
+        """Add a planetary set with ring over sun teeth `z`; inertia of its planets [kg·m²].
+
+        `losses` are the fields of a table of losses, or none.
+        """
         ports = {"sun": sun, "ring": ring, "carrier": carrier}
-        return self._add("planetary", name, ports, z=z, planet_inertia=planet_inertia)
+        fields = {"z": z, "planet_inertia": planet_inertia, "losses": losses}
+        return self._add("planetary", name, ports, **fields)
 
     def clutch(
         self,

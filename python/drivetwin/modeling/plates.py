@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -14,7 +15,8 @@ class Plates:
     """Capacity of a clutch: μ(|slip|) · gain · (pressure - p0), static `peak` times that at rest.
 
     `friction` is a law or a constant μ; gain in m³, p0 in Pa, drum inertia in kg·m². By default
-    the pressure itself is the capacity [N·m].
+    the pressure itself is the capacity [N·m]. `drag` are the fields of a table of drag torque over
+    slip, or none.
     """
 
     friction: Stribeck | FrictionTable | float = 1.0
@@ -22,6 +24,7 @@ class Plates:
     p0: float = 0.0
     peak: float = 1.0
     drum_inertia: float = 0.0
+    drag: Mapping[str, Any] | None = None
 
     def describe(self) -> dict[str, Any]:
         """Return the fields of the element."""
@@ -37,4 +40,5 @@ class Plates:
             "p0": self.p0,
             "peak": self.peak,
             "drum_inertia": self.drum_inertia,
+            **({} if self.drag is None else {"drag": dict(self.drag)}),
         }

@@ -54,6 +54,8 @@ _LOSS = {
     "eta": _NUMBER,
     **dict.fromkeys(("eta_backward", "drag", "drag_backward"), _OPTIONAL),
 }
+_LOSSES = {"speed": _NUMBERS, "torque": _NUMBERS, "loss": Field(FieldKind.ROWS)}
+_DRAG = {"slip": _NUMBERS, "torque": _NUMBERS}
 _CONVERTER = dict.fromkeys(("speed_ratio", "capacity", "torque_ratio"), _NUMBERS)
 _ENGINE = {"throttle": _NUMBERS, "speed": _NUMBERS, "torque": Field(FieldKind.ROWS)}
 
@@ -64,13 +66,24 @@ def _group(fields: Mapping[str, Field], *, required: bool = True) -> Field:
 
 ELEMENT_FIELDS: Mapping[str, Mapping[str, Field]] = {
     "inertia": {"node": _NODE, "inertia": _NUMBER},
-    "gear": {**_ENDS, "ratio": _NUMBER, "loss": _group(_LOSS, required=False)},
+    "gear": {
+        **_ENDS,
+        "ratio": _NUMBER,
+        "loss": _group(_LOSS, required=False),
+        "losses": _group(_LOSSES, required=False),
+    },
     "planetary": {
         **dict.fromkeys(("sun", "ring", "carrier"), _NODE),
         "z": _NUMBER,
         "planet_inertia": _OPTIONAL,
+        "losses": _group(_LOSSES, required=False),
     },
-    "clutch": {**_ENDS, **_LAW, "drum_inertia": _NUMBER},
+    "clutch": {
+        **_ENDS,
+        **_LAW,
+        "drum_inertia": _NUMBER,
+        "drag": _group(_DRAG, required=False),
+    },
     "one_way_clutch": {**_ENDS, "clutch": _group(_LAW, required=False)},
     "bearing": {**_ENDS, "speed": _NUMBERS, "torque": _NUMBERS, "peak": _NUMBER},
     "spring_damper": {**_ENDS, "stiffness": _NUMBER, "damping": _NUMBER},

@@ -149,6 +149,7 @@ impl<T: Number> ShiftElement<T> {
                 peak: self.peak,
                 pressure: self.name.clone(),
                 drum_inertia: self.drum_inertia,
+                drag: None,
             }),
             Element::Gear(gear(joined("i_out ", &self.name), &b, output, self.i_out)),
         ]
@@ -167,7 +168,7 @@ fn inertia<T: Number>(name: Name, node: &Name, inertia: T) -> Element<T> {
 }
 
 fn gear<T: Number>(name: Name, a: &Name, b: &Name, ratio: T) -> Gear<T> {
-    Gear { name, a: a.clone(), b: b.clone(), ratio, loss: None }
+    Gear { name, a: a.clone(), b: b.clone(), ratio, loss: None, losses: None }
 }
 
 impl<T> DualClutch<T> {

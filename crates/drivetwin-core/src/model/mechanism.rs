@@ -166,6 +166,10 @@ pub enum Account {
     Load,
     /// Turned into heat by the slip of a torque converter or tyre.
     Converter,
+    /// Turned into heat in a gear.
+    Gear,
+    /// Turned into heat by the drag of a clutch.
+    Drag,
 }
 
 /// A scalar torque law over one or two node speeds and the inputs.
@@ -212,6 +216,16 @@ pub enum ForceLaw<T> {
         stiffness: T,
         /// rad/s.
         least_speed: f64,
+    },
+    /// Loss torque in the direction of a slip, by a table over its magnitude and a transmitted torque.
+    Loss {
+        /// Slip.
+        slip: Row<T>,
+        /// Index of the constraint that transmits the torque: that of its first entry; none for a table over
+        /// the slip alone.
+        constraint: Option<usize>,
+        /// Loss torque over transmitted torque, in place of a throttle, and slip from zero on.
+        map: TorqueMap,
     },
 }
 
@@ -317,6 +331,20 @@ impl<T: Number> Mechanism<T> {
     /// Index of an input, added on first use.
     pub fn input(&mut self, name: &Name) -> usize {
         index_of(&mut self.inputs, name)
+    }
+
+    /// State a loss torque against a slip, see [`ForceLaw::Loss`].
+    pub fn add_loss(
+        &mut self,
+        element: &Name,
+        slip: Row<T>,
+        constraint: Option<usize>,
+        map: TorqueMap,
+    ) {
+        let nodes = slip.iter().map(|&(node, c)| (node, -c)).collect();
+        let account = if constraint.is_some() { Account::Gear } else { Account::Drag };
+        let law = ForceLaw::Loss { slip, constraint, map };
+        self.forces.push(Force { element: element.clone(), nodes, law, lag: None, account });
     }
 
     /// Linear form with the speed of one node.

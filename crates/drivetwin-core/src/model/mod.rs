@@ -9,6 +9,7 @@ pub mod dual_clutch;
 pub mod elements;
 mod error;
 pub mod friction;
+pub mod loss_table;
 pub mod mechanism;
 pub mod torque_map;
 
@@ -16,6 +17,7 @@ pub use dual_clutch::DualClutch;
 pub use elements::Element;
 pub use error::{ModelError, ModelFaults};
 pub use friction::{FrictionLaw, FrictionTable, Stribeck};
+pub use loss_table::{DragTable, LossTable};
 pub use mechanism::Mechanism;
 
 use crate::number::Number;

@@ -6,6 +6,7 @@ use super::error::CompileError;
 use super::linalg::{Matrix, independent_rows, is_nothing, solve};
 use super::mode::{ModeKey, Motion};
 use super::nonlinear_torque::{NonlinearTorque, TorqueLaw};
+use super::table_loss::TableLoss;
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
 use crate::model::{Driveline, FrictionLaw, Name};
 use crate::number::Number;
@@ -90,6 +91,8 @@ pub struct Network<T> {
     pub frictions: Vec<FrictionElement<T>>,
     /// Lossy gears.
     pub losses: Vec<LossyGear<T>>,
+    /// Gears with tables of losses.
+    pub table_losses: Vec<TableLoss>,
     /// Prescribed speeds over the independent speeds, and their inputs.
     pub prescribed: Vec<(Vec<T>, usize)>,
     /// Scalar channels: frictions first.
@@ -132,6 +135,7 @@ impl<T: Number> Network<T> {
             mechanism,
             frictions: Vec::new(),
             losses: Vec::new(),
+            table_losses: Vec::new(),
             prescribed: Vec::new(),
             channels: Vec::new(),
             applied_torques: Vec::new(),
@@ -366,6 +370,11 @@ impl<T: Number> Network<T> {
                 // That of the channel to come.
                 _ => self.basis(),
             };
+            if let ForceLaw::Loss { constraint: Some(constraint), map, .. } = &force.law {
+                let (constraint, channel, map) = (*constraint, self.channels.len(), map.clone());
+                let element = force.element.clone();
+                self.table_losses.push(TableLoss { element, constraint, channel, map });
+            }
             self.channels.extend(self.channel_of(&force.law));
             if let Some(time) = force.lag {
                 self.lags.push(FirstOrderLag { target: basis, time });
@@ -403,6 +412,10 @@ impl<T: Number> Network<T> {
                 let law = TorqueLaw::Slip { stiffness: *stiffness, least_speed: *least_speed };
                 NonlinearTorque { law, arguments: vec![slip, road] }
             }
+            ForceLaw::Loss { slip, constraint, map } => NonlinearTorque {
+                law: TorqueLaw::Loss { map: map.clone(), coupled: constraint.is_some() },
+                arguments: vec![self.over_states(&self.over_speeds(slip))],
+            },
         })
     }
 

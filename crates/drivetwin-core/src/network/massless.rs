@@ -66,6 +66,9 @@ impl<T: Number> Network<T> {
             ForceLaw::Quadratic { node, .. } | ForceLaw::Map { node, .. } => moves(*node),
             ForceLaw::Converter { pump, turbine, .. } => moves(*pump) || moves(*turbine),
             ForceLaw::Slip { wheel, road, .. } => moves(*wheel) || moves(*road),
+            ForceLaw::Loss { slip, constraint, .. } => {
+                touches(slip) || constraint.is_some_and(|i| touches(&m.constraints[i].row))
+            }
         };
         is_nothing(self.mass[(j, j)])
             && m.springs.iter().any(|s| touches(&s.row))

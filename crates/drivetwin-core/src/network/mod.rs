@@ -11,12 +11,14 @@
 //! with inputs u and scalar channels φ: the torque of every slipping friction element and of every
 //! force law that is not linear.
 
+mod branch;
 mod compile;
 mod constraint_forces;
 mod constraints;
 mod error;
 mod impulse;
 pub mod linalg;
+pub mod loss_coupling;
 mod massless;
 pub mod mobility;
 mod mode;
@@ -26,9 +28,12 @@ pub mod reduction;
 pub mod smooth_law;
 mod spectral_radius;
 pub mod statics;
+mod table_loss;
 
+pub use branch::Branch;
 pub use compile::{FrictionElement, LossyGear, Network};
 pub use error::CompileError;
 pub use impulse::{Demand, Impulse, ImpulseFault};
 pub use mode::{GearBounds, GearState, Mode, ModeKey, RowId};
-pub use nonlinear_torque::{Branch, NonlinearTorque};
+pub use nonlinear_torque::NonlinearTorque;
+pub use table_loss::TableLoss;

@@ -96,6 +96,8 @@ pub struct Mode<T> {
     multipliers: OnceLock<Matrix<T>>,
     /// See [`Mode::gear_torque`].
     gear_torque: OnceLock<Matrix<T>>,
+    /// See [`Mode::table_torque`].
+    pub(super) table_torque: OnceLock<Matrix<T>>,
     /// True if more rows stick than there are speeds to hold. The torque split then depends on the
     /// capacities.
     pub redundant: bool,
@@ -212,6 +214,7 @@ impl<T: Number> Network<T> {
             derivative,
             multipliers: OnceLock::new(),
             gear_torque: OnceLock::new(),
+            table_torque: OnceLock::new(),
             stuck_torque: found.torque,
             stuck,
             redundant: found.redundant,

@@ -4,59 +4,15 @@
 //! Within a branch (a direction of slip, a piece of a table) each is analytic; the solver searches for
 //! crossings of the branch's boundaries.
 
+use super::branch::{
+    Branch, BranchBoundary, between, loss_boundaries, scaled, slip_boundaries, weighted,
+};
 use super::linalg::is_zero;
 use crate::model::converter_map::ConverterMap;
 use crate::model::friction::{Decay, FrictionLaw};
 use crate::model::mechanism::{Normal, Region, TwistForm};
 use crate::model::torque_map::{TorqueMap, span_index};
 use crate::number::{Number, Series, TERMS, Values, product_term};
-
-/// Analytic branch of a torque law.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Branch {
-    /// No torque.
-    #[default]
-    Off,
-    /// Friction at rest relative to the other side, loaded to its static capacity.
-    Saturated {
-        /// Sign of the torque.
-        sign: f64,
-    },
-    /// Moving in one direction, on piece `piece` of a table.
-    Moving {
-        /// Sign of the speed.
-        sign: f64,
-        /// Piece of the table, 0 without one.
-        piece: usize,
-    },
-    /// Spans of throttle and speed of a torque map.
-    Map {
-        /// Throttle span.
-        throttle: usize,
-        /// Speed span.
-        speed: usize,
-    },
-    /// Span of the speed ratio of a converter.
-    Converter {
-        /// Index of the span.
-        index: usize,
-        /// Sign of the pump speed: turning backwards, its torques are those of a mirror.
-        sign: f64,
-    },
-    /// Direction of the road below a tyre.
-    Slip {
-        /// Its sign; 0 below the least speed.
-        sign: f64,
-    },
-    /// Region of a piecewise linear compliance.
-    Region {
-        /// Its index.
-        index: usize,
-    },
-}
-
-/// A boundary of a branch: a series that must stay positive, and the branch beyond.
-pub type BranchBoundary<T> = (Series<T>, Branch);
 
 /// A law over one or two linear forms of the state, and the inputs.
 #[derive(Clone, Debug)]
@@ -92,6 +48,15 @@ pub enum TorqueLaw<T> {
         stiffness: T,
         /// Least speed of the road that a slip is related to, rad/s.
         least_speed: f64,
+    },
+    /// Loss torque over the slip and the torque through a gear, see [`Network::table_losses`].
+    ///
+    /// [`Network::table_losses`]: crate::network::Network::table_losses
+    Loss {
+        /// Loss torque over transmitted torque, in place of a throttle, and slip from zero on.
+        map: TorqueMap,
+        /// True if it depends on the torque through a gear, the second argument.
+        coupled: bool,
     },
     /// Piecewise linear compliance over twist and its rate.
     Regions(Vec<Region<T>>),
@@ -191,8 +156,27 @@ impl<T: Number> NonlinearTorque<T> {
     pub fn is_product(&self) -> bool {
         matches!(
             self.law,
-            TorqueLaw::Quadratic(_) | TorqueLaw::Map { .. } | TorqueLaw::Converter { .. }
+            TorqueLaw::Quadratic(_)
+                | TorqueLaw::Map { .. }
+                | TorqueLaw::Converter { .. }
+                | TorqueLaw::Loss { .. }
         )
+    }
+
+    /// Return true if the second argument is the torque through a gear, which follows from all torques.
+    pub fn is_coupled(&self) -> bool {
+        matches!(self.law, TorqueLaw::Loss { coupled: true, .. })
+    }
+
+    /// Loss torque per torque through the gear, at a slip [rad/s]; zero of other laws.
+    pub fn loss_slope(&self, branch: Branch, slip: T) -> T {
+        match (&self.law, branch) {
+            (TorqueLaw::Loss { map, .. }, Branch::Loss { sign, torque, speed }) => {
+                let cell = map.cell(torque, speed);
+                slip * (cell.t11 * sign) + cell.t10
+            }
+            _ => T::zero_(),
+        }
     }
 
     /// Slip over which stiction decays by e, rad/s, and stiction itself.
@@ -261,6 +245,12 @@ impl<T: Number> NonlinearTorque<T> {
                     quotient_term(*stiffness * s[k] * sign, &c.torque, r, k)
                 }
             }
+            (TorqueLaw::Loss { map, .. }, Branch::Loss { sign, torque, speed }) => {
+                let cell = map.cell(torque, speed);
+                let bilinear = product_term(r, s, k) * (cell.t11 * sign);
+                let linear = bilinear + r[k] * cell.t10 + s[k] * cell.t01;
+                if k == 0 { linear + cell.t00 * sign } else { linear }
+            }
             (TorqueLaw::Regions(regions), Branch::Region { index }) => {
                 let TwistForm { constant, per_twist, per_rate } = regions[index].torque;
                 let linear = per_twist * s[k] + per_rate * r[k];
@@ -317,6 +307,11 @@ impl<T: Number> NonlinearTorque<T> {
                 let sign = |r: f64| if r.abs() < *least_speed { 0.0 } else { r.signum() };
                 Branch::Slip { sign: r.decide(sign) }
             }
+            TorqueLaw::Loss { map, .. } => Branch::Loss {
+                sign,
+                torque: span_index(&map.throttle, 0.0),
+                speed: s.decide(|s| span_index(&map.speed, (s * sign).max(0.0))),
+            },
             TorqueLaw::Regions(regions) => {
                 let (s, r) = (T::promote(s), T::promote(r));
                 let left = |(border, _): &(TwistForm<T>, usize)| border.at(s, r).re();
@@ -382,6 +377,10 @@ impl<T: Number> NonlinearTorque<T> {
             (TorqueLaw::Slip { least_speed, .. }, Branch::Slip { sign }) => {
                 slip_boundaries(r, *least_speed, sign)
             }
+            (TorqueLaw::Loss { map, coupled }, Branch::Loss { sign, .. }) => {
+                let torques = if *coupled { Some(scaled(r, sign)) } else { None };
+                loss_boundaries(map, branch, &scaled(s, sign), torques)
+            }
             (TorqueLaw::Regions(regions), Branch::Region { index }) => {
                 let border = |&(form, next): &(TwistForm<T>, usize)| {
                     let mut series = weighted(s, form.per_twist, r, form.per_rate);
@@ -393,40 +392,4 @@ impl<T: Number> NonlinearTorque<T> {
             _ => Vec::new(),
         }
     }
-}
-
-/// Boundaries of a tyre on a road of speed `road` in direction `sign`, 0 below the least speed.
-fn slip_boundaries<T: Number>(
-    road: &Series<T>,
-    least_speed: f64,
-    sign: f64,
-) -> Vec<BranchBoundary<T>> {
-    if sign == 0.0 {
-        let ends = between(road, (-least_speed, least_speed));
-        return ends.map(|(border, step)| (border, Branch::Slip { sign: step as f64 })).collect();
-    }
-    let mut border = scaled(road, sign);
-    border[0] -= T::of(least_speed);
-    vec![(border, Branch::Slip { sign: 0.0 })]
-}
-
-fn scaled<T: Number>(series: &Series<T>, factor: f64) -> Series<T> {
-    series.map(|c| c * factor)
-}
-
-fn weighted<T: Number>(a: &Series<T>, wa: T, b: &Series<T>, wb: T) -> Series<T> {
-    std::array::from_fn(|k| a[k] * wa + b[k] * wb)
-}
-
-/// Distances to the ends of a span that exist, each with the step to the neighbouring branch.
-fn between<T: Number>(
-    series: &Series<T>,
-    span: (f64, f64),
-) -> impl Iterator<Item = (Series<T>, isize)> {
-    let mut above = *series;
-    above[0] -= span.0;
-    let mut below = scaled(series, -1.0);
-    below[0] += span.1;
-    let finite = [(span.0, (above, -1)), (span.1, (below, 1))];
-    finite.into_iter().filter(|(end, _)| end.is_finite()).map(|(_, border)| border)
 }

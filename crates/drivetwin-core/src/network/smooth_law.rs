@@ -2,7 +2,7 @@
 //! The laws of smooth channels and of normal loads in one form, as the inner loop over samples evaluates
 //! them.
 
-use super::nonlinear_torque::Branch;
+use super::branch::Branch;
 use super::nonlinear_torque::{NonlinearTorque, TorqueLaw};
 use crate::model::FrictionLaw;
 use crate::model::mechanism::Normal;

@@ -71,6 +71,8 @@ pub(super) fn visit_powers<T: Number>(
             Some(Account::Source) => add(PowerKind::Source, power),
             Some(Account::Load) => add(PowerKind::Load, -power),
             Some(Account::Converter) => add(PowerKind::Converter, -power),
+            Some(Account::Gear) => add(PowerKind::Gear, -power),
+            Some(Account::Drag) => add(PowerKind::Friction, -power),
             None => add(PowerKind::Damper, -power),
         }
     }

@@ -40,7 +40,7 @@ pub struct Linear {
 
 /// Linearise with `locked` elements at rest and others slipping as stated; elements that are in neither
 /// list are open. Loads that depend on speed and laws without a slope at hand (maps, converters, tables
-/// of twist) are taken as constant.
+/// of twist and of losses) are taken as constant.
 pub fn linearise(
     network: &Network<f64>,
     locked: &[String],
@@ -88,7 +88,7 @@ pub fn linearise(
         };
         let row = output.find(network)?.row(network, &mode, torque);
         let row =
-            over(&row.ok_or_else(|| StartError::NotLinear { output: format!("{output:?}") })?);
+            over(&row.ok_or_else(|| StartError::NotLinear { output: output.to_string() })?);
         linear.c.row_mut(i).copy_from_slice(&row[..n]);
         linear.d.row_mut(i).copy_from_slice(&row[n..]);
     }

@@ -30,7 +30,7 @@ pub fn torque(node: &str, input: &str) -> Element<f64> {
 
 pub fn gear(a: &str, b: &str, ratio: f64) -> Element<f64> {
     let name = format!("gear {a} {b}").into();
-    Element::Gear(Gear { name, a: a.into(), b: b.into(), ratio, loss: None })
+    Element::Gear(Gear { name, a: a.into(), b: b.into(), ratio, loss: None, losses: None })
 }
 
 pub fn shaft(a: &str, b: &str, stiffness: f64, damping: f64) -> Element<f64> {
@@ -55,6 +55,7 @@ pub fn clutch(name: &str, a: &str, b: &str) -> Clutch<f64> {
         peak: 1.0,
         pressure: format!("P {name}").into(),
         drum_inertia: 0.0,
+        drag: None,
     }
 }
 

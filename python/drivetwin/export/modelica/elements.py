@@ -22,6 +22,7 @@ from drivetwin.export.modelica.friction import (
     build_one_way_clutch,
 )
 from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR, SPRING_TABLE, TYRE
+from drivetwin.export.modelica.losses import add_planetary_losses, build_loss_gear
 from drivetwin.export.modelica.text import format_matrix
 from drivetwin.simulation.network import Element
 
@@ -50,6 +51,8 @@ def _build_inertia(element: Element, names: Names) -> Part:
 
 
 def _build_gear(element: Element, names: Names) -> Part:
+    if element.get("losses") is not None:
+        return build_loss_gear(element, names)
     name = names.elements[element["name"]]
     flanges = (("flange_a", element["a"]), ("flange_b", element["b"]))
     ratio, loss = format_values(ratio=element["ratio"]), element.get("loss")
@@ -74,7 +77,7 @@ def _build_planetary(element: Element, names: Names) -> Part:
     gears = Component(kind, name, format_values(ratio=z), (*shafts, ("ring", element["ring"])))
     spin = element.get("planet_inertia", 0.0)
     if spin == 0.0:
-        return Part((gears,))
+        return add_planetary_losses(Part((gears,)), element.get("losses"))
     planet = f"{name} planets"
     pinions = Component(
         kind, f"{name}_pinions", format_values(ratio=(z - 1.0) / 2.0), (*shafts, ("ring", planet))
@@ -82,7 +85,7 @@ def _build_planetary(element: Element, names: Names) -> Part:
     mass = Component(
         f"{_COMPONENTS}.Inertia", f"{name}_planets", format_values(J=spin), (("flange_a", planet),)
     )
-    return Part((gears, pinions, mass))
+    return add_planetary_losses(Part((gears, pinions, mass)), element.get("losses"))
 
 
 def _build_spring_damper(element: Element, names: Names) -> Part:

@@ -22,6 +22,7 @@ from drivetwin.export.modelica.component import (
     format_values,
 )
 from drivetwin.export.modelica.helpers import SLIP_INERTIA
+from drivetwin.export.modelica.losses import add_drag
 from drivetwin.export.modelica.text import format_matrix
 from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import Stribeck
@@ -47,11 +48,13 @@ def build_clutch(element: Element, names: Names) -> Part:
         _build_friction_component(f"{ROTATIONAL}.Components.{kind}", element, flanges, names),
         rest=rest,
     )
+    part = add_drag(part, element, names)
     drum = element.get("drum_inertia", 0.0)
     if drum == 0.0:
         return part
     inertia = Component(SLIP_INERTIA, f"{name}_drum", format_values(J=drum), both)
-    return replace(part, components=(*part.components, inertia), helpers=frozenset({SLIP_INERTIA}))
+    helpers = part.helpers | {SLIP_INERTIA}
+    return replace(part, components=(*part.components, inertia), helpers=helpers)
 
 
 def build_one_way_clutch(element: Element, names: Names) -> Part:

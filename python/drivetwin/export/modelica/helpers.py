@@ -8,6 +8,9 @@ PAPER_GEAR = "ConstantEfficiencyGear"
 CONVERTER = "TorqueConverter"
 SPRING_TABLE = "SpringTable"
 TYRE = "TyreSlip"
+LOSS_GEAR = "LossTableGear"
+LOSS_PLANETARY = "LossTablePlanetary"
+DRAG = "ClutchDrag"
 
 HELPERS = {
     SLIP_INERTIA: """\
@@ -76,5 +79,59 @@ HELPERS = {
     flange_a.tau = slip_stiffness*slip;
     flange_b.tau = -flange_a.tau;
   end TyreSlip;
+""",
+    LOSS_GEAR: """\
+  model LossTableGear "Gear with a table of its loss torque over speed and torque of flange_a"
+    extends Modelica.Mechanics.Rotational.Interfaces.PartialTwoFlanges;
+    parameter Real ratio "Speed of flange_a over speed of flange_b";
+    parameter Real losses[:, :] "Torques in the first column, speeds in the first row; N.m, rad/s";
+    Modelica.Units.SI.AngularVelocity w;
+    Modelica.Units.SI.Torque loss;
+    Modelica.Blocks.Tables.CombiTable2Ds table(
+      table=losses,
+      extrapolation=Modelica.Blocks.Types.Extrapolation.HoldLastPoint);
+  equation
+    flange_a.phi = ratio*flange_b.phi;
+    w = der(flange_a.phi);
+    table.u1 = noEvent(if w < 0 then -flange_a.tau else flange_a.tau);
+    table.u2 = noEvent(abs(w));
+    loss = noEvent(if w < 0 then -table.y else table.y);
+    0 = flange_b.tau + ratio*(flange_a.tau - loss);
+  end LossTableGear;
+""",
+    LOSS_PLANETARY: """\
+  model LossTablePlanetary "Planetary set with a table of its loss torque between sun and carrier"
+    parameter Real ratio "Ring over sun teeth";
+    parameter Real losses[:, :] "Torques in the first column, speeds in the first row; N.m, rad/s";
+    Modelica.Mechanics.Rotational.Interfaces.Flange_a sun;
+    Modelica.Mechanics.Rotational.Interfaces.Flange_a carrier;
+    Modelica.Mechanics.Rotational.Interfaces.Flange_b ring;
+    Modelica.Units.SI.AngularVelocity w "Speed of the sun relative to the carrier";
+    Modelica.Units.SI.Torque loss;
+    Modelica.Blocks.Tables.CombiTable2Ds table(
+      table=losses,
+      extrapolation=Modelica.Blocks.Types.Extrapolation.HoldLastPoint);
+  equation
+    (1 + ratio)*carrier.phi = sun.phi + ratio*ring.phi;
+    w = der(sun.phi) - der(carrier.phi);
+    table.u1 = noEvent(if w < 0 then -sun.tau else sun.tau);
+    table.u2 = noEvent(abs(w));
+    loss = noEvent(if w < 0 then -table.y else table.y);
+    ring.tau = ratio*(sun.tau - loss);
+    carrier.tau = -(sun.tau + ring.tau);
+  end LossTablePlanetary;
+""",
+    DRAG: """\
+  model ClutchDrag "Drag torque of a clutch over its slip"
+    extends Modelica.Mechanics.Rotational.Interfaces.PartialCompliantWithRelativeStates;
+    parameter Real drag[:, 2] "Slip [rad/s] from zero on, torque [N.m]";
+    Modelica.Blocks.Tables.CombiTable1Ds table(
+      table=drag,
+      columns={2},
+      extrapolation=Modelica.Blocks.Types.Extrapolation.HoldLastPoint);
+  equation
+    table.u = noEvent(abs(w_rel));
+    tau = noEvent(if w_rel < 0 then -table.y[1] else table.y[1]);
+  end ClutchDrag;
 """,
 }

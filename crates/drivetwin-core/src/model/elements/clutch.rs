@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 //! A friction clutch, or a brake where one side is the ground (paper eqs. 4-6).
 
-use crate::model::Name;
 use crate::model::error::{ModelError, require, require_apart};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Friction, Inertia, Mechanism, Normal};
+use crate::model::{DragTable, Name};
 use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
@@ -32,12 +32,16 @@ pub struct Clutch<T> {
     /// Inertia that turns with the slip (a brake's drum in the dual-clutch picture,
     /// THEORY section 2), kg·m². Must be >= 0.
     pub drum_inertia: T,
+    /// Drag torque over the slip, beside the friction; none if absent.
+    #[serde(default)]
+    pub drag: Option<DragTable>,
 }
 
 impl<T: Number> Clutch<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         self.friction.check(&self.name)?;
+        self.drag.as_ref().map_or(Ok(()), |drag| drag.check(&self.name))?;
         require(&self.name, "gain", self.gain.re(), |v| v >= 0.0, ">= 0 m^3")?;
         require(&self.name, "p0", self.p0.re(), |_| true, "finite")?;
         require(&self.name, "peak", self.peak.re(), |v| v >= 1.0, ">= 1")?;
@@ -48,6 +52,9 @@ impl<T: Number> Clutch<T> {
         let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, T::of(-1.0))]);
         let normal =
             Normal::Pressure { input: m.input(&self.pressure), gain: self.gain, p0: self.p0 };
+        if let Some(drag) = &self.drag {
+            m.add_loss(&self.name, row.clone(), None, drag.map());
+        }
         m.inertias.push(Inertia {
             element: self.name.clone(),
             row: row.clone(),

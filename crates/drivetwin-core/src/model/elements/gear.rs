@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! A gear pair, with a lumped efficiency where stated (THEORY section 3).
 
-use crate::model::Name;
-use crate::model::error::{ModelError, require, require_apart};
+use crate::model::error::{ModelError, require, require_apart, require_moving};
 use crate::model::mechanism::{Constraint, Loss, LossLaw, Mechanism};
+use crate::model::{LossTable, Name};
 use crate::number::{Number, Values};
 use serde::{Deserialize, Serialize};
 
@@ -76,19 +76,30 @@ pub struct Gear<T> {
     /// Loss; none if absent.
     #[serde(default = "Option::default")]
     pub loss: Option<GearLoss<T>>,
+    /// Loss torque at `a` over its speed and the torque that enters there; taken off before
+    /// `loss`.
+    #[serde(default)]
+    pub losses: Option<LossTable>,
 }
 
 impl<T: Number> Gear<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         require(&self.name, "ratio", self.ratio.re(), |v| v != 0.0, "not 0")?;
-        self.loss.as_ref().map_or(Ok(()), |loss| loss.check(&self.name))
+        self.loss.as_ref().map_or(Ok(()), |loss| loss.check(&self.name))?;
+        let Some(losses) = &self.losses else { return Ok(()) };
+        require_moving(&self.name, &self.a)?;
+        losses.check(&self.name)
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, -self.ratio)]);
         let driving = m.node(&self.a);
         let loss = self.loss.as_ref().map(|loss| loss.state(driving));
+        if let Some(losses) = &self.losses {
+            let slip = Mechanism::single(driving);
+            m.add_loss(&self.name, slip, Some(m.constraints.len()), losses.map());
+        }
         m.constraints.push(Constraint { element: self.name.clone(), row, loss });
     }
 }

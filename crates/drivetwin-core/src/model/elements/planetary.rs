@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! A planetary gear set.
 
-use crate::model::Name;
 use crate::model::error::{ModelError, require};
 use crate::model::mechanism::{Constraint, Inertia, Mechanism};
+use crate::model::{LossTable, Name};
 use crate::number::{Number, Values};
 use serde::{Deserialize, Serialize};
 
@@ -26,11 +26,16 @@ pub struct Planetary<T> {
     /// pinions (z > 1), 0 for others. Their orbiting mass belongs to the carrier. Must be >= 0.
     #[serde(default = "Option::default")]
     pub planet_inertia: Option<T>,
+    /// Loss torque between sun and carrier over their relative speed and the torque that enters at the sun;
+    /// none if absent.
+    #[serde(default)]
+    pub losses: Option<LossTable>,
 }
 
 impl<T: Number> Planetary<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require(&self.name, "z", self.z.re(), |z| z != 0.0 && z != -1.0, "neither 0 nor -1")?;
+        self.losses.as_ref().map_or(Ok(()), |losses| losses.check(&self.name))?;
         let Some(spin) = self.planet_inertia else { return Ok(()) };
         require(&self.name, "planet_inertia", spin.re(), |v| v >= 0.0, ">= 0 kg m^2")?;
         if spin.re().decide(|v| v == 0.0) {
@@ -48,6 +53,10 @@ impl<T: Number> Planetary<T> {
             let pinion = (self.z - 1.0).recip() * 2.0;
             let spin = m.row(&[(&self.carrier, pinion + 1.0), (&self.sun, -pinion)]);
             m.inertias.push(Inertia { element: self.name.clone(), row: spin, inertia });
+        }
+        if let Some(losses) = &self.losses {
+            let slip = m.row(&[(&self.sun, one), (&self.carrier, -one)]);
+            m.add_loss(&self.name, slip, Some(m.constraints.len()), losses.map());
         }
         m.constraints.push(Constraint { element: self.name.clone(), row, loss: None });
     }

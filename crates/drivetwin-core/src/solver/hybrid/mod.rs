@@ -2,9 +2,11 @@
 //! Hybrid automaton of the driveline: modes, guards, events and Taylor steps between them.
 
 pub(crate) mod active_set;
+mod decision_basis;
 pub(crate) mod event;
 pub(crate) mod event_search;
 mod impulse;
+mod loss_cells;
 pub(crate) mod mode_cache;
 pub(crate) mod stall;
 pub(crate) mod state;

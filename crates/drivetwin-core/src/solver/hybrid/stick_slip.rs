@@ -5,14 +5,14 @@
 use crate::network::linalg::{Matrix, independent_rows};
 use crate::network::nonlinear_torque::form;
 use crate::network::{Branch, GearState, Mode, ModeKey, RowId};
-use crate::number::{Number, Values, evaluate};
+use crate::number::{Number, Values};
 use crate::solver::hybrid::active_set::ActiveSet;
 use crate::solver::hybrid::event::{FrictionState, signum_nonneg};
 use crate::solver::hybrid::state::HybridState;
 use crate::solver::status::Status;
 use crate::solver::tolerances::{
-    BOUND_RTOL, FORCED_ACCELERATION_RTOL, STRICT_MARGIN_RTOL, SUM_RTOL, T_PLUS, T_PLUS_SHARE,
-    TORQUE_ATOL, ZERO_SLIP_RTOL, negligible, sum_and_scale,
+    BOUND_RTOL, FORCED_ACCELERATION_RTOL, STRICT_MARGIN_RTOL, SUM_RTOL, TORQUE_ATOL,
+    ZERO_SLIP_RTOL, negligible, sum_and_scale,
 };
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ impl<T: Number> HybridState<'_, T> {
     /// Decide anew the state of everything at zero speed. `overloaded` names what has just reached
     /// its bound, with the torque's sign.
     pub(crate) fn decide(&mut self, overloaded: Option<(RowId, f64)>) -> Result<(), Status> {
-        self.evaluate_at_t_plus();
+        self.evaluate_at_t_plus()?;
         let candidates = self.at_zero_speed();
         self.check_forced(&candidates)?;
         let mut trial = self.assignment();
@@ -49,7 +49,7 @@ impl<T: Number> HybridState<'_, T> {
         let mut visited: Vec<ActiveSet> = Vec::new();
         loop {
             let mode = self.mode(self.key_of(&trial))?;
-            let basis = self.basis_now(&trial, &candidates);
+            let basis = self.basis_now(&trial, &candidates, &mode)?;
             let Some(fault) = self.fault(&trial, &candidates, &mode, &basis) else {
                 let moving = trial.moving_off(&candidates).0;
                 if moving == 0
@@ -59,7 +59,7 @@ impl<T: Number> HybridState<'_, T> {
                     let after = overloaded.is_some();
                     let (trial, mode) =
                         self.restick_if_feasible(trial, mode, basis, &candidates, after);
-                    self.adopt(trial, &candidates, mode);
+                    self.adopt(trial, &candidates, mode)?;
                 }
                 return Ok(());
             };
@@ -108,14 +108,13 @@ impl<T: Number> HybridState<'_, T> {
                 break;
             }
             let Ok(mode) = self.mode(self.key_of(&trial)) else { continue };
-            let basis = self.basis_now(&trial, candidates);
+            let Ok(basis) = self.basis_now(&trial, candidates, &mode) else { continue };
             let is_right = self.fault(&trial, candidates, &mode, &basis).is_none()
                 && (moving.is_none()
                     || self.is_strictly_feasible(&mode, &basis)
                         && self.violates_static_limit(&trial, candidates, &mode));
             if is_right {
-                self.adopt(trial, candidates, mode);
-                return true;
+                return self.adopt(trial, candidates, mode).is_ok();
             }
         }
         false
@@ -150,7 +149,7 @@ impl<T: Number> HybridState<'_, T> {
                 continue;
             }
             let Ok(mode_held) = self.mode(self.key_of(&held)) else { continue };
-            let basis_held = self.basis_now(&held, candidates);
+            let Ok(basis_held) = self.basis_now(&held, candidates, &mode_held) else { continue };
             if self.fault(&held, candidates, &mode_held, &basis_held).is_none() {
                 (trial, mode) = (held, mode_held);
             }
@@ -171,8 +170,8 @@ impl<T: Number> HybridState<'_, T> {
                 at_capacity.rows[j] = FrictionState::Saturated { sign };
             }
         }
-        let basis = self.basis_now(&at_capacity, candidates);
-        self.returning(trial, candidates, mode, &basis).is_none()
+        let basis = self.basis_now(&at_capacity, candidates, mode);
+        basis.is_ok_and(|basis| self.returning(trial, candidates, mode, &basis).is_none())
     }
 
     /// Return true if every holding torque lies strictly within its bounds.
@@ -205,29 +204,11 @@ impl<T: Number> HybridState<'_, T> {
         Some(trial)
     }
 
-    /// Inputs and state a moment from now, as the present mode would have them: where torques and
-    /// capacities agree, or all start from zero, their rates decide.
-    fn evaluate_at_t_plus(&mut self) {
-        let remaining = self.remaining.re().larger(T::Values::zero_());
-        let moment = T::promote((remaining * T_PLUS_SHARE).smaller(T::Values::of(T_PLUS)));
-        let order = self.expansion.input_order();
-        for (ahead, now) in self.inputs_plus.iter_mut().zip(&self.expansion.inputs) {
-            *ahead = *now;
-            ahead[0] = evaluate(now, order, moment);
-        }
-        self.x_plus.clone_from(&self.x);
-        let mut basis = self.basis_without_channels();
-        basis.extend((0..self.network.channels.len()).map(|i| self.channel_plus(i)));
-        for (i, ahead) in self.x_plus.iter_mut().enumerate() {
-            *ahead += form(self.mode.derivative.row(i), &basis) * moment;
-        }
-    }
-
-    fn assignment(&self) -> ActiveSet {
+    pub(super) fn assignment(&self) -> ActiveSet {
         ActiveSet { rows: self.rows.clone(), gears: self.gears.clone() }
     }
 
-    fn at_zero_speed(&self) -> Vec<RowId> {
+    pub(super) fn at_zero_speed(&self) -> Vec<RowId> {
         let near = |row: RowId| {
             let slip = self.network.slip_of(row);
             let terms = slip.iter().zip(&self.x);
@@ -247,44 +228,6 @@ impl<T: Number> HybridState<'_, T> {
     fn key_of(&self, trial: &ActiveSet) -> ModeKey {
         let stuck = (0..trial.rows.len()).filter(|&j| trial.rows[j] == FrictionState::Sticking);
         ModeKey::new(stuck, &trial.gears)
-    }
-
-    /// The basis at this instant under a trial.
-    fn basis_now(&mut self, trial: &ActiveSet, candidates: &[RowId]) -> Vec<T> {
-        let mut basis = self.basis_without_channels();
-        for (j, row) in self.network.frictions.iter().enumerate() {
-            let at_rest = candidates.contains(&RowId::Friction(j));
-            let slip = if at_rest { T::zero_() } else { form(&row.slip, &self.x_plus) };
-            let normal = self.normal(j);
-            basis.push(match trial.rows[j] {
-                FrictionState::Slipping { sign } => row.law.at(slip * sign) * normal * sign,
-                FrictionState::Saturated { sign } => {
-                    row.law.at(T::zero_()) * row.peak * normal * sign
-                }
-                FrictionState::Sticking | FrictionState::Open => T::zero_(),
-            });
-        }
-        let others = self.network.frictions.len()..self.network.channels.len();
-        basis.extend(others.map(|i| self.channel_plus(i)));
-        basis
-    }
-
-    /// Normal load of an element now, cut at zero.
-    fn normal(&self, j: usize) -> T {
-        let normal = self.network.frictions[j].normal.term(&self.inputs_plus, 0);
-        if self.pressed[j] && normal.re().decide(|normal| normal > 0.0) {
-            normal
-        } else {
-            T::zero_()
-        }
-    }
-
-    /// Static capacities of the friction elements.
-    pub(crate) fn capacities(&self) -> Vec<T> {
-        let capacity = |(j, row): (usize, &crate::network::FrictionElement<T>)| {
-            row.law.at(T::zero_()) * row.peak * self.normal(j)
-        };
-        self.network.frictions.iter().enumerate().map(capacity).collect()
     }
 
     fn fault(
@@ -466,7 +409,15 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Make a trial the state of the run.
-    fn adopt(&mut self, trial: ActiveSet, candidates: &[RowId], mode: Arc<Mode<T>>) {
+    fn adopt(
+        &mut self,
+        trial: ActiveSet,
+        candidates: &[RowId],
+        mode: Arc<Mode<T>>,
+    ) -> Result<(), Status> {
+        if !self.network.table_losses.is_empty() {
+            self.basis_now(&trial, candidates, &mode)?;
+        }
         self.released.iter_mut().for_each(|r| *r = false);
         for &row in candidates {
             let index = self.index_of(row);
@@ -493,5 +444,6 @@ impl<T: Number> HybridState<'_, T> {
             };
         }
         self.mode = mode;
+        Ok(())
     }
 }

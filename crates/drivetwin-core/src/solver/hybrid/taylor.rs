@@ -2,8 +2,9 @@
 //! Taylor expansion in time of the whole state in one mode.
 
 use crate::network::linalg::is_zero;
+use crate::network::loss_coupling::LossCoupling;
 use crate::network::nonlinear_torque::{ChannelSeries, form};
-use crate::network::{Branch, Mode, Network, NonlinearTorque};
+use crate::network::{Branch, Mode, Network, NonlinearTorque, TableLoss};
 use crate::number::{INVERSE, KernelFloat, Number, Series, TERMS, Values, evaluate, slope};
 use crate::solver::settings::Accuracy;
 use crate::solver::tolerances::{MAX_STICTION_EXPONENT_CHANGE, STICTION_RANGE};
@@ -23,6 +24,8 @@ pub struct TaylorExpansion<T> {
     basis: Vec<T>,
     /// 1 over the scale of each state, without derivatives.
     scales: Vec<T>,
+    /// Coupling of the losses of gears by tables.
+    losses: Option<LossCoupling<T>>,
 }
 
 impl<T: Number> TaylorExpansion<T> {
@@ -35,6 +38,7 @@ impl<T: Number> TaylorExpansion<T> {
             order: 0,
             basis: Vec::with_capacity(network.basis()),
             scales: vec![T::zero_(); network.states()],
+            losses: None,
         }
     }
 
@@ -86,11 +90,11 @@ impl<T: Number> TaylorExpansion<T> {
         // Runs whose series ends with each order, as bits.
         let mut ended = [0; TERMS];
         for k in 0..last {
-            self.channel_terms(network, branches, k);
             // Of lines only two coefficients are left to enter, and the zeros after them.
             if k <= 2 || curved {
                 self.input_terms(network, k);
             }
+            self.channel_terms(network, mode, branches, k);
             power *= h;
             let size = self.next_term(mode, k);
             sizes[k + 1] = power * if curved { size.larger(self.input_size(k + 1)) } else { size };
@@ -100,12 +104,12 @@ impl<T: Number> TaylorExpansion<T> {
                 growing &= !ended[k + 1];
             }
             if growing == 0 {
-                self.finish(network, branches, k + 1, &ended);
+                self.finish(network, mode, branches, k + 1, &ended);
                 return self.within_decay(network, branches, h);
             }
         }
         ended[last] |= growing;
-        self.finish(network, branches, last, &ended);
+        self.finish(network, mode, branches, last, &ended);
         if accuracy.order.is_some() {
             return h;
         }
@@ -182,11 +186,15 @@ impl<T: Number> TaylorExpansion<T> {
     fn finish(
         &mut self,
         network: &Network<T>,
+        mode: &Mode<T>,
         branches: &[Branch],
         order: usize,
         ended: &[u32; TERMS],
     ) {
-        self.channel_terms(network, branches, order);
+        if !network.table_losses.is_empty() {
+            self.input_terms(network, order);
+        }
+        self.channel_terms(network, mode, branches, order);
         self.order = order;
         let mut done = 0;
         for k in 1..order {
@@ -208,7 +216,13 @@ impl<T: Number> TaylorExpansion<T> {
 
     /// Coefficient `k` of the channels from that of the states, both into the basis.
     #[inline(always)]
-    fn channel_terms(&mut self, network: &Network<T>, branches: &[Branch], k: usize) {
+    fn channel_terms(
+        &mut self,
+        network: &Network<T>,
+        mode: &Mode<T>,
+        branches: &[Branch],
+        k: usize,
+    ) {
         let (states, others) = self.basis.split_at_mut(self.states.len());
         for (to, state) in states.iter_mut().zip(&self.states) {
             *to = state[k];
@@ -219,8 +233,38 @@ impl<T: Number> TaylorExpansion<T> {
             for (row, argument) in channel.arguments.iter().zip(&mut series.arguments) {
                 argument[k] = form(row, states);
             }
+            if channel.is_coupled() {
+                series.arguments[1][k] = T::zero_();
+            }
             channel.term(branch, &self.inputs, series, k);
             *torque = series.torque[k];
+        }
+        if !network.table_losses.is_empty() {
+            self.loss_terms(network, mode, branches, k);
+        }
+    }
+
+    /// Coefficient `k` of the torques through gears with tables of losses and of their loss torques, of which
+    /// the basis and the channels have the part without torque.
+    fn loss_terms(&mut self, network: &Network<T>, mode: &Mode<T>, branches: &[Branch], k: usize) {
+        if k == 0 {
+            let slope = |loss: &TableLoss| {
+                let slip = self.channels[loss.channel].arguments[0][0];
+                network.channels[loss.channel].loss_slope(branches[loss.channel], slip)
+            };
+            let slopes = network.table_losses.iter().map(slope).collect();
+            self.losses = LossCoupling::new(network, mode, slopes);
+        }
+        let Some(losses) = &self.losses else {
+            // Undetermined: the run ends with status `not finite`.
+            self.basis.fill(T::of(f64::NAN));
+            return;
+        };
+        let torques = losses.close(network, mode, &mut self.basis);
+        for (loss, torque) in network.table_losses.iter().zip(torques) {
+            let channel = &mut self.channels[loss.channel];
+            channel.arguments[1][k] = torque;
+            channel.torque[k] = self.basis[network.first_channel() + loss.channel];
         }
     }
 
@@ -233,7 +277,8 @@ impl<T: Number> TaylorExpansion<T> {
         }
         let given = &mut self.basis[network.first_rate()..];
         for (to, &(_, input)) in given.iter_mut().zip(&network.prescribed) {
-            *to = self.inputs[input][k + 1] * (k + 1) as f64;
+            let next = self.inputs[input].get(k + 1).copied().unwrap_or_else(T::zero_);
+            *to = next * (k + 1) as f64;
         }
         self.basis[network.one()] = T::of(if k == 0 { 1.0 } else { 0.0 });
     }

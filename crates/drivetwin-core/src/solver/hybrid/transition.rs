@@ -2,7 +2,7 @@
 //! Changes of mode at events and at jumps of the inputs.
 
 use crate::network::nonlinear_torque::form;
-use crate::network::{GearState, RowId};
+use crate::network::{Branch, GearState, RowId};
 use crate::number::{Number, Values};
 use crate::solver::hybrid::active_set::ActiveSet;
 use crate::solver::hybrid::event::{Event, EventCause, EventKind, FrictionState, signum_nonneg};
@@ -48,7 +48,10 @@ impl<T: Number> HybridState<'_, T> {
                 self.decide(None)
             }
             EventCause::BranchBoundary(channel, branch) => {
-                self.branches[channel] = branch;
+                let before = std::mem::replace(&mut self.branches[channel], branch);
+                if self.network.channels[channel].is_coupled() && turns(before, branch) {
+                    return self.settle_cells();
+                }
                 Ok(())
             }
         }
@@ -163,17 +166,21 @@ impl<T: Number> HybridState<'_, T> {
         basis
     }
 
-    /// Torque of a channel for a decision, in its present branch.
+    /// Torque of a channel for a decision, in its present branch; of a gear with a table of losses the part without
+    /// torque.
     pub(crate) fn channel_plus(&mut self, i: usize) -> T {
         let (channel, series) = (&self.network.channels[i], &mut self.channel_plus);
         for (argument, row) in series.arguments.iter_mut().zip(&channel.arguments) {
             argument[0] = form(row, &self.x_plus);
         }
+        if channel.is_coupled() {
+            series.arguments[1][0] = T::zero_();
+        }
         channel.term(self.branches[i], &self.inputs_plus, series, 0);
         series.torque[0]
     }
 
-    fn cell_now(&self, i: usize) -> crate::network::Branch {
+    fn cell_now(&self, i: usize) -> Branch {
         let channel = &self.network.channels[i];
         let mut arguments = [T::Values::zero_(); 2];
         for (argument, row) in arguments.iter_mut().zip(&channel.arguments) {
@@ -216,4 +223,9 @@ impl<T: Number> HybridState<'_, T> {
         let event = |(element, kind)| Event { time, element, kind, energy };
         self.events.extend(events.into_iter().map(event));
     }
+}
+
+/// Return true if a gear with a table of losses turns round.
+fn turns(before: Branch, after: Branch) -> bool {
+    matches!((before, after), (Branch::Loss { sign: a, .. }, Branch::Loss { sign: b, .. }) if a != b)
 }

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""Gears, a planetary set and a clutch with tables of losses against an independent solution.
+
+The reference states the equations of motion anew: at every instant it iterates on the torques that
+enter the gears, reads the tables with SciPy's interpolator and integrates with DOP853.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import RegularGridInterpolator
+
+from drivetwin.errors import InputError
+from drivetwin.modeling.model import Model
+from drivetwin.modeling.plates import Plates
+from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.network import Sine
+
+GEAR = {
+    "speed": [20.0, 60.0, 150.0],
+    "torque": [-80.0, 0.0, 50.0, 200.0],
+    "loss": [[5.0, 6.0, 8.0], [0.5, 1.0, 2.5], [2.0, 2.5, 4.5], [7.0, 9.0, 12.0]],
+}
+SET = {"speed": [10.0, 80.0], "torque": [0.0, 100.0], "loss": [[0.3, 1.5], [3.0, 6.0]]}
+DRAG = {"slip": [5.0, 40.0], "torque": [4.0, 1.5]}
+RATIO, Z = 1.8, 2.2
+INERTIAS = {"a": 0.2, "b": 0.3, "ring": 0.4, "carrier": 2.0}
+END = 4.0
+
+
+def build_model() -> Model:
+    """Build source, gear, planetary set with an open brake at the ring, load."""
+    model = Model("losses")
+    nodes = {name: model.inertia(f"J {name}", inertia) for name, inertia in INERTIAS.items()}
+    model.gear("G", nodes["a"], nodes["b"], ratio=RATIO, losses=GEAR)
+    model.planetary("P", nodes["b"], nodes["ring"], nodes["carrier"], z=Z, losses=SET)
+    model.clutch("B", nodes["ring"], model.ground, pressure=0.0, plates=Plates(drag=DRAG))
+    model.road_load("load", nodes["carrier"], aero=0.05)
+    model.torque("T", nodes["a"], Sine(150.0, 0.9))
+    model.start({nodes["a"]: 40.0, nodes["ring"]: 5.0})
+    return model
+
+
+class Table:
+    """Loss torque with the sign of the speed."""
+
+    def __init__(self, table: dict[str, Any]) -> None:
+        torque = np.array(table["torque"])
+        loss = np.array(table["loss"])
+        if torque[0] >= 0.0:
+            torque, loss = np.r_[-torque[:0:-1], torque], np.r_[loss[:0:-1], loss]
+        speed = np.r_[0.0, table["speed"]]
+        self.low, self.high = (torque[0], 0.0), (torque[-1], speed[-1])
+        padded = np.c_[np.zeros(len(torque)), loss]
+        self.table = RegularGridInterpolator((torque, speed), padded)
+
+    def __call__(self, speed: float, torque: float) -> float:
+        sign = 1.0 if speed >= 0.0 else -1.0
+        point = np.clip([torque * sign, abs(speed)], self.low, self.high)
+        return sign * float(self.table(point)[0])
+
+
+GEAR_TABLE, SET_TABLE = Table(GEAR), Table(SET)
+
+
+def compute_rates(time: float, speeds: FloatArray) -> tuple[FloatArray, float]:
+    """Accelerations of a and ring, and the power lost in gear and set."""
+    a, ring = speeds
+    b = a / RATIO
+    carrier = (b + Z * ring) / (1.0 + Z)
+    drag = np.sign(ring) * np.interp(abs(ring), [0.0, *DRAG["slip"]], [0.0, *DRAG["torque"]])
+    source = 150.0 * np.sin(2.0 * np.pi * 0.9 * time)
+    J = INERTIAS
+    # Unknown: a', ring', torques that enter gear and sun; rows: nodes a, b, ring, carrier.
+    system = np.array(
+        [
+            [J["a"], 0.0, 1.0, 0.0],
+            [J["b"] / RATIO, 0.0, -RATIO, 1.0],
+            [0.0, J["ring"], 0.0, Z],
+            [J["carrier"] / (RATIO * (1 + Z)), J["carrier"] * Z / (1 + Z), 0.0, -(1 + Z)],
+        ]
+    )
+    torques = np.zeros(2)
+    for _ in range(200):
+        lost = GEAR_TABLE(a, torques[0]), SET_TABLE(b - carrier, torques[1])
+        right = [
+            source,
+            -RATIO * lost[0],
+            -drag + Z * lost[1],
+            -0.05 * carrier * abs(carrier) + lost[1] - (1 + Z) * lost[1],
+        ]
+        solution = np.linalg.solve(system, right)
+        change, torques = np.abs(solution[2:] - torques).max(), solution[2:]
+        if change < 1e-12:
+            break
+    return solution[:2], lost[0] * a + lost[1] * (b - carrier)
+
+
+def test_the_motion_and_the_losses_are_those_of_an_independent_solution() -> None:
+    model = build_model()
+    grid = np.linspace(0.0, END, 41)
+    speeds = [model.node(f"J {name}").speed for name in ("a", "ring")]
+    heats = [("heat", "G"), ("heat", "P")]
+    run = model.simulate(grid, record=[*speeds, *heats], audit=True)
+    assert run.status == "completed"
+
+    def rates(time: float, state: FloatArray) -> FloatArray:
+        motion, power = compute_rates(time, state[:2])
+        return np.append(motion, power)
+
+    known = solve_ivp(
+        rates, (0.0, END), [40.0, 5.0, 0.0], "DOP853", grid, rtol=1e-9, atol=1e-9, max_step=0.01
+    ).y
+    for ours, theirs in zip(speeds, known, strict=False):
+        assert run[ours] == pytest.approx(theirs, abs=2e-6)
+    assert known[0].min() < -10.0 < 10.0 < known[0].max()
+    assert run[heats[0]] + run[heats[1]] == pytest.approx(known[2], rel=1e-6, abs=1e-4)
+    audit = run.audit
+    assert audit is not None
+    assert audit.gear_loss == pytest.approx(known[2][-1], rel=1e-6)
+    assert abs(audit.error) < 1e-9 * audit.gear_loss
+
+
+def test_the_energy_closes_from_the_columns() -> None:
+    balance = build_model().simulate(END).balance_energy()
+    size = max(abs(one.work) for one in balance.values())
+    assert abs(sum(one.work for one in balance.values())) < 1e-9 * size
+    for name in ("G", "P", "B"):
+        one = balance[name]
+        assert one.heat > 0.0
+        assert abs(one.work - one.heat - one.stored) < 1e-9 * size, name
+
+
+def test_faults_of_tables_are_told_by_element() -> None:
+    model = Model("faults")
+    model.inertia("J", 1.0, "a")
+    model.gear("G", "a", "b", ratio=2.0, losses={"speed": [1.0], "torque": [0.0], "los": [[1.0]]})
+    with pytest.raises(InputError, match=r"G: losses: unknown field 'los'; did you mean 'loss'"):
+        model.simulate(1.0)
+    model = Model("impossible")
+    wheel = model.inertia("J", 1.0, "a")
+    steep = {"speed": [1.0], "torque": [0.0, 10.0], "loss": [[0.0], [10.0]]}
+    model.gear("G", "a", "b", ratio=2.0, losses=steep)
+    model.start({wheel: 1.0})
+    with pytest.raises(InputError, match="G: losses have a loss that grows by more than"):
+        model.simulate(1.0)
