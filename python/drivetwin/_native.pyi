@@ -30,6 +30,7 @@ _Run = tuple[
     list[float] | None,
 ]
 
+_Output = tuple[str, Sequence[str]]
 _Ratios = tuple[str, float, float, float]
 _Scenario = tuple[
     Sequence[tuple[str, _Array, _Array, float]],
@@ -55,7 +56,7 @@ def linearise(
     driveline: str,
     locked: Sequence[str],
     slipping: Sequence[tuple[str, float, float]],
-    outputs: str,
+    outputs: Sequence[_Output],
 ) -> tuple[list[_Array], list[str], list[str]]: ...
 def simulate_batch(
     model: str,
@@ -63,7 +64,7 @@ def simulate_batch(
     sets: tuple[Sequence[str], _Array],
     grid: _Array,
     wanted: tuple[_Array, str],
-    into: tuple[tuple[str, int], _Array],
+    into: tuple[tuple[Sequence[_Output], int], _Array],
 ) -> _Ends: ...
 def simulate_controlled(
     model: str,
@@ -71,7 +72,7 @@ def simulate_controlled(
     sets: tuple[Sequence[str], _Array],
     grid: _Array,
     controlled: tuple[str, str],
-    into: tuple[tuple[str, bool, int], _Array],
+    into: tuple[tuple[Sequence[_Output], bool, int], _Array],
 ) -> _Ends: ...
 def batch_sensitivities(
     model: str,
@@ -79,11 +80,11 @@ def batch_sensitivities(
     sets: tuple[Sequence[str], _Array],
     grid: tuple[_Array, Sequence[str]],
     wanted: tuple[_Array, str],
-    options: tuple[str, int],
+    options: tuple[Sequence[_Output], int],
 ) -> tuple[_Ends, tuple[_Array, _Array, _Array, list[tuple[int, str]]]]: ...
 def simulate_network(
     driveline: str,
-    outputs: str,
+    outputs: Sequence[_Output],
     signals: tuple[
         Sequence[tuple[str, _Array, _Array]], Sequence[tuple[str, float, float, float, float]]
     ],

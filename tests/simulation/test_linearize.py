@@ -249,3 +249,46 @@ def test_what_no_linear_system_tells_is_refused() -> None:
         linearise(MODEL, ["B2"], outputs=[("angle", "wheel")])
     with pytest.raises(InputError, match="no operating point"):
         Slip(np.nan, 3e5)
+
+
+SHAFT: list[Element] = [
+    {"type": "inertia", "name": "J", "node": "a", "inertia": 2.0},
+    {"type": "gear", "name": "G", "a": "a", "b": "b", "ratio": 3.0},
+    {"type": "spring_damper", "name": "s", "a": "b", "b": "ground"}
+    | {"stiffness": 50.0, "damping": 4.0},
+]
+
+
+def test_torques_at_ports_are_outputs() -> None:
+    """The shaft acts on b with -(50 twist + 4 ω_b); the gear carries a third of it to a."""
+    outputs: list[tuple[str, str]] = [("torque", "s.a"), ("torque", "s.b"), ("torque", "G.a")]
+    system = linearise(SHAFT, [], outputs=outputs)
+    speed, twist = (system.states.index(name) for name in ("a", "s"))
+    for row, sign in zip(system.C, (-1.0, 1.0, -1.0 / 3.0), strict=True):
+        assert row[[twist, speed]] == pytest.approx([sign * 50.0, sign * 4.0 / 3.0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "told"),
+    [
+        ([("sped", "a")], r"unknown kind; did you mean 'speed'\?"),
+        ([("torque", "G.c")], r"output \('torque', 'G.c'\): no port 'c'"),
+        ([("power", "J")], "the power of J is no linear function"),
+        ([("speed",)], r"write \(kind, name\)"),
+        ([("speed", "c")], 'node "c" is unknown; known are a, b'),
+    ],
+)
+def test_outputs_that_a_linear_system_lacks_are_named(
+    outputs: list[tuple[str, str]], told: str
+) -> None:
+    with pytest.raises(InputError, match=told) as caught:
+        linearise(SHAFT, [], outputs=outputs)
+    assert "line 1" not in str(caught.value)
+
+
+def test_faults_of_elements_are_told_as_in_a_simulation() -> None:
+    faulty = [SHAFT[0], {**SHAFT[1], "ration": 3.0}]
+    with pytest.raises(InputError, match=r"G: unknown field 'ration'; did you mean 'ratio'\?"):
+        linearise(faulty, [])
+    with pytest.raises(InputError, match="no torques at ports"):
+        linearise(MODEL, ["B3"], outputs=[("torque", "B3.a")])

@@ -24,6 +24,8 @@ from drivetwin.simulation.batch import (
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     FloatArray,
+    Signal,
+    simulate_sensitivities,
 )
 from drivetwin.simulation.network import Sine, Start, simulate
 from drivetwin.simulation.serialize import as_json
@@ -80,8 +82,24 @@ def run_long_batch_sensitivities() -> None:
     )
 
 
+def run_long_sensitivities() -> None:
+    """Differentiate one run over 200,000 samples of its inputs, by all parameters of two passes."""
+    one, stretched = scenario(), np.linspace(0.0, 200.0, 200_001)
+    torque, pressures = (
+        Signal(stretched, np.resize(one.engine_torque.values, stretched.size)),
+        {
+            name: Signal(stretched, np.resize(p.values, stretched.size))
+            for name, p in one.pressures.items()
+        },
+    )
+    by = [f"{name}.{field}" for name in ("B2", "B3") for field in ("P0", "mu_c", "mu_s", "gain")]
+    by += ["eta", "J1", "J_out", "i_f", "J_v", "k_o", "c_o", "load.constant", "start.twist"]
+    simulate_sensitivities(MODEL, torque, pressures, one.start, np.array([0.0, 200.0]), by)
+
+
 CALLS: dict[str, Callable[[], object]] = {
     "network": run_long_network,
+    "sensitivities": run_long_sensitivities,
     "batch": lambda: run_long_batch(1),
     "batch in two threads": lambda: run_long_batch(2),
     "batch sensitivities": run_long_batch_sensitivities,
@@ -111,7 +129,7 @@ def test_a_fault_inside_the_core_is_an_error_below_exception() -> None:
             (["eta"], np.full((4, 1), 0.9)),
             TIME,
             (np.empty((0, 0)), "last"),
-            (('[{"speed": "engine"}]', 1), values),
+            (([("speed", ("engine",))], 1), values),
         )
     assert isinstance(caught.value, Exception)
 

@@ -3,9 +3,10 @@
 
 use crate::border::call;
 use crate::dual_clutch::{Delayed, Start, model_of, start_of};
+use crate::output::{NamedOutput, outputs_of};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{
-    Batch, Keep, Outcome, Output, ParameterSets, Plan, Recording, RunOptions, Sampled,
+    Batch, Keep, Outcome, ParameterSets, Plan, Recording, RunOptions, Sampled,
     dual_clutch_batch, dual_clutch_batch_sensitivities,
 };
 use drivetwin_core::solver::{Settings, Signal, Status};
@@ -17,8 +18,8 @@ use pyo3::prelude::*;
 type Scenario<'py> = (Vec<Delayed<'py>>, Start);
 /// Measured columns (outputs, time) for a misfit, what to keep (`columns`, `last` or `misfit`).
 type Wanted<'py> = (PyReadonlyArray2<'py, f64>, String);
-/// Outputs as a JSON list, threads (0: all).
-type Options = (String, usize);
+/// Outputs, threads (0: all).
+type Options = (Vec<NamedOutput>, usize);
 /// Numbers of events, times of the last lock [s], failed runs and why.
 pub type Ends<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>, Vec<(usize, String)>);
 /// Flat values, flat derivatives, derivatives of the last locks, runs with a grazing event and why.
@@ -110,10 +111,6 @@ pub fn batch_sensitivities<'py>(
 
 pub fn refused(error: &dyn std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
-}
-
-pub fn outputs_of(json: &str) -> PyResult<Vec<Output>> {
-    serde_json::from_str(json).map_err(|e| refused(&e))
 }
 
 pub fn names_of(names: &[String]) -> Vec<&str> {

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
 //! Many controlled runs; see `drivetwin.simulation.controlled_batch`.
 
-use crate::batch::{Ends, ends, names_of, outputs_of, refused};
+use crate::batch::{Ends, ends, names_of, refused};
 use crate::border::call;
 use crate::dual_clutch::{Start, model_of, start_of};
+use crate::output::{NamedOutput, outputs_of};
 use drivetwin_core::control::{ControlledUnit, ShiftController};
 use drivetwin_core::simulate::{ControlledRuns, controlled_batch};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
 use pyo3::prelude::*;
 
-/// Outputs as a JSON list, whether inputs are recorded too, threads (0: all).
-type Options = (String, bool, usize);
+/// Outputs, whether inputs are recorded too, threads (0: all).
+type Options = (Vec<NamedOutput>, bool, usize);
 
 /// Simulate a driveline given as JSON under `controllers`, once per parameter set with its unit of `units` (JSON
 /// lists), into flat `values`: sets × controllers × rows × grid.

@@ -10,6 +10,7 @@ mod dual_clutch;
 mod gearbox;
 mod linear;
 mod network;
+mod output;
 mod plain;
 mod table;
 

@@ -4,9 +4,10 @@
 use crate::border::call;
 use crate::dual_clutch::model_of;
 use crate::network::parse;
+use crate::output::{NamedOutput, outputs_of};
 use drivetwin_core::network::Network;
 use drivetwin_core::network::linalg::Matrix;
-use drivetwin_core::simulate::{Output, Slipping, linearise as linearised};
+use drivetwin_core::simulate::{Slipping, linearise as linearised};
 use numpy::PyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -22,14 +23,14 @@ pub fn linearise<'py>(
     driveline: &str,
     locked: Vec<String>,
     slipping: Vec<(String, f64, f64)>,
-    outputs: &str,
+    outputs: Vec<NamedOutput>,
 ) -> PyResult<System<'py>> {
     let refuse = |e: &dyn std::fmt::Display| PyValueError::new_err(e.to_string());
     let elements = match driveline.trim_start().starts_with('[') {
         true => parse(driveline)?,
         false => model_of(driveline)?.driveline(),
     };
-    let outputs: Vec<Output> = serde_json::from_str(outputs).map_err(|e| refuse(&e))?;
+    let outputs = outputs_of(&outputs)?;
     let slipping: Vec<Slipping> = slipping
         .into_iter()
         .map(|(element, slip, pressure)| Slipping { element, slip, pressure })

@@ -2,10 +2,11 @@
 //! Simulation of any network of elements; see `drivetwin.simulation.network`.
 
 use crate::border::call;
+use crate::output::{NamedOutput, outputs_of};
 use crate::plain::{Audit, Event, as_array, events_of};
 use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::network::Network;
-use drivetwin_core::simulate::{Output, RunOptions, Start, run_network};
+use drivetwin_core::simulate::{RunOptions, Start, run_network};
 use drivetwin_core::solver::{Settings, Signal};
 use numpy::{PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -23,21 +24,19 @@ type Options = (f64, f64, Option<usize>, bool, bool);
 /// Columns (n_outputs, n_time), events, status, audit.
 type Run<'py> = (Bound<'py, PyArray2<f64>>, Vec<Event>, String, Option<Audit>);
 
-/// Simulate a driveline given as JSON; outputs are a JSON list such as `[{"speed": "engine"}]`.
+/// Simulate a driveline given as JSON; outputs are such as `("speed", ["engine"])`.
 #[pyfunction]
 #[pyo3(signature = (driveline, outputs, signals, start, grid, options))]
 pub fn simulate_network<'py>(
     py: Python<'py>,
     driveline: &str,
-    outputs: &str,
+    outputs: Vec<NamedOutput>,
     signals: (Vec<Samples<'py>>, Vec<Sine>),
     start: StartState,
     grid: PyReadonlyArray1<'py, f64>,
     options: Options,
 ) -> PyResult<Run<'py>> {
-    let refuse = |e: serde_json::Error| PyValueError::new_err(e.to_string());
-    let driveline = parse(driveline)?;
-    let outputs: Vec<Output> = serde_json::from_str(outputs).map_err(refuse)?;
+    let (driveline, outputs) = (parse(driveline)?, outputs_of(&outputs)?);
     let grid = grid.as_slice()?;
     let (samples, sines) = signals;
     let mut inputs = samples

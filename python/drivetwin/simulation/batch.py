@@ -7,7 +7,6 @@ result depends neither on its neighbours nor on the number of threads.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -29,6 +28,7 @@ from drivetwin.simulation.dual_clutch import (
     to_core_start,
     to_delayed_core_samples,
 )
+from drivetwin.simulation.network_output import NativeOutput
 from drivetwin.simulation.serialize import as_array, as_json, as_names
 
 
@@ -79,12 +79,12 @@ class BatchSensitivities:
     grazing: Mapping[int, str]
 
 
-OUTPUTS: Mapping[str, Mapping[str, str]] = {
-    "engine_speed": {"speed": "engine"},
-    "output_speed": {"speed": "output"},
-    "wheel_speed": {"speed": "wheel"},
-    "twist": {"twist": "output shaft"},
-    "shaft_torque": {"shaft_torque": "output shaft"},
+OUTPUTS: Mapping[str, NativeOutput] = {
+    "engine_speed": ("speed", ("engine",)),
+    "output_speed": ("speed", ("output",)),
+    "wheel_speed": ("speed", ("wheel",)),
+    "twist": ("twist", ("output shaft",)),
+    "shaft_torque": ("shaft_torque", ("output shaft",)),
 }
 
 
@@ -181,7 +181,7 @@ class _Asked:
     sets: tuple[list[str], FloatArray]
     time: FloatArray
     wanted: tuple[FloatArray, str]
-    outputs: str
+    outputs: Sequence[NativeOutput]
     shape: tuple[int, ...]
 
     @classmethod
@@ -212,7 +212,7 @@ class _Asked:
             (list(sets), np.ascontiguousarray(table)),
             run_time(time),
             (np.ascontiguousarray(wanted), keep.value if isinstance(keep, Keep) else "misfit"),
-            json.dumps([parse_output(name) for name in outputs]),
+            [parse_output(name) for name in outputs],
             shape if keep is Keep.COLUMNS else shape[:2],
         )
 
@@ -237,11 +237,11 @@ def _count_runs(sets: Mapping[str, FloatArray], scenarios: Sequence[Scenario]) -
     return runs
 
 
-def parse_output(name: str) -> Mapping[str, str]:
+def parse_output(name: str) -> NativeOutput:
     """Return an output as the core takes it. Raises InputError for an unknown name."""
     kind, _, element = name.partition(".")
     if element and kind in ("torque", "slip"):
-        return {"friction_torque" if kind == "torque" else "slip": element}
+        return "friction_torque" if kind == "torque" else "slip", (element,)
     if name not in OUTPUTS:
         known = ", ".join([*OUTPUTS, "torque.<element>", "slip.<element>"])
         raise InputError(f"output {name!r} is unknown", f"choose from {known}")

@@ -7,7 +7,6 @@ linearised about an operating point and the rest held, what is left are four mat
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +18,9 @@ from scipy.linalg import null_space
 from drivetwin._native import linearise as native_linearise
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray
+from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
 from drivetwin.simulation.network import Element
+from drivetwin.simulation.network_output import Request, combine_columns, resolve_output
 from drivetwin.simulation.serialize import as_json, as_names
 
 Output = tuple[str, str]
@@ -151,41 +152,61 @@ def linearise(
     if outputs is None:
         outputs = (SHAFT_TORQUE,) if elements is None else ()
     locked, points = as_names(locked), dict(slipping or {})
-    _check(locked, points, outputs)
+    refuse_faults(find_element_faults(elements or ()))
+    _check(locked, points)
+    requests = _find_requests(outputs, elements)
     try:
         matrices, states, inputs = native_linearise(
             as_json(driveline if elements is None else elements),
             locked,
             [(name, p.slip, p.pressure) for name, p in points.items()],
-            json.dumps([{kind: name} for kind, name in outputs]),
+            [one for request in requests for one in request.native],
         )
     except ValueError as error:
         raise InputError(str(error), "correct the description or the names") from error
     a, b, c, d = matrices
     held = _collect_inactive_inputs(elements or ())
     moving = [i for i, name in enumerate(inputs) if name not in held]
+    rows = combine_columns(requests, np.hstack([c, d]))
+    by_all = np.reshape(rows, (len(outputs), len(states) + len(inputs)))
+    by_states, by_inputs = np.hsplit(by_all, [len(states)])
     return LinearSystem(
         a,
         b[:, moving],
-        c.reshape(len(outputs), len(states)),
-        d.reshape(len(outputs), len(inputs))[:, moving],
+        by_states,
+        by_inputs[:, moving],
         tuple(states),
         tuple(inputs[i] for i in moving),
         tuple(outputs),
     )
 
 
-def _check(locked: Sequence[str], points: Mapping[str, Slip], outputs: Sequence[Output]) -> None:
-    """Raise InputError for elements or outputs that a linear system cannot represent."""
+def _check(locked: Sequence[str], points: Mapping[str, Slip]) -> None:
+    """Raise InputError for an element that is both locked and slipping."""
     both = [name for name in points if name in locked]
     if both:
         raise InputError(f"{', '.join(both)}: locked and slipping", "name it in one of them")
+
+
+def _find_requests(
+    outputs: Sequence[Output], elements: Sequence[Element] | None
+) -> list[Request]:
+    """Resolve the outputs. Raises InputError for those that a linear system cannot represent."""
+    requests = [resolve_output(output, elements or ()) for output in outputs]
+    kinds = {output[0] for output in outputs if output}
+    if elements is None and "torque" in kinds:
+        raise InputError(
+            "a dual-clutch driveline has no torques at ports",
+            "ask for a friction_torque or the shaft_torque, or describe it by elements",
+        )
+    refuse_faults([one for one in requests if isinstance(one, str)])
     angles = [name for kind, name in outputs if kind == "angle"]
     if angles:
         raise InputError(
             f"the angle of {', '.join(angles)} is no output of a linear system",
             "ask for the speed; the response of the angle is that of the speed over jω",
         )
+    return [one for one in requests if isinstance(one, Request)]
 
 
 def _collect_inactive_inputs(elements: Sequence[Element]) -> set[object]:

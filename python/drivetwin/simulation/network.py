@@ -8,7 +8,6 @@ and their laws are listed in docs/reference/elements.md. Nodes are the names use
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -121,7 +120,7 @@ def simulate(
     try:
         columns, events, status, energy = native_simulate_network(
             as_json(elements),
-            json.dumps([one for request in recorded for one in request.native]),
+            [one for request in recorded for one in request.native],
             (to_core_samples(sampled), sines),
             (list(start.speeds.items()), list(start.twists.items()), as_names(start.locked)),
             run_time(time),

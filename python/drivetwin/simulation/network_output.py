@@ -22,11 +22,16 @@ _UNBALANCED = ("gear", "torque_converter")
 """Elements with a housing: their torques at the ports do not vanish in sum."""
 
 
+NativeOutput = tuple[str, tuple[str, ...]]
+"""Quantity as the core names it: its kind, and the name of its node or element, or element and node
+of a torque."""
+
+
 @dataclass(frozen=True)
 class Request:
     """Quantities that the core records for one output: `sign` times their sum."""
 
-    native: tuple[Mapping[str, Any], ...]
+    native: tuple[NativeOutput, ...]
     sign: float = 1.0
 
 
@@ -37,13 +42,13 @@ def resolve_output(output: tuple[str, str], elements: Sequence[Mapping[str, Any]
     housing vanish in sum.
     """
     known = (*_OF_NODES, *_OF_ELEMENTS)
-    if not (isinstance(output, tuple | list) and len(output) == 2):
+    if not (isinstance(output, tuple | list) and len(output) == 2 and isinstance(output[1], str)):
         return f"output {output!r}: write (kind, name)"
     kind, name = output
     if kind not in known:
         return f"output {output!r}: unknown kind{suggest_spelling(str(kind), known)}"
     if kind != "torque":
-        return Request(({kind: name},))
+        return Request(((kind, (name,)),))
     element_name, _, port = name.rpartition(".")
     by_name = {str(element["name"]): element for element in elements}
     if element_name not in by_name:
@@ -54,11 +59,11 @@ def resolve_output(output: tuple[str, str], elements: Sequence[Mapping[str, Any]
     if port not in ports:
         return f"output {output!r}: no port {port!r}{suggest_spelling(port, ports)}"
     if ports[port] != GROUND:
-        return Request(({"torque": [element_name, ports[port]]},))
+        return Request((("torque", (element_name, ports[port])),))
     if element["type"] in _UNBALANCED:
         return f"output {output!r}: the housing holds this port, its torque is not computed"
     others = [node for node in ports.values() if node != GROUND]
-    return Request(tuple({"torque": [element_name, node]} for node in others), -1.0)
+    return Request(tuple(("torque", (element_name, node)) for node in others), -1.0)
 
 
 def combine_columns(requests: Sequence[Request], columns: FloatArray) -> list[FloatArray]:

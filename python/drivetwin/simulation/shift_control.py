@@ -8,7 +8,6 @@ docs/howto/calibrate.md.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -165,7 +164,7 @@ def simulate_controlled(
             run_time(time),
             (as_json(list(controllers)), as_json(list(plant.units))),
             (
-                (json.dumps([parse_output(name) for name in outputs]), with_inputs, threads),
+                ([parse_output(name) for name in outputs], with_inputs, threads),
                 values.reshape(-1),
             ),
         )

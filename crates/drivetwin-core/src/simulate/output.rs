@@ -5,6 +5,7 @@ use super::start::{StartError, find};
 use crate::network::Network;
 use crate::number::Number;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// A quantity to record, by the name of its node or element.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -93,6 +94,27 @@ impl Output {
             Self::Heat(name) => Target::Heat(element(name)?),
             Self::Energy(name) => Target::Energy(element(name)?),
         })
+    }
+}
+
+impl fmt::Display for Output {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kind, name) = match self {
+            Self::Speed(node) => ("speed", node),
+            Self::Acceleration(node) => ("acceleration", node),
+            Self::Angle(node) => ("angle", node),
+            Self::Twist(shaft) => ("twist", shaft),
+            Self::ShaftTorque(shaft) => ("shaft torque", shaft),
+            Self::Slip(element) => ("slip", element),
+            Self::FrictionTorque(element) => ("friction torque", element),
+            Self::Torque(element, node) => return write!(f, "torque of {element} at {node}"),
+            Self::Power(element) => ("power", element),
+            Self::Loss(element) => ("loss", element),
+            Self::Work(element) => ("work", element),
+            Self::Heat(element) => ("heat", element),
+            Self::Energy(element) => ("energy", element),
+        };
+        write!(f, "{kind} of {name}")
     }
 }
 

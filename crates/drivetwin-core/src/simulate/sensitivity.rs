@@ -6,7 +6,7 @@ use super::run::{RunOptions, SimulateError};
 use super::trajectory::Trajectory;
 use crate::model::dual_clutch::DualClutch;
 use crate::number::{Dual, Number};
-use crate::solver::{Event, Settings, Signal};
+use crate::solver::{Event, Settings, Signal, Status};
 use thiserror::Error;
 
 /// Most parameters that one pass differentiates for.
@@ -127,6 +127,9 @@ fn pass<const P: usize>(
     let inputs = apply_delays(signals, &delays);
     let dual =
         simulate_dual_clutch(&model, &inputs, &start, grid, RunOptions { settings, audit: false })?;
+    if matches!(dual.status, Status::Interrupted { .. }) {
+        return Err(SimulateError::Interrupted.into());
+    }
     let of_lane = |lane| dual.events.iter().map(|e| e.time.eps[lane]).collect();
     let events: Vec<Vec<f64>> = (0..parameters.len()).map(of_lane).collect();
     let (run, columns) = split_derivatives(dual);

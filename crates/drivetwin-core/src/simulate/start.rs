@@ -52,7 +52,7 @@ pub enum StartError {
         name: String,
     },
     /// A power or energy among the outputs of a linear model.
-    #[error("{output} is no linear function of states and inputs")]
+    #[error("the {output} is no linear function of states and inputs")]
     NotLinear {
         /// The output.
         output: String,
