@@ -6,8 +6,8 @@ use crate::dual_clutch::{Delayed, Start, model_of, start_of};
 use crate::output::{NamedOutput, outputs_of};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{
-    Batch, Keep, Outcome, ParameterSets, Plan, Recording, RunOptions, Sampled,
-    dual_clutch_batch, dual_clutch_batch_sensitivities,
+    Batch, Keep, Outcome, ParameterSets, Plan, Recording, RunOptions, Sampled, dual_clutch_batch,
+    dual_clutch_batch_sensitivities,
 };
 use drivetwin_core::solver::{Settings, Signal, Status};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};

@@ -188,9 +188,7 @@ def _check(locked: Sequence[str], points: Mapping[str, Slip]) -> None:
         raise InputError(f"{', '.join(both)}: locked and slipping", "name it in one of them")
 
 
-def _find_requests(
-    outputs: Sequence[Output], elements: Sequence[Element] | None
-) -> list[Request]:
+def _find_requests(outputs: Sequence[Output], elements: Sequence[Element] | None) -> list[Request]:
     """Resolve the outputs. Raises InputError for those that a linear system cannot represent."""
     requests = [resolve_output(output, elements or ()) for output in outputs]
     kinds = {output[0] for output in outputs if output}

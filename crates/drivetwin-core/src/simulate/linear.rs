@@ -87,8 +87,7 @@ pub fn linearise(
             }
         };
         let row = output.find(network)?.row(network, &mode, torque);
-        let row =
-            over(&row.ok_or_else(|| StartError::NotLinear { output: output.to_string() })?);
+        let row = over(&row.ok_or_else(|| StartError::NotLinear { output: output.to_string() })?);
         linear.c.row_mut(i).copy_from_slice(&row[..n]);
         linear.d.row_mut(i).copy_from_slice(&row[n..]);
     }
