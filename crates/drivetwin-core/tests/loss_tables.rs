@@ -171,7 +171,13 @@ fn drag_below_its_first_slip_is_viscous_and_above_its_last_constant() {
     let pressure = constant("P B", 0.0, 4.0);
     let from = |w: f64| {
         let start = start(&[("rotor", w)], &[]);
-        simulate(&network, &[pressure.clone()], &start, &grid(4.0, 41), &[speed("rotor")])
+        simulate(
+            &network,
+            std::slice::from_ref(&pressure),
+            &start,
+            &grid(4.0, 41),
+            &[speed("rotor")],
+        )
     };
     // 10 N·m at 5 rad/s
     let viscous = from(-4.0);
