@@ -18,7 +18,7 @@ from drivetwin.errors import InputError
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.plates import Plates
 from drivetwin.simulation.dual_clutch import FloatArray
-from drivetwin.simulation.network import Sine
+from drivetwin.simulation.network import Output, Sine
 
 GEAR = {
     "speed": [20.0, 60.0, 150.0],
@@ -120,7 +120,7 @@ def test_the_motion_and_the_losses_are_those_of_an_independent_solution() -> Non
     model = build_model()
     grid = np.linspace(0.0, END, 41)
     speeds = [model.node(f"J {name}").speed for name in ("a", "ring")]
-    heats = [("heat", "G"), ("heat", "P")]
+    heats: list[Output] = [("heat", "G"), ("heat", "P")]
     run = model.simulate(grid, record=[*speeds, *heats], audit=True)
     assert run.status == "completed"
 
