@@ -107,15 +107,19 @@ def require_identified(twin: Twin) -> None:
 
 
 def derive_limits(task: Task) -> tuple[Limit, ...]:
-    """Limits at which a calibration is no worse than the start in time, vibration and energy."""
+    """Limits at which a calibration is no worse than the start in time, vibration and energy.
+
+    They are upper bounds of the start with the confidence of the certificate, on the draws by
+    which the limits of a calibration are checked: the start keeps them.
+    """
     plant, space = Plant(task.maneuver, task.settings.threads), Space(task.policy)
-    draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
+    draws = draw_for(task, task.settings.check_draws, Purpose.CHECK)
     outcome = plant.evaluate(space.build_control(space.start), draws)
     limits = []
     for metric, statistic in DEFAULT_LIMITS.items():
         found = compute_quantiles(outcome.values[metric], task.settings.confidence)
-        value = found.mean if statistic is Statistic.MEAN else found.share_95
-        limits.append(Limit(metric, value, statistic))
+        value = found.mean_upper if statistic is Statistic.MEAN else found.upper_95
+        limits.append(Limit(metric, found.share_95 if value is None else value, statistic))
     return tuple(limits)
 
 
