@@ -301,17 +301,15 @@ def _load_valid_twin(source: Path) -> Twin:
     from drivetwin.estimation.result.status import ModelStatus
     from drivetwin.files.result_file import load_result
     from drivetwin.files.twin_conversion import load_twin
+    from drivetwin.report.model_verdict import explain_result
 
     model = load_twin(source)
     result = source.with_name(RESULT)
     if source.name == TWIN and result.is_file():
-        status = load_result(result).status
-        if status is ModelStatus.NOT_VALID:
-            raise IdentificationError(
-                f"the twin is {status.value}: its simulation does not follow the log",
-                f"see {RESULT} for the reasons, correct the vehicle card and identify again",
-                Where(file=str(source)),
-            )
+        verdict = explain_result(load_result(result))
+        if verdict.status is ModelStatus.NOT_VALID:
+            what = f"the twin is {verdict.status.value}: {verdict.reason}"
+            raise IdentificationError(what, verdict.action, Where(file=str(source)))
     return model
 
 
