@@ -230,7 +230,9 @@ def _add_hydraulics(scenario: Scenario, random: np.random.Generator) -> Scenario
     )
     commands = {going.name: Program(drawn[going.name]), coming.name: Program(knots)}
     sensors = tuple(
-        Sensor(make_command_role(name), Quantity.PRESSURE, f"Cmd{name}", "bar", COMMAND_RATE, 0.0)
+        Sensor(
+            make_command_role(name), Quantity.PRESSURE, f"Prs{name}Cmd", "bar", COMMAND_RATE, 0.0
+        )
         for name in models
     )
     actuators = {name: ControlledActuator(commands[name], models[name]) for name in models}

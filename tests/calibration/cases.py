@@ -50,6 +50,7 @@ QUICK = CalibrationSettings(
     tail_draws=8,
     check_draws=40,
     repairs=1,
+    repair_iterations=1,
     certificate_draws=60,
     neighbour_draws=6,
     neighbour_iterations=1,

@@ -27,7 +27,9 @@ def test_improves_on_fresh_draws_and_repeats_itself() -> None:
 
 
 def test_a_limit_out_of_reach_leaves_the_best_calibration_and_is_named() -> None:
-    found = calibrate(make_task((Limit(Metric.SHIFT_TIME, 0.05), Limit(Metric.FRICTION_ENERGY, 1e9))))
+    found = calibrate(
+        make_task((Limit(Metric.SHIFT_TIME, 0.05), Limit(Metric.FRICTION_ENERGY, 1e9)))
+    )
     time = found.after.certificate.limits[0].value
     assert time < found.before.certificate.limits[0].value
     with pytest.raises(InfeasibleError, match=r"shift time \(95 %\) .* s, limit 0.05") as caught:

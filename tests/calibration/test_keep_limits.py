@@ -44,7 +44,9 @@ def test_bounds_fall_and_the_weight_rises_until_the_limits_hold() -> None:
     assert kept.excess <= 0.0
     assert kept.coordinates == pytest.approx([0.694, 3e4])
     assert [one.weight for one in seen] == [300.0, 900.0]
-    assert [one.limits[0].bound for one in seen] == pytest.approx([0.7 / 1.02, 0.7 / 1.02 / (0.704 / 0.7)])
+    assert [one.limits[0].bound for one in seen] == pytest.approx(
+        [0.7 / 1.02, 0.7 / 1.02 / (0.704 / 0.7)]
+    )
     assert {one.limits[1].bound for one in seen} == {4e4}
 
 

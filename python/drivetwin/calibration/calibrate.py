@@ -173,21 +173,19 @@ def _polish(
             polished.append(polish(run, one.coordinates, objective, settings.polish_iterations))
     best = min(polished, key=lambda one: one.value)
     with scale_progress(0.5, 1.0):
-        return _polish_tail(task, plant, objective, best.coordinates)
+        return _polish_tail((task, plant), objective, best.coordinates, settings.tail_iterations)
 
 
 def _polish_tail(
-    task: Task, plant: Plant, objective: Objective, start: FloatArray
+    problem: tuple[Task, Plant], objective: Objective, start: FloatArray, iterations: int
 ) -> FloatArray:
-    settings = task.settings
-    run = _make_run(task, plant, draw_for(task, settings.tail_draws, Purpose.TAIL))
-    tail = objective.set_share(settings.tail_share)
-    return np.asarray(polish(run, start, tail, settings.tail_iterations).coordinates)
+    task, plant = problem
+    run = _make_run(task, plant, draw_for(task, task.settings.tail_draws, Purpose.TAIL))
+    tail = objective.set_share(task.settings.tail_share)
+    return np.asarray(polish(run, start, tail, iterations).coordinates)
 
 
-def _keep_limits(
-    task: Task, plant: Plant, objective: Objective, found: FloatArray
-) -> FloatArray:
+def _keep_limits(task: Task, plant: Plant, objective: Objective, found: FloatArray) -> FloatArray:
     """Return coordinates (q,) whose limits hold on the draws of the check, or the nearest to it.
 
     They are polished from those found, and where this fails from the start.
@@ -201,7 +199,7 @@ def _keep_limits(
         return [one.excess for one in certificate.limits]
 
     def improve(at: FloatArray, under: Objective) -> FloatArray:
-        return _polish_tail(task, plant, under, at)
+        return _polish_tail((task, plant), under, at, settings.repair_iterations)
 
     repair = Repair(measure, improve, settings.repairs, settings.repair_weight)
     kept = repair.keep_limits(found, objective)

@@ -60,9 +60,7 @@ def require_limits(found: Sequence[LimitCheck], start: Sequence[LimitCheck]) -> 
     `found` are the limits on fresh draws of a calibration, `start` those of its start.
     """
     pairs = zip(found, start, strict=True)
-    exceeded = [
-        (one, old) for one, old in pairs if one.value > (1.0 + TOLERANCE) * one.limit.bound
-    ]
+    exceeded = [(one, old) for one, old in pairs if one.value > (1.0 + TOLERANCE) * one.limit.bound]
     if exceeded:
         raise InfeasibleError(
             f"no calibration within the {len(found)} limits was found; the best exceeds "

@@ -32,6 +32,8 @@ class CalibrationSettings:
     """Scenarios on which limits are derived from the start, and checked after the polish."""
     repairs: int = 3
     """Largest number of polishes under tighter limits, where a limit is exceeded on these draws."""
+    repair_iterations: int = 3
+    """Largest number of linear programs of one of these polishes."""
     repair_weight: float = 3.0
     """Factor on the weight of the excess from one of these polishes to the next."""
     certificate_draws: int = 2000
