@@ -37,7 +37,7 @@ def test_bounds_fall_and_the_weight_rises_until_the_limits_hold() -> None:
 
     def improve(at: FloatArray, under: Objective) -> FloatArray:
         seen.append(under)
-        return at - np.array([0.01, 0.0])
+        return np.asarray(at - np.array([0.01, 0.0]))
 
     start = np.array([0.714, 3e4])
     kept = Repair(measure, improve, 5, 3.0).keep_limits(start, OBJECTIVE)

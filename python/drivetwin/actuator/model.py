@@ -18,7 +18,6 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.errors import InputError, Where
 
-
 REFERENCE: float = bar
 """Pressure [Pa] above the kiss pressure at which the fill time is stated."""
 

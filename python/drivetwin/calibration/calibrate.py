@@ -173,13 +173,12 @@ def _polish(
             polished.append(polish(run, one.coordinates, objective, settings.polish_iterations))
     best = min(polished, key=lambda one: one.value)
     with scale_progress(0.5, 1.0):
-        return _polish_tail((task, plant), objective, best.coordinates, settings.tail_iterations)
+        return _polish_tail(task, plant, objective, best.coordinates, settings.tail_iterations)
 
 
 def _polish_tail(
-    problem: tuple[Task, Plant], objective: Objective, start: FloatArray, iterations: int
+    task: Task, plant: Plant, objective: Objective, start: FloatArray, iterations: int
 ) -> FloatArray:
-    task, plant = problem
     run = _make_run(task, plant, draw_for(task, task.settings.tail_draws, Purpose.TAIL))
     tail = objective.set_share(task.settings.tail_share)
     return np.asarray(polish(run, start, tail, iterations).coordinates)
@@ -199,7 +198,7 @@ def _keep_limits(task: Task, plant: Plant, objective: Objective, found: FloatArr
         return [one.excess for one in certificate.limits]
 
     def improve(at: FloatArray, under: Objective) -> FloatArray:
-        return _polish_tail((task, plant), under, at, settings.repair_iterations)
+        return _polish_tail(task, plant, under, at, settings.repair_iterations)
 
     repair = Repair(measure, improve, settings.repairs, settings.repair_weight)
     kept = repair.keep_limits(found, objective)

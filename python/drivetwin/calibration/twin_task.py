@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -32,6 +33,7 @@ DEFAULT_LIMITS = {
     Metric.FRICTION_ENERGY: Statistic.MEAN,
 }
 """Limits without a file: no worse than the start."""
+_NOT_IDENTIFIED = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
 
 
 @dataclass(frozen=True)
@@ -97,10 +99,11 @@ def require_identified(twin: Twin) -> None:
     """
     verdicts = [one.verdict for one in twin.parameters.values()]
     if Verdict.IDENTIFIED not in verdicts:
-        reasons = sorted({one.reason for one in twin.parameters.values() if one.reason})
+        estimated = [one for one in twin.parameters.values() if one.verdict in _NOT_IDENTIFIED]
+        reasons = Counter(one.reason for one in estimated if one.reason).most_common(1)
         raise IdentificationError(
             "the twin is not valid: none of its parameters is identified"
-            + (f" ({reasons[0]})" if reasons else ""),
+            + (f" ({reasons[0][0]})" if reasons else ""),
             "correct the vehicle card or take another log, and identify again",
             Where(file=twin.name),
         )
