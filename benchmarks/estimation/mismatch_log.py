@@ -55,7 +55,7 @@ def make_mismatch_log(
     Raises InputError for an impossible size, SimulationError where the run does not complete.
     """
     vehicle = draw_vehicle(seed)
-    scenario = _set_rates(_hold_load(vehicle.scenario), rates)
+    scenario = set_rates(hold_load(vehicle.scenario), rates)
     if effect is EffectId.BACKLASH:
         scenario = replace(scenario, engine_torque=_build_tips(scenario))
     recorded = run(scenario, seed, effects={} if effect is None else {effect: size})
@@ -70,14 +70,14 @@ def make_mismatch_log(
         return MismatchLog(read_log(log_file, read), read, recorded)
 
 
-def _hold_load(scenario: Scenario) -> Scenario:
+def hold_load(scenario: Scenario) -> Scenario:
     """Return the scenario with its load at the start, so that the truth has the whole load."""
     model, wheel = scenario.model, scenario.start().wheel_speed
     load = RoadLoad(constant=model.load.evaluate(wheel))
     return replace(scenario, model=replace(model, load=load))
 
 
-def _set_rates(scenario: Scenario, rates: Rates) -> Scenario:
+def set_rates(scenario: Scenario, rates: Rates) -> Scenario:
     """Return the scenario with sensors at these rates, an output torque among them.
 
     A speed that is a mean over its period stays so.

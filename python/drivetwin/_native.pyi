@@ -92,6 +92,9 @@ def simulate_network(
     grid: _Array,
     options: _Options,
 ) -> _Run: ...
+def actuator_pressure(
+    model: str, command: tuple[_Array, _Array], initial: float | None, at: _Array
+) -> _Array: ...
 def gear_statics(
     driveline: str, engaged: Sequence[str], input: str, output: str
 ) -> tuple[list[tuple[str, float | None]], list[tuple[str, str, float]], tuple[float, float]]: ...

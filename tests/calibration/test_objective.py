@@ -38,7 +38,7 @@ def test_penalty_is_relative_to_the_bound() -> None:
     assert each.evaluate(outcome) == pytest.approx(20.0 + 100.0 * 0.25)
     mean = Objective((Limit(Metric.SHIFT_TIME, 0.75, Statistic.MEAN),), 0.5, 100.0)
     assert mean.evaluate(outcome) == pytest.approx(20.0)
-    assert mean.tighten(0.2).evaluate(outcome) == pytest.approx(20.0 + 100.0 * 0.25)
+    assert mean.tighten([0.2]).evaluate(outcome) == pytest.approx(20.0 + 100.0 * 0.25)
 
 
 @pytest.mark.parametrize("bound", [0.0, -1.0, float("nan"), float("inf")])

@@ -129,7 +129,7 @@ def test_a_slip_loop_is_calibrated_behind_actuators(
     assert "no actuator of B2 and B3" in capsys.readouterr().err
 
 
-def test_limits_out_of_reach_leave_no_files(
+def test_with_limits_out_of_reach_the_best_calibration_is_written(
     twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     limits = tmp_path / "limits.toml"
@@ -137,8 +137,16 @@ def test_limits_out_of_reach_leave_no_files(
     out = tmp_path / "out"
     given = ["calibrate", str(twin), "--shift", "2-3", "--limits", str(limits), "-o", str(out)]
     assert main([*given, *SHORT]) == 2
-    assert "limit 0.05" in capsys.readouterr().err
-    assert not out.exists()
+    error = capsys.readouterr().err
+    assert "limit 0.05" in error
+    assert "raise the limit of the shift time" in error
+    assert {one.name for one in out.iterdir()} == FILES
+    assert not out.with_name("out.resume.json").exists()
+    assert "exceeded, binds" in (out / "report.html").read_text(encoding="utf-8")
+    assert main([*given, *SHORT, "--json"]) == 2
+    found = json.loads(capsys.readouterr().out)
+    assert found["error"]["type"] == "InfeasibleError"
+    assert found["certificate"]["after"]["limits"][0]["state"] == "exceeded"
 
 
 def test_front_and_map_are_in_the_files(

@@ -3,6 +3,7 @@
 //!
 //! Private to the package; the Python modules of the same names are its face.
 
+mod actuator;
 mod batch;
 mod border;
 mod controlled;
@@ -28,6 +29,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(batch::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(batch::batch_sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(controlled::simulate_controlled, module)?)?;
+    module.add_function(wrap_pyfunction!(actuator::actuator_pressure, module)?)?;
     module.add_function(wrap_pyfunction!(linear::linearise, module)?)?;
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;

@@ -17,9 +17,8 @@ from scipy.optimize import least_squares
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.actuator.fill import REFERENCE
 from drivetwin.actuator.held_signal import HeldSignal
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, REFERENCE, ActuatorModel
 from drivetwin.errors import IdentificationError
 
 

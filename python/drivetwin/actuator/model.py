@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Actuator model: hysteresis, dead time, fill of the clutch, second-order lag."""
+"""Actuator model: hysteresis, dead time, fill of the clutch, second-order lag.
+
+The core has the equations; see docs/explanation/actuator.md.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
+from scipy.constants import bar
 
+from drivetwin._native import actuator_pressure
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.fill import Stroke, apply_hysteresis
 from drivetwin.actuator.held_signal import HeldSignal
-from drivetwin.actuator.lag import Lag, solve_lag
 from drivetwin.errors import InputError, Where
+
+REFERENCE: float = bar
+"""Pressure [Pa] above the kiss pressure at which the fill time is stated."""
 
 
 @dataclass(frozen=True)
@@ -94,11 +101,14 @@ class ActuatorModel:
 
         At rest before the command begins: at `initial` [Pa] as far as the hysteresis allows it, or
         without it at the first command. Sampled at the controller's task, the command is exact.
+        Raises InputError for times `at` that do not increase.
         """
-        changes = command.drop_repeated()
-        first = float(changes.values[0])
-        valve = apply_hysteresis(changes, self.hysteresis, first if initial is None else initial)
-        stroke = Stroke(self.kiss_pressure, self.fill_time)
-        acting = stroke.limit_pressure(HeldSignal(valve.time + self.dead_time, valve.values))
-        lag = Lag(self.rising_lag, self.falling_lag, self.damping)
-        return solve_lag(acting, float(acting.values[0]), lag).evaluate(at)
+        if not (np.diff(at) >= 0.0).all():
+            raise InputError(
+                "the times at which a pressure is wanted do not increase",
+                "sort them",
+                Where(key="at"),
+            )
+        time, values = (np.ascontiguousarray(one) for one in (command.time, command.values))
+        given = json.dumps({name: float(getattr(self, name)) for name in QUANTITIES})
+        return actuator_pressure(given, (time, values), initial, np.ascontiguousarray(at))

@@ -54,6 +54,12 @@ class LimitCheck:
     upper: float | None
 
     @property
+    def excess(self) -> float:
+        """Relative excess of the upper bound, or of the estimate without one; negative within."""
+        value = self.value if self.upper is None else self.upper
+        return value / self.limit.bound - 1.0
+
+    @property
     def state(self) -> LimitState:
         """State of the limit on the draws."""
         if self.upper is not None and self.upper <= self.limit.bound:

@@ -72,7 +72,14 @@ class Objective:
         """Return the objective with another quantile."""
         return replace(self, share=share)
 
-    def tighten(self, margin: float) -> Objective:
-        """Return the objective with its bounds lower by the relative `margin`."""
-        limits = tuple(replace(one, bound=(1.0 - margin) * one.bound) for one in self.limits)
+    def tighten(self, margins: Sequence[float]) -> Objective:
+        """Return the objective with bounds lower by relative `margins`, one for each limit."""
+        limits = tuple(
+            replace(one, bound=(1.0 - margin) * one.bound)
+            for one, margin in zip(self.limits, margins, strict=True)
+        )
         return replace(self, limits=limits)
+
+    def scale_weight(self, factor: float) -> Objective:
+        """Return the objective with another weight of the excesses."""
+        return replace(self, weight=factor * self.weight)

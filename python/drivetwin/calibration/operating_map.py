@@ -122,8 +122,8 @@ class OperatingMap:
 def calibrate_map(make_task: MakeTask, grid: Grid, stages: Stages = NO_STAGES) -> OperatingMap:
     """Calibrate all points of a grid; `stages` may have some of them.
 
-    Raises InfeasibleError where the start cannot keep the limits, and InputError for an operating
-    point that has no such policy. Other points may exceed a limit; their certificates say so.
+    A point may exceed a limit; its certificate says so. Raises InputError for an operating point
+    that has no such policy.
     """
     tasks = {place: make_task(grid.get_point(place)) for place in grid.places}
     with scale_progress(0.0, 0.6):

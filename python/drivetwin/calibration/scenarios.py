@@ -42,6 +42,7 @@ class Purpose(IntEnum):
     POLISH = 2
     TAIL = 3
     CERTIFICATE = 4
+    CHECK = 5
 
 
 DrawModel = Callable[[np.random.Generator], DualClutch | None]

@@ -28,6 +28,14 @@ class CalibrationSettings:
     """Scenarios of the polish."""
     tail_draws: int = 256
     """Scenarios of the last polish, which shapes the tail."""
+    check_draws: int = 2000
+    """Scenarios on which limits are derived from the start, and checked after the polish."""
+    repairs: int = 3
+    """Largest number of polishes under tighter limits, where a limit is exceeded on these draws."""
+    repair_iterations: int = 3
+    """Largest number of linear programs of one of these polishes."""
+    repair_weight: float = 3.0
+    """Factor on the weight of the excess from one of these polishes to the next."""
     certificate_draws: int = 2000
     """Fresh scenarios of the certificate."""
     search_share: float = 0.9

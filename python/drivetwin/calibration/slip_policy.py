@@ -11,8 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.fill import REFERENCE
-from drivetwin.actuator.model import ActuatorModel
+from drivetwin.actuator.model import REFERENCE, ActuatorModel
 from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.profiles import PolicyParameter, check_parameters, move_start

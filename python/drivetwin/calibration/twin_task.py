@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -32,6 +33,7 @@ DEFAULT_LIMITS = {
     Metric.FRICTION_ENERGY: Statistic.MEAN,
 }
 """Limits without a file: no worse than the start."""
+_NOT_IDENTIFIED = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
 
 
 @dataclass(frozen=True)
@@ -97,25 +99,30 @@ def require_identified(twin: Twin) -> None:
     """
     verdicts = [one.verdict for one in twin.parameters.values()]
     if Verdict.IDENTIFIED not in verdicts:
-        reasons = sorted({one.reason for one in twin.parameters.values() if one.reason})
+        estimated = [one for one in twin.parameters.values() if one.verdict in _NOT_IDENTIFIED]
+        reasons = Counter(one.reason for one in estimated if one.reason).most_common(1)
         raise IdentificationError(
             "the twin is not valid: none of its parameters is identified"
-            + (f" ({reasons[0]})" if reasons else ""),
+            + (f" ({reasons[0][0]})" if reasons else ""),
             "correct the vehicle card or take another log, and identify again",
             Where(file=twin.name),
         )
 
 
 def derive_limits(task: Task) -> tuple[Limit, ...]:
-    """Limits at which a calibration is no worse than the start in time, vibration and energy."""
+    """Limits at which a calibration is no worse than the start in time, vibration and energy.
+
+    They are upper bounds of the start with the confidence of the certificate, on the draws by
+    which the limits of a calibration are checked: the start keeps them.
+    """
     plant, space = Plant(task.maneuver, task.settings.threads), Space(task.policy)
-    draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
+    draws = draw_for(task, task.settings.check_draws, Purpose.CHECK)
     outcome = plant.evaluate(space.build_control(space.start), draws)
     limits = []
     for metric, statistic in DEFAULT_LIMITS.items():
         found = compute_quantiles(outcome.values[metric], task.settings.confidence)
-        value = found.mean if statistic is Statistic.MEAN else found.share_95
-        limits.append(Limit(metric, value, statistic))
+        value = found.mean_upper if statistic is Statistic.MEAN else found.upper_95
+        limits.append(Limit(metric, found.share_95 if value is None else value, statistic))
     return tuple(limits)
 
 

@@ -23,8 +23,15 @@ from drivetwin.cli.output import (
     print_line,
     print_table,
     show_step,
+    to_error_document,
 )
-from drivetwin.errors import DrivetwinError, IdentificationError, InputError, Where
+from drivetwin.errors import (
+    DrivetwinError,
+    IdentificationError,
+    InfeasibleError,
+    InputError,
+    Where,
+)
 
 if TYPE_CHECKING:
     from drivetwin.calibration.calibrate import Calibration
@@ -122,6 +129,7 @@ def calibrate(
 
     Minimise the tail mean of peak jerk under limits, and certify the result on fresh draws. Write
     calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx into DIR.
+    Where a limit is out of reach, the best calibration found is written and the exit code is 2.
     """
     from drivetwin.calibration.identified_range import check_identified_range
     from drivetwin.calibration.settings import CalibrationSettings
@@ -168,13 +176,30 @@ def calibrate(
     with show_step(f"writing {output}"):
         _write_results(output, results, findings, (model, request, twin))
     stages.remove()
+    infeasible = _find_excess(found, output)
     if as_json:
-        print_json(_to_document(results, findings, output))
+        fault = {} if infeasible is None else to_error_document(infeasible)
+        print_json({**_to_document(results, findings, output), **fault})
+        if infeasible is not None:
+            raise typer.Exit(infeasible.exit_code)
         return
     _print_results(found)
     _print_around(*results[1:])
     print_findings(findings)
     print_line(f"wrote {output / REPORT}")
+    if infeasible is not None:
+        raise infeasible
+
+
+def _find_excess(found: Calibration, output: Path) -> DrivetwinError | None:
+    """Return the error of a calibration that exceeds a limit, which names its file."""
+    from drivetwin.calibration.keep_limits import require_limits
+
+    try:
+        require_limits(found.after.certificate.limits, found.before.certificate.limits)
+    except InfeasibleError as error:
+        return replace(error, where=Where(file=str(output / CALIBRATION)))
+    return None
 
 
 def _open_stages(
@@ -276,17 +301,15 @@ def _load_valid_twin(source: Path) -> Twin:
     from drivetwin.estimation.result.status import ModelStatus
     from drivetwin.files.result_file import load_result
     from drivetwin.files.twin_conversion import load_twin
+    from drivetwin.report.model_verdict import explain_result
 
     model = load_twin(source)
     result = source.with_name(RESULT)
     if source.name == TWIN and result.is_file():
-        status = load_result(result).status
-        if status is ModelStatus.NOT_VALID:
-            raise IdentificationError(
-                f"the twin is {status.value}: its simulation does not follow the log",
-                f"see {RESULT} for the reasons, correct the vehicle card and identify again",
-                Where(file=str(source)),
-            )
+        verdict = explain_result(load_result(result))
+        if verdict.status is ModelStatus.NOT_VALID:
+            what = f"the twin is {verdict.status.value}: {verdict.reason}"
+            raise IdentificationError(what, verdict.action, Where(file=str(source)))
     return model
 
 
@@ -378,9 +401,10 @@ def _print_results(found: Calibration) -> None:
 
 def _print_around(front: Front | None, mapped: OperatingMap | None) -> None:
     if front is not None:
+        times = [one.time for one in front.points]
+        reach = f", shift time {times[0]:.3f} to {times[-1]:.3f} s" if times else ""
         print_line(
-            f"front: {len(front.points)} of {front.tried} calibrations, shift time "
-            f"{front.points[0].time:.3f} to {front.points[-1].time:.3f} s"
+            f"front: {len(times)} of {front.tried} calibrations keep the other limits{reach}"
         )
     if mapped is not None:
         jerks = [one.jerk for one in mapped.points.values()]

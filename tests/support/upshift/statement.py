@@ -28,7 +28,10 @@ _LENGTH = STEP * (SAMPLES - 1)
 
 @dataclass(frozen=True)
 class Problem:
-    """Parameters of the equations, SI; pairs are of the off-going and the on-coming clutch."""
+    """Parameters of the equations, SI; pairs are of the off-going and the on-coming clutch.
+
+    `speed` is that of the engine at the start.
+    """
 
     J_e: float = 17.5
     J_out: float = 1.5
@@ -47,6 +50,7 @@ class Problem:
     mu_c: float = 0.12
     v_s: float = 6.0
     mu_v: float = 1e-4
+    speed: float = 185.0
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ def make_inputs() -> Inputs:
 def start(of: Problem, given: Inputs) -> tuple[float, float, float, float]:
     """Return ω_e, ω_out, ω_w [rad/s] and T_o [N m]: steady acceleration, first clutch locked."""
     ratio = of.i_in * of.i_c[0] * of.i_out[0]
-    engine, vehicle = 185.0, of.J_v / of.i_f**2
+    engine, vehicle = of.speed, of.J_v / of.i_f**2
     inertia = of.J_e * ratio**2 + of.J_out + vehicle
     acceleration = (float(given.torque[0]) * of.eta * ratio - of.T_v / of.i_f) / inertia
     output = engine / ratio

@@ -26,11 +26,41 @@ pub struct ActuatorModel {
     pub hysteresis: f64,
 }
 
+impl ActuatorModel {
+    /// Pressures [Pa] at increasing times `at` [s] by `commands`, times [s] with pressures [Pa] held from there on.
+    ///
+    /// At rest before the first command: at `initial` [Pa] as far as the hysteresis allows it, or without it at
+    /// that command. Nothing without a command.
+    pub fn respond(&self, commands: &[(f64, f64)], initial: Option<f64>, at: &[f64]) -> Vec<f64> {
+        let (Some(&(begin, first)), Some(&start)) = (commands.first(), at.first()) else {
+            return Vec::new();
+        };
+        let valve = self.move_valve(initial.unwrap_or(first), first);
+        let step = at.get(1).map_or(0.0, |next| next - start);
+        let mut actuator = Actuator::new(self, valve, start.min(begin), step);
+        let mut left = commands.iter().peekable();
+        at.iter()
+            .map(|&time| {
+                while let Some(&(change, wanted)) = left.next_if(|one| one.0 <= time) {
+                    actuator.advance(change);
+                    actuator.command(wanted);
+                }
+                actuator.advance(time)
+            })
+            .collect()
+    }
+
+    /// Pressure [Pa] of a valve at `valve` [Pa] after a command [Pa]: a play centred on it, shut at zero or less.
+    fn move_valve(&self, valve: f64, wanted: f64) -> f64 {
+        let half = 0.5 * self.hysteresis;
+        if wanted > 0.0 { valve.max(wanted - half).max(0.0).min(wanted + half) } else { 0.0 }
+    }
+}
+
 /// Actuator in motion.
 #[derive(Clone, Debug)]
 pub struct Actuator {
-    half_hysteresis: f64,
-    dead_time: f64,
+    model: ActuatorModel,
     valve: f64,
     /// Pressures of the valve [Pa] with the times [s] at which they reach the clutch.
     pending: VecDeque<(f64, f64)>,
@@ -45,8 +75,7 @@ impl Actuator {
         let stroke = Stroke::new(model.kiss_pressure, model.fill_time, command);
         let &ActuatorModel { rising_lag, falling_lag, damping, .. } = model;
         Self {
-            half_hysteresis: 0.5 * model.hysteresis,
-            dead_time: model.dead_time,
+            model: *model,
             valve: command,
             pending: VecDeque::new(),
             lag: Lag::new(rising_lag, falling_lag, damping, stroke.acting(), step),
@@ -57,12 +86,10 @@ impl Actuator {
 
     /// Command a pressure [Pa] from the present time on; zero or less shuts the valve.
     pub fn command(&mut self, wanted: f64) {
-        let half = self.half_hysteresis;
-        let moved = self.valve.max(wanted - half).max(0.0).min(wanted + half);
-        let valve = if wanted > 0.0 { moved } else { 0.0 };
+        let valve = self.model.move_valve(self.valve, wanted);
         if valve != self.valve {
             self.valve = valve;
-            self.pending.push_back((self.time + self.dead_time, valve));
+            self.pending.push_back((self.time + self.model.dead_time, valve));
         }
     }
 
