@@ -225,6 +225,19 @@ def test_proposals_need_a_file_to_be_written_to(
     assert "--write-mapping" in capsys.readouterr().err
 
 
+def test_an_ignored_column_is_listed_as_ignored_and_stays_so(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mapping, again = tmp_path / "map.toml", tmp_path / "again.toml"
+    mapping.write_text('[columns]\nignored = ["SpdWhl"]\n')
+    options = ["--channels", str(mapping), "--write-mapping", str(again)]
+    found = _inspect(capsys, str(bench_files.log), "--vehicle", str(bench_files.card), *options)
+    columns = {column["name"]: column for column in found["columns"]}
+    assert (columns["SpdWhl"]["roles"], columns["SpdWhl"]["ignored"]) == ([], True)
+    assert "wheel_speed" not in found["mapping"]
+    assert read_mapping(again).options.ignored == ("SpdWhl",)
+
+
 def test_names_of_the_user_are_recognised_and_kept(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

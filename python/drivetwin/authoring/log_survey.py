@@ -12,7 +12,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.mapping import Mapped, make_spec
+from drivetwin.channels.mapping import Mapped, make_spec, select_free
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.name_table import load_name_table, normalise_name
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
@@ -104,7 +104,7 @@ def survey_log(path: Path, mapping: Path | None) -> LogSurvey:
     stated = Mapped({}) if mapping is None else read_mapping(mapping)
     with open_recording(path, stated.options) as opened:
         recording = Remembered(opened)
-        specs = find_pressure_columns(recording.columns, stated.channels)
+        specs = find_pressure_columns(recording.columns, stated)
         channels = {
             **stated.channels,
             **{make_pressure_role(key): one for key, one in specs.items()},
@@ -151,26 +151,22 @@ def make_blank_card(labels: Mapping[str, object]) -> VehicleCard:
     return VehicleCard("", "paper", 1.0, 1.0, (), elements, (1.0, 2.0), (1.0, 2.0))
 
 
-def find_pressure_columns(
-    columns: Sequence[Column], stated: Mapping[str, ChannelSpec]
-) -> dict[str, ChannelSpec]:
+def find_pressure_columns(columns: Sequence[Column], stated: Mapped) -> dict[str, ChannelSpec]:
     """Find the pressures of shift elements: as stated in a mapping, else by name and unit.
 
     Where no name has a known form, all pressures are candidates under their own names.
     """
     found = {
         label: spec
-        for role, spec in stated.items()
+        for role, spec in stated.channels.items()
         if (label := get_pressure_element(role)) is not None
     }
     if found:
         return found
     usable = [
         column
-        for column in columns
-        if not (column.empty or column.silent or column.aside)
-        and _is_pressure(column)
-        and not any(spec.matches(column) for spec in stated.values())
+        for column in select_free(columns, stated.channels.values(), stated.options.ignored)
+        if not (column.empty or column.silent or column.aside) and _is_pressure(column)
     ]
     labels: dict[str, list[Column]] = {}
     for column in usable:

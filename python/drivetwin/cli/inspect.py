@@ -226,7 +226,7 @@ def _build_table(columns: Sequence[Column], source: str) -> Table:
             _format_cell(low),
             _format_cell(high),
             str(column.gaps),
-            ", ".join(column.roles) or "-",
+            ", ".join(column.roles) or ("ignored" if column.ignored else "-"),
         )
     return table
 

@@ -21,8 +21,7 @@ from drivetwin.authoring.log_survey import (
     make_blank_card,
     survey_log,
 )
-from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.mapping import Mapped, combine_specs
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.pressure_roles import get_element, make_pressure_role
@@ -39,6 +38,7 @@ from drivetwin.plausibility.check import FROM_READING, check_card, select_card_f
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.workbench.jobs import Emit
+from drivetwin.workbench.mapping import Corrections
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Opened:
 
 @dataclass(frozen=True)
 class Request:
-    """Files to open, and the channels as corrected by the user.
+    """Files to open, and the user's corrections of the mapping.
 
     The labels name the files in messages and results; without a card `card` is None.
     """
@@ -70,7 +70,7 @@ class Request:
     card: Path | None = None
     card_label: str = ""
     mapping: Path | None = None
-    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    corrections: Corrections = field(default_factory=Corrections)
 
 
 @dataclass(frozen=True)
@@ -178,10 +178,15 @@ def _read_stated(request: Request, card: VehicleCard | None) -> Mapped:
     stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
     corrected = {
         role: spec
-        for role, spec in request.channels.items()
+        for role, spec in request.corrections.channels.items()
         if card is None or (element := get_element(role)) is None or element in card.elements
     }
-    return replace(stated, channels={**stated.channels, **corrected})
+    ignored = tuple(dict.fromkeys((*stated.options.ignored, *request.corrections.ignored)))
+    return replace(
+        stated,
+        channels=combine_specs(stated.channels, corrected, request.corrections.ignored),
+        options=replace(stated.options, ignored=ignored),
+    )
 
 
 def _name_pressures(
@@ -193,7 +198,7 @@ def _name_pressures(
     """
     if card is not None:
         return card, stated
-    specs = find_pressure_columns(recording.columns, stated.channels)
+    specs = find_pressure_columns(recording.columns, stated)
     pressures = {make_pressure_role(label): spec for label, spec in specs.items()}
     return make_blank_card(specs), replace(stated, channels={**stated.channels, **pressures})
 
