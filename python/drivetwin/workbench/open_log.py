@@ -15,7 +15,6 @@ from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.phases import Boundary, move_boundaries
 from drivetwin.workbench.sandboxed_parse import Opened
 
-
 MOST_LOGS = 6
 """Maximum number of logs of a session."""
 
