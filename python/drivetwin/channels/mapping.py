@@ -222,7 +222,8 @@ def _refuse_unknown_elements(
             raise MappingError(
                 f"the mapping has a pressure of {element!r}, which is no element of the vehicle "
                 f"card{suggest_spelling(element, elements)}",
-                f"use the element names of the card: [channels.{table}<element>]",
+                f"use the element names of the card: [channels.{table}<element>]; `drivetwin "
+                "inspect LOG --vehicle CARD --write-mapping channels.toml` writes them",
                 Where(file=file),
             )
 
