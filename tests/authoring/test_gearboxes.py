@@ -7,7 +7,12 @@ from itertools import pairwise
 
 import pytest
 
-from drivetwin.authoring.gearboxes import list_forward_gears, match_gearboxes, reduce_gears
+from drivetwin.authoring.gearboxes import (
+    list_forward_gears,
+    match_gearboxes,
+    reduce_gears,
+    refuse_irreducible,
+)
 from drivetwin.errors import CardError
 from drivetwin.gearbox import list_builtin_gearboxes
 
@@ -38,6 +43,15 @@ def test_neighbouring_gears_have_consistent_ratios(name: str) -> None:
         assert [one.gear for one in elements] == [low, high]
         for one in elements:
             assert one.i_c * one.i_out == pytest.approx(one.ratio, rel=1e-5)
+
+
+def test_a_gearbox_of_dogs_alone_is_refused_as_a_whole() -> None:
+    for name in list_builtin_gearboxes():
+        if name == "manual-6":
+            with pytest.raises(CardError, match="dog"):
+                refuse_irreducible(name)
+        else:
+            refuse_irreducible(name)
 
 
 def test_gears_of_several_shifts_need_one_element_each() -> None:

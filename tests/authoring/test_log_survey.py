@@ -12,10 +12,17 @@ import pytest
 from drivetwin._util.toml import parse_toml
 from drivetwin.authoring.answers import Origin, get_value
 from drivetwin.authoring.card_text import format_card
-from drivetwin.authoring.log_survey import LogGear, assign_pressures, label_pressure, survey_log
+from drivetwin.authoring.log_survey import (
+    LogGear,
+    assign_pressures,
+    find_pressure_columns,
+    label_pressure,
+    survey_log,
+)
 from drivetwin.authoring.options import CardOptions, parse_options
 from drivetwin.authoring.questions import Sources
 from drivetwin.authoring.session import Session
+from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.read_options import Column
 from drivetwin.vehicle.card import load_card
 from tests.plausibility.fixtures import Synthetic, make_log
@@ -99,21 +106,35 @@ def test_a_complete_card_of_a_log_and_options_is_read(made: Synthetic, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("name", "unit", "label"),
+    ("name", "label"),
     [
-        ("PrsBrk2", "bar", "B2"), ("p_K1_ist", "bar", "K1"), ("Druck Bremse 3", "kPa", "B3"),
-        ("p2", "bar", "E2"), ("PrsC4", "bar", "C4"), ("PrsClutch", "bar", "K"),
-        ("PrsMain", "bar", None), ("PrsBrk2", None, None), ("n2", "rpm", None),
-        ("C03 p", "bar", "C3"), ("ClutchPressureC4", "bar", "C4"),
-        ("Kupplungsdruck 1", "bar", "K1"),
-        ("BrakePressure2", "bar", "B2"), ("Prs_Clutch_K2", "bar", "K2"), ("p_K1_soll", "bar", None),
-        ("Druck_Kupplung_1", "bar", "K1"), ("C4Pressure", "psi", "C4"), ("Clutch4", "bar", None),
+        ("PrsBrk2", "B2"), ("p_K1_ist", "K1"), ("Druck Bremse 3", "B3"), ("p2", "E2"),
+        ("PrsC4", "C4"), ("PrsClutch", "K"), ("PrsMain", None), ("n2", None), ("C03 p", "C3"),
+        ("ClutchPressureC4", "C4"), ("Kupplungsdruck 1", "K1"), ("BrakePressure2", "B2"),
+        ("Prs_Clutch_K2", "K2"), ("Druck_Kupplung_1", "K1"), ("C4Pressure", "C4"),
+        ("Clutch4", None),
     ],
 )  # fmt: skip
-def test_pressures_are_labelled_after_their_elements(
-    name: str, unit: str | None, label: str | None
+def test_pressures_are_labelled_after_their_elements(name: str, label: str | None) -> None:
+    assert label_pressure(name) == label
+
+
+@pytest.mark.parametrize(
+    ("columns", "labels"),
+    [
+        ({"PrsBrk2": "bar", "p_K1_soll": "bar", "p3": "rpm", "p4": ""}, {"B2"}),
+        ({"PrsBrk2": "", "PrsBrk3": None, "p_K1_soll": None, "p4": "Nm"}, {"B2", "B3"}),
+        ({"main": "bar", "PrsBrk2": "rpm"}, {"main"}),
+        ({"main": None, "n2": None}, set()),
+    ],
+)
+def test_columns_with_a_unit_of_pressure_come_before_those_without(
+    columns: dict[str, str | None], labels: set[str]
 ) -> None:
-    assert label_pressure(Column(name, unit)) == label
+    made = [Column(name, unit) for name, unit in columns.items()]
+    assert find_pressure_columns(made, Mapped({})).keys() == labels
+    known = find_pressure_columns(made, Mapped({}), any_name=False)
+    assert known.keys() == labels - {"main"}
 
 
 def test_pressures_that_are_high_throughout_make_no_gear() -> None:

@@ -59,7 +59,7 @@ def test_a_held_out_log_is_predicted(opened: Page, pictures: Path) -> None:
     page = opened
     expect(page.locator("#log-content")).to_contain_text("identified together")
     show_view(page, "shifts")
-    page.get_by_label("use of shift 2→3 of second.csv").select_option("hold")
+    page.get_by_label("use of shift 2→3 of second.csv").select_option("hold out")
     expect_message(page, "predicts 1 shift instead of fitting")
     expect(page.locator("#step-shifts")).to_contain_text("2 shifts of 2 logs found, 1 held out.")
     show_view(page, "identify")

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.mapping import resolve_roles
+from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
+from drivetwin.channels.mapping import Fallback, combine_specs, resolve_roles
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.recognition import infer_candidates
 from drivetwin.channels.roles import NEEDED
@@ -39,6 +39,31 @@ def test_a_stated_column_is_not_guessed_for_another_role() -> None:
     stated = {"wheel_speed": ChannelSpec("SpdIn")}
     with pytest.raises(MissingChannelError, match="'input_speed'"):
         resolve_roles(columns(ENGLISH), stated, ELEMENTS, NEEDED, "log.csv")
+
+
+def test_an_ignored_column_gets_no_role_unless_one_is_stated() -> None:
+    remembered = {"output_torque": RememberedChannel(ChannelSpec("TrqOut"))}
+    fallback = Fallback(remembered, {"wheel_speed": ["TrqOut"]}, ("TrqOut", "SpdWhl", "Nowhere"))
+    mapped = resolve_roles(columns(ENGLISH), {}, ELEMENTS, (), "log.csv", fallback=fallback)
+    assert not {"output_torque", "wheel_speed"} & set(mapped.channels)
+    assert [one.code for one in mapped.findings] == [Code.IGNORED_COLUMN_ABSENT]
+    stated = {"wheel_speed": ChannelSpec("SpdWhl")}
+    mapped = resolve_roles(columns(ENGLISH), stated, ELEMENTS, (), "log.csv", fallback=fallback)
+    assert mapped.channels["wheel_speed"].source == "SpdWhl"
+
+
+def test_an_ignored_candidate_leaves_the_other_one() -> None:
+    two = columns([*ENGLISH, "EngineTorque"])
+    mapped = resolve_roles(
+        two, {}, ELEMENTS, NEEDED, "log.csv", fallback=Fallback(ignored=("EngTrq",))
+    )
+    assert mapped.channels["engine_torque"].source == "EngineTorque"
+
+
+def test_a_mapping_takes_columns_from_the_roles_of_the_card() -> None:
+    card = {"gear": ChannelSpec("a"), "throttle": ChannelSpec("b"), "wheel_speed": ChannelSpec("c")}
+    stated = {"input_speed": ChannelSpec("c")}
+    assert combine_specs(card, stated, ("a",)) == {"throttle": ChannelSpec("b"), **stated}
 
 
 def test_the_engine_speed_stands_in_for_the_input_speed() -> None:

@@ -30,7 +30,7 @@ def test_a_written_mapping_reads_back(tmp_path: Path) -> None:
 
 def test_options_for_the_whole_file_read_back(tmp_path: Path) -> None:
     bus = BusOptions((tmp_path / "bus.dbc",), 1109.0)
-    options = ReadOptions(TimeColumn("clk", "ms", simultaneous=True), bus)
+    options = ReadOptions(TimeColumn("clk", "ms", simultaneous=True), bus, ('M "ist"', "nRad"))
     path = tmp_path / "map.toml"
     text = format_mapping({"gear": ChannelSpec("Gang", group="10ms")}, options)
     path.write_text(text, encoding="utf-8")

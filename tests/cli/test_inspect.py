@@ -180,11 +180,13 @@ def _unnamed(log: Path, path: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("with_card", [True, False])
 def test_a_log_without_units_is_described_and_its_mapping_proposes_them(
-    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str], *, with_card: bool
 ) -> None:
     log, path = _unnamed(bench_files.log, tmp_path / "log.csv"), tmp_path / "map.toml"
-    arguments = [str(log), "--vehicle", str(bench_files.card), "--write-mapping", str(path)]
+    card = ["--vehicle", str(bench_files.card)] if with_card else []
+    arguments = [str(log), *card, "--write-mapping", str(path)]
     found = _inspect(capsys, *arguments)
     assert len(found["columns"]) == 7
     assert "time column" in found["refusal"]["what"]
@@ -201,6 +203,9 @@ def test_a_log_without_units_is_described_and_its_mapping_proposes_them(
     assert accepted.options.time.unit == "s"
     checked = ["shifts", str(log), "--vehicle", str(bench_files.card), "--channels", str(path)]
     assert main(checked) == 0
+    capsys.readouterr()
+    again = _inspect(capsys, str(log), *card, "--channels", str(path))
+    assert (again["refusal"], len(again["notes"])) == (None, 0 if with_card else 1)
 
 
 def test_a_mapping_is_written_of_a_log_that_cannot_be_read(
@@ -223,6 +228,19 @@ def test_proposals_need_a_file_to_be_written_to(
 ) -> None:
     assert main(["inspect", str(bench_files.log), "--accept-proposals"]) == 2
     assert "--write-mapping" in capsys.readouterr().err
+
+
+def test_an_ignored_column_is_listed_as_ignored_and_stays_so(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mapping, again = tmp_path / "map.toml", tmp_path / "again.toml"
+    mapping.write_text('[columns]\nignored = ["SpdWhl"]\n')
+    options = ["--channels", str(mapping), "--write-mapping", str(again)]
+    found = _inspect(capsys, str(bench_files.log), "--vehicle", str(bench_files.card), *options)
+    columns = {column["name"]: column for column in found["columns"]}
+    assert (columns["SpdWhl"]["roles"], columns["SpdWhl"]["ignored"]) == ([], True)
+    assert "wheel_speed" not in found["mapping"]
+    assert read_mapping(again).options.ignored == ("SpdWhl",)
 
 
 def test_names_of_the_user_are_recognised_and_kept(

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Commands ended at random moments: outputs whole or absent, no temporary files, exit codes.
 
-The suite `faults` tries 30 moments of each command and signal, the everyday tests one of some.
+The suite `faults` tries 30 moments of each command and signal, or KILLED_MOMENTS; the everyday
+tests try one of some.
 """
 
 from __future__ import annotations
@@ -123,8 +124,8 @@ def test_one_moment(folder: Path, tmp_path: Path, name: str, number: int) -> Non
 @pytest.mark.faults
 @pytest.mark.parametrize("number", SIGNALS)
 @pytest.mark.parametrize("name", ["identify", "export", "report", "fleet"])
-def test_thirty_moments(folder: Path, tmp_path: Path, name: str, number: int) -> None:
-    try_moments(folder, tmp_path, name, number, 30)
+def test_many_moments(folder: Path, tmp_path: Path, name: str, number: int) -> None:
+    try_moments(folder, tmp_path, name, number, int(os.environ.get("KILLED_MOMENTS", "30")))
 
 
 def test_of_two_at_once_one_wins_and_one_is_told(folder: Path, tmp_path: Path) -> None:

@@ -241,7 +241,7 @@ def test_covariance_is_total(twin: Twin) -> None:
 
 def test_the_card_it_carries_reads_a_log_as_the_vehicles_own(twin: Twin, tmp_path: Path) -> None:
     spec = ChannelSpec("TQ_OUT", unit="N*m", sign=-1, group="fast")
-    options = ReadOptions(TimeColumn("clk", "ms"), BusOptions((Path("a.dbc"),), 1109.0))
+    options = ReadOptions(TimeColumn("clk", "ms"), BusOptions((Path("a.dbc"),), 1109.0), ("nMot",))
     mapping = RememberedMapping({"output_torque": RememberedChannel(spec, "Nm")}, options)
     save_twin(tmp_path / "twin.toml", replace(twin, mapping=mapping))
     carried, given = load_twin(tmp_path / "twin.toml").build_card(), card()

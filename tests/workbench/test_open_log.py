@@ -12,8 +12,9 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Outcome
 from drivetwin.workbench.mapping import Entry, list_rows
+from drivetwin.workbench.open_log import MOST_LOGS
 from drivetwin.workbench.phases import Boundary
-from drivetwin.workbench.session import MOST_LOGS, Session
+from drivetwin.workbench.session import Session
 from tests.workbench.conftest import CARD, LOG, finish
 
 SECOND = "second.csv"
@@ -100,8 +101,8 @@ def test_an_added_log_has_the_corrections_of_the_selected_one(
     )
     session.add_log(session.get_folder_source(SECOND))
     first, second = session.work.logs
-    assert first.channels == second.channels
-    assert second.channels["wheel_speed"].unit == "1/min"
+    assert first.corrections == second.corrections
+    assert second.corrections.channels["wheel_speed"].unit == "1/min"
     assert set(first.require_log().channels) == set(second.require_log().channels)
 
 

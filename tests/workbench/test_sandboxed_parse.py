@@ -11,6 +11,7 @@ from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.errors import InputError
 from drivetwin.logs.formats.parser_limits import BASE_TIME
 from drivetwin.workbench.jobs import call
+from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.sandboxed_parse import (
     Opened,
     Request,
@@ -38,7 +39,7 @@ def test_a_log_comes_with_columns_and_shifts(place: Path, tmp_path: Path) -> Non
 
 def test_a_wrong_mapping_is_a_fault_with_the_columns_at_hand(place: Path, tmp_path: Path) -> None:
     wrong = {"output_speed": ChannelSpec("absent")}
-    opened = _open(place, tmp_path, channels=wrong)
+    opened = _open(place, tmp_path, corrections=Corrections(wrong))
     assert opened.log is None
     assert "absent" in opened.fault
     assert opened.survey.columns
@@ -46,7 +47,7 @@ def test_a_wrong_mapping_is_a_fault_with_the_columns_at_hand(place: Path, tmp_pa
 
 def test_a_corrected_unit_is_what_the_log_is_read_in(place: Path, tmp_path: Path) -> None:
     plain, opened = (
-        _open(place, tmp_path, channels=channels)
+        _open(place, tmp_path, corrections=Corrections(channels))
         for channels in ({}, {"output_torque": ChannelSpec(_column(place), unit="lbf*ft")})
     )
     assert plain.log is not None
@@ -56,9 +57,8 @@ def test_a_corrected_unit_is_what_the_log_is_read_in(place: Path, tmp_path: Path
 
 
 def test_a_corrected_unit_that_cannot_be_is_a_fault(place: Path, tmp_path: Path) -> None:
-    opened = _open(
-        place, tmp_path, channels={"output_torque": ChannelSpec(_column(place), unit="kNm")}
-    )
+    wrong = {"output_torque": ChannelSpec(_column(place), unit="kNm")}
+    opened = _open(place, tmp_path, corrections=Corrections(wrong))
     assert opened.log is None
     assert "largest torque" in opened.fault
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -94,6 +95,29 @@ def test_a_correction_reads_the_log_again(session: Session) -> None:
         session.identify([Method.PAPER])
     session.correct_mapping([Entry(one.role, one.unit, one.reversed) for one in rows])
     assert len(session.work.shifts) == 1
+
+
+@pytest.mark.parametrize("with_card", [True, False])
+def test_a_recognised_column_can_be_not_used_and_used_again(
+    session: Session, *, with_card: bool
+) -> None:
+    session.open(
+        session.get_folder_source(LOG), session.get_folder_source(CARD) if with_card else None
+    )
+    unused = {"wheel_speed", *(() if with_card else ("pressure.B2",))}
+    rows = list_rows(session.work.require_opened().survey)
+    all_used = [Entry(one.role, one.unit, one.reversed) for one in rows]
+    session.correct_mapping(
+        [replace(one, role="" if one.role in unused else one.role) for one in all_used]
+    )
+    left = {row.role for row in list_rows(session.work.require_opened().survey)}
+    assert left == {one.role for one in all_used} - unused | {""}
+    assert not unused & set(session.work.require_log().channels)
+    if with_card:
+        session.reopen(session.get_folder_source(session.save("unused")))
+        assert "wheel_speed" not in session.work.require_log()
+    session.correct_mapping(all_used)
+    assert unused <= set(session.work.require_log().channels)
 
 
 def test_phases_go_back_to_what_was_detected(session: Session) -> None:

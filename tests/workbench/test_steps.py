@@ -65,7 +65,7 @@ def test_every_log_must_be_readable_and_one_shift_fitted(identified: Session) ->
     both = replace(work, logs=(one, broken)).drop_results()
     assert _get(both, Step.CHANNELS).text == "b.csv cannot be read as mapped."
     assert _get(both, Step.SHIFTS).remedy is Step.CHANNELS
-    assert _get(both, Step.IDENTIFY).status is BLOCKED
+    assert _get(both, Step.IDENTIFY).remedy is Step.CHANNELS
     held = work.drop_results().hold_out([frozenset({0})])
     assert _get(held, Step.SHIFTS).text == "2→3 found, 1 held out."
     assert _get(held, Step.IDENTIFY).text == "Every shift is held out."

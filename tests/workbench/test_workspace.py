@@ -81,6 +81,7 @@ def _without(key: str) -> Callable[[dict[str, Any]], object]:
         (lambda c: c.update(locks={"k_o": {"kind": "loose"}}), "locks"),
         (lambda c: c["logs"][0].update(phases={"0": {"dawn": 1.0}}), "phases"),
         (lambda c: c["logs"][0].update(channels={"nonsense": {"source": "x"}}), "channels"),
+        (lambda c: c["logs"].append(c["logs"][0]), "twice"),
         (lambda c: c["twins"]["integral"]["bench.csv"].pop("parameters"), "twins"),
     ],
 )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -60,7 +61,8 @@ def test_any_text_is_a_file_inside_or_refused(folder: Folder, name: str) -> None
 
 def test_new_files_stay_inside_and_get_their_ending(folder: Folder) -> None:
     assert folder.make_new_path("work", ".workspace.json") == folder.root / "work.workspace.json"
-    for name in ("../work", "absent/work", "", ".workspace.json", "outer/work"):
+    os.mkfifo(folder.root / "pipe.workspace.json")
+    for name in ("../work", "absent/work", "", ".workspace.json", "outer/work", "pipe"):
         with pytest.raises(RefusedError):
             folder.make_new_path(name, ".workspace.json")
 

@@ -25,6 +25,8 @@ from drivetwin.workbench.zoom import collect_curves, parse_view
         ({"xaxis.range": [2.0, 1.0]}, None),
         ({"xaxis.range": ["a", None]}, None),
         ({"xaxis.range[0]": float("nan"), "xaxis.range[1]": 1.0}, None),
+        ({"xaxis.range": [0, 10**400]}, None),
+        ({"xaxis.range": [False, True]}, None),
         ({"shapes[0].x0": 1.0}, None),
         ({}, None),
     ],
@@ -44,6 +46,14 @@ def test_every_sample_in_view_is_sent(start: float) -> None:
     inside = x[(x >= view[0]) & (x <= view[1])]
     assert inside.size == pytest.approx(1001, abs=1)
     assert np.diff(inside) == pytest.approx(1e-3, abs=1e-4)
+
+
+def test_large_values_keep_their_steps() -> None:
+    time: FloatArray = np.arange(100, dtype=np.float64)
+    curve = Curve("clock", time, 1.7e9 + time, "#000")
+    (sent,) = collect_curves([Panel("clock", NM, [curve])], (0.0, 99.0)).values()
+    y = np.frombuffer(base64.b64decode(sent["y"]["bdata"]), sent["y"]["dtype"])
+    assert np.diff(y) == pytest.approx(1.0)
 
 
 def test_the_only_shift_in_the_window_is_selected(identified: Session) -> None:

@@ -97,13 +97,13 @@ def _iterate_excess(document: dict[str, Any]) -> Iterator[str]:
             waiting += [(item, (*place, name)) for name, item in inside]
         elif isinstance(value, int) and not -(2**63) <= value < 2**63:
             yield f"{key}: the integer exceeds 64 bits"
-        elif isinstance(value, float) and _is_extreme(value):
+        elif isinstance(value, float) and is_extreme(value):
             yield f"{key}: {value:g} is beyond 1e{MAX_EXPONENT} or within 1e-{MAX_EXPONENT} of zero"
         if any(isinstance(one, str) and len(one) > MAX_TEXT for one in (value, *place[-1:])):
             yield f"{key}: a text of more than {MAX_TEXT} characters"
 
 
-def _is_extreme(value: float) -> bool:
+def is_extreme(value: float) -> bool:
     """Return whether a number exceeds the limits; zero, NaN and infinity do not."""
     size = abs(value)
     return 0.0 < size < 10.0**-MAX_EXPONENT or 10.0**MAX_EXPONENT < size < math.inf

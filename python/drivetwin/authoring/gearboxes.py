@@ -126,6 +126,19 @@ def reduce_gears(name: str, gears: tuple[str, ...]) -> tuple[GearboxElement, ...
     )
 
 
+def refuse_irreducible(name: str) -> None:
+    """Raise CardError if no two neighbouring gears of a gearbox have a dual-clutch form."""
+    faults = []
+    for pair in pairwise(list_forward_gears(name)):
+        try:
+            reduce_gears(name, pair)
+        except CardError as fault:
+            faults.append(fault)
+        else:
+            return
+    raise faults[0]
+
+
 def _is_same(one: ElementRatios, other: ElementRatios) -> bool:
     apart = (abs(one.i_c / other.i_c - 1.0), abs(one.i_out / other.i_out - 1.0))
     return one.element == other.element and max(apart) <= SAME_RATIOS

@@ -12,7 +12,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.mapping import Mapped, make_spec
+from drivetwin.channels.mapping import Mapped, make_spec, select_free
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.name_table import load_name_table, normalise_name
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
@@ -104,13 +104,8 @@ def survey_log(path: Path, mapping: Path | None) -> LogSurvey:
     stated = Mapped({}) if mapping is None else read_mapping(mapping)
     with open_recording(path, stated.options) as opened:
         recording = Remembered(opened)
-        specs = find_pressure_columns(recording.columns, stated.channels)
-        channels = {
-            **stated.channels,
-            **{make_pressure_role(key): one for key, one in specs.items()},
-        }
-        blank = make_blank_card(specs)
-        named = replace(stated, channels=channels)
+        specs = find_pressure_columns(recording.columns, stated)
+        blank, named = name_pressures(specs, stated)
         columns = tuple(recording.columns)
         log = read_recording(recording, path, blank, named, Demands((), (), gearing=False))
     labels = [label for label in specs if make_pressure_role(label) in log]
@@ -145,47 +140,48 @@ def _compare_input_speeds(log: ShiftLog) -> tuple[float | None, bool]:
     return float(middle), False
 
 
-def make_blank_card(labels: Mapping[str, object]) -> VehicleCard:
-    """Make a card without gears that lets pressures be read under the `labels`."""
-    elements = {label: ElementSpec(label, "brake", 1.0, PriorValue(0.0)) for label in labels}
-    return VehicleCard("", "paper", 1.0, 1.0, (), elements, (1.0, 2.0), (1.0, 2.0))
+def name_pressures(specs: Mapping[str, ChannelSpec], stated: Mapped) -> tuple[VehicleCard, Mapped]:
+    """Return a card without gears and a mapping by which pressures are read under their labels."""
+    elements = {label: ElementSpec(label, "brake", 1.0, PriorValue(0.0)) for label in specs}
+    card = VehicleCard("", "paper", 1.0, 1.0, (), elements, (1.0, 2.0), (1.0, 2.0))
+    pressures = {make_pressure_role(label): spec for label, spec in specs.items()}
+    return card, replace(stated, channels={**stated.channels, **pressures})
 
 
 def find_pressure_columns(
-    columns: Sequence[Column], stated: Mapping[str, ChannelSpec]
+    columns: Sequence[Column], stated: Mapped, *, any_name: bool = True
 ) -> dict[str, ChannelSpec]:
     """Find the pressures of shift elements: as stated in a mapping, else by name and unit.
 
-    Where no name has a known form, all pressures are candidates under their own names.
+    Where no column has a unit of pressure, names of a known form count alone. Where no name has a
+    known form, all pressures are candidates under their own names if `any_name`.
     """
     found = {
         label: spec
-        for role, spec in stated.items()
+        for role, spec in stated.channels.items()
         if (label := get_pressure_element(role)) is not None
     }
     if found:
         return found
     usable = [
         column
-        for column in columns
-        if not (column.empty or column.silent or column.aside)
-        and _is_pressure(column)
-        and not any(spec.matches(column) for spec in stated.values())
+        for column in select_free(columns, stated.channels.values(), stated.options.ignored)
+        if not (column.empty or column.silent or column.aside or _is_command(column))
     ]
+    pressures = [column for column in usable if _has_pressure_unit(column)]
+    without_unit = [column for column in usable if not (column.unit or "").strip()]
     labels: dict[str, list[Column]] = {}
-    for column in usable:
-        if (label := label_pressure(column)) is not None:
+    for column in pressures or without_unit:
+        if (label := label_pressure(column.name)) is not None:
             labels.setdefault(label, []).append(column)
-    if not labels:
-        labels = {column.name.strip()[:MOST_LABEL]: [column] for column in usable}
+    if any_name and not labels:
+        labels = {column.name.strip()[:MOST_LABEL]: [column] for column in pressures}
     return {label: make_spec(one[0], columns) for label, one in labels.items() if len(one) == 1}
 
 
-def label_pressure(column: Column) -> str | None:
-    """Return the element that a pressure column is named after: `PrsBrk2` -> `B2`; else None."""
-    if not _is_pressure(column):
-        return None
-    plain = normalise_name(re.split(r"[./]", column.name)[-1])
+def label_pressure(name: str) -> str | None:
+    """Return the element that a column of a pressure is named after: `PrsBrk2` -> `B2`; or None."""
+    plain = normalise_name(re.split(r"[./]", name)[-1])
     table = load_name_table()
     pressure, clutch, brake, state = (
         table.make_alternatives(kind) for kind in ("pressure", "clutch", "brake", "state")
@@ -207,13 +203,15 @@ def label_pressure(column: Column) -> str | None:
     return "K" if re.fullmatch(f"(?:{pressure})(?:{clutch})(?:{state})*", plain) else None
 
 
-def _is_pressure(column: Column) -> bool:
-    """Return True for a column in a unit of pressure that is not named as a command."""
+def _has_pressure_unit(column: Column) -> bool:
     unit = find_unit(column.unit or "")
-    if unit is None or unit.quantity is not Quantity.PRESSURE:
-        return False
+    return unit is not None and unit.quantity is Quantity.PRESSURE
+
+
+def _is_command(column: Column) -> bool:
+    """Return True for a column that is named as a command."""
     command = load_name_table().make_alternatives("command", WHOLE_WORD)
-    return re.search(f"({command})$|^({command})", normalise_name(column.name)) is None
+    return re.search(f"({command})$|^({command})", normalise_name(column.name)) is not None
 
 
 def _find_gears(log: ShiftLog, speeds: GearboxSpeeds, labels: Sequence[str]) -> list[LogGear]:

@@ -8,6 +8,8 @@ import re
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 
+from drivetwin._util.toml import MAX_EXPONENT, is_extreme
+
 Parser = Callable[[str], object]
 
 MOST_CHARACTERS = 200
@@ -15,7 +17,7 @@ MOST_CHARACTERS = 200
 
 
 def parse_number(text: str) -> float:
-    """Parse a finite number with a decimal point."""
+    """Parse a finite number with a decimal point, of a size that a card may have."""
     text = text.strip()
     try:
         value = float(text)
@@ -25,6 +27,8 @@ def parse_number(text: str) -> float:
         raise ValueError(f"{text!r} is no number") from None
     if not math.isfinite(value) or "_" in text:
         raise ValueError(f"{text!r} is no finite number")
+    if is_extreme(value):
+        raise ValueError(f"{text!r} is beyond 1e{MAX_EXPONENT} or within 1e-{MAX_EXPONENT} of zero")
     return value
 
 

@@ -14,6 +14,7 @@ from drivetwin.authoring.gearboxes import (
     list_forward_gears,
     match_gearboxes,
     reduce_gears,
+    refuse_irreducible,
 )
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
@@ -88,7 +89,7 @@ def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Ques
     yield Question(
         ("gearbox",), "--gearbox NAME", "Built-in gearbox, or none",
         f"A built-in gearbox gives ratios and elements: {', '.join(known)}.{fitting}",
-        _make_optional(make_choice_parser([*known, "none"])),
+        _parse_gearbox,
         default=Answer(None, Origin.DEFAULT), shown="none", choices=("none", *known),
     )  # fmt: skip
     box = get_value(answers, "gearbox")
@@ -118,6 +119,18 @@ def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Ques
         _make_elements_parser(len(ratios) or None, list_stated_elements(answers)),
         default=_guess_elements(answers, survey),
     )  # fmt: skip
+
+
+def _parse_gearbox(text: str) -> str | None:
+    """Parse the name of a built-in gearbox that has a shift between clutches or brakes."""
+    name = make_choice_parser([*list_builtin_gearboxes(), "none"])(text)
+    if name == "none":
+        return None
+    try:
+        refuse_irreducible(name)
+    except CardError as fault:
+        raise ValueError(f"{fault.what}; {fault.remedy}") from fault
+    return name
 
 
 def list_stated_elements(answers: Answers) -> tuple[str, ...]:
@@ -308,16 +321,6 @@ def _describe_classes(role: str) -> str:
 
 def _make_sensor_parser(role: str) -> Parser:
     return lambda text: parse_sensor(text, role)
-
-
-def _make_optional(parse: Parser) -> Parser:
-    """Return a parser that converts `none` to None."""
-
-    def parse_optional(text: str) -> object:
-        value = parse(text)
-        return None if value == "none" else value
-
-    return parse_optional
 
 
 def _parse_mass(text: str) -> tuple[float, float]:

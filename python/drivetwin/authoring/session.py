@@ -149,8 +149,9 @@ def _list_dependencies(answers: Answers) -> tuple[object, ...]:
 
 def _make_open_error(questions: list[Question]) -> InputError:
     listed = "".join(f"\n  - {one.option}: {one.prompt}" for one in questions)
+    count = "1 entry is" if len(questions) == 1 else f"{len(questions)} entries are"
     return InputError(
-        f"{len(questions)} entries of the card are open, and no terminal for questions:{listed}",
+        f"{count} of the card open, and there is no terminal for questions:{listed}",
         "state them by these options, or run the command in a terminal; `--draft` writes a file in "
         "which open entries are comments",
     )

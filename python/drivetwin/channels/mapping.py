@@ -38,10 +38,14 @@ class Mapped:
 
 @dataclass(frozen=True)
 class Fallback:
-    """Sources of the roles that are not stated: channels of an earlier log, then names."""
+    """Sources of the roles that are not stated: channels of an earlier log, then names.
+
+    Columns whose name is `ignored` are no source.
+    """
 
     remembered: Mapping[str, RememberedChannel] = field(default_factory=dict)
     names: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    ignored: Collection[str] = ()
 
 
 _NO_FALLBACK = Fallback()
@@ -70,7 +74,8 @@ def resolve_roles(
     _refuse_unknown_elements(stated, elements, file)
     stated, findings = _drop_absent_optional(stated, columns, strict)
     channels = {role: _require_column(role, spec, columns, file) for role, spec in stated.items()}
-    free = select_free(columns, stated.values())
+    findings += _find_absent_ignored(fallback.ignored, columns)
+    free = select_free(columns, stated.values(), fallback.ignored)
     open_roles = {role: one for role, one in fallback.remembered.items() if role not in stated}
     recalled, remarks = recall_channels(open_roles, free, elements)
     channels |= recalled
@@ -102,10 +107,38 @@ def resolve_roles(
     )
 
 
-def select_free(columns: Iterable[Column], specs: Iterable[ChannelSpec]) -> list[Column]:
-    """Return the columns that none of the `specs` refers to."""
+def combine_specs(
+    base: Mapping[str, ChannelSpec], stated: Mapping[str, ChannelSpec], ignored: Collection[str]
+) -> dict[str, ChannelSpec]:
+    """Return the specs by role: the `stated` ones, then those of `base`.
+
+    Specs of `base` whose column is `ignored` or stated for another role are left out.
+    """
+    used = {(spec.source, spec.group) for spec in stated.values()}
+    kept = {
+        role: spec
+        for role, spec in base.items()
+        if spec.source not in ignored and (spec.source, spec.group) not in used
+    }
+    return {**kept, **stated}
+
+
+def select_free(
+    columns: Iterable[Column], specs: Iterable[ChannelSpec], ignored: Collection[str] = ()
+) -> list[Column]:
+    """Return the columns that none of the `specs` refers to and whose name is not `ignored`."""
     specs = tuple(specs)
-    return [one for one in columns if not any(spec.matches(one) for spec in specs)]
+    return [
+        column
+        for column in columns
+        if column.name not in ignored and not any(spec.matches(column) for spec in specs)
+    ]
+
+
+def _find_absent_ignored(ignored: Iterable[str], columns: Sequence[Column]) -> list[Finding]:
+    """Return a finding for each ignored name that no column has."""
+    names = {column.name for column in columns}
+    return [report(Code.IGNORED_COLUMN_ABSENT, column=one) for one in ignored if one not in names]
 
 
 def _drop_absent_optional(
@@ -189,7 +222,8 @@ def _refuse_unknown_elements(
             raise MappingError(
                 f"the mapping has a pressure of {element!r}, which is no element of the vehicle "
                 f"card{suggest_spelling(element, elements)}",
-                f"use the element names of the card: [channels.{table}<element>]",
+                f"use the element names of the card: [channels.{table}<element>]; `drivetwin "
+                "inspect LOG --vehicle CARD --write-mapping channels.toml` writes them",
                 Where(file=file),
             )
 

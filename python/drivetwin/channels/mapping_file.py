@@ -92,11 +92,18 @@ class BusTable(StrictModel):
     reference_torque_Nm: float | None = Field(default=None, gt=0)
 
 
+class ColumnsTable(StrictModel):
+    """`[columns]`: names of columns that get no role by their name."""
+
+    ignored: list[str] = Field(default_factory=list)
+
+
 class MappingFile(StrictModel):
     """A channel mapping file."""
 
     time: TimeTable = TimeTable()
     bus: BusTable = BusTable()
+    columns: ColumnsTable = ColumnsTable()
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
     names: ByRole[list[str]] = ByRole[list[str]]()
 
@@ -124,7 +131,7 @@ def read_mapping(path: Path) -> Mapped:
     time = TimeColumn(file.time.source, file.time.unit, file.time.simultaneous)
     names = dict(file.names.iterate_roles())
     _refuse_blank_names(names, path)
-    return Mapped(channels, ReadOptions(time, bus), names=names)
+    return Mapped(channels, ReadOptions(time, bus, tuple(file.columns.ignored)), names=names)
 
 
 def _refuse_blank_names(names: Mapping[str, list[str]], path: Path) -> None:

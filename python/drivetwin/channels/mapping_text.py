@@ -118,8 +118,9 @@ def _format_path(role: str) -> str:
 
 
 def _list_options(options: ReadOptions) -> dict[str, dict[str, str]]:
-    """The entries of `[time]` and `[bus]` as TOML, without what is not stated."""
+    """List the entries of `[time]`, `[bus]` and `[columns]` as TOML, those that are stated."""
     time, bus = options.time, options.bus
+    ignored = ", ".join(map(format_text, options.ignored))
     paths = [format_text(str(path.resolve())) for path in bus.databases]
     torque = bus.reference_torque
     entries: dict[str, dict[str, str | None]] = {
@@ -132,6 +133,7 @@ def _list_options(options: ReadOptions) -> dict[str, dict[str, str]]:
             "dbc": f"[{', '.join(paths)}]" if paths else None,
             "reference_torque_Nm": None if torque is None else repr(float(torque)),
         },
+        "columns": {"ignored": f"[{ignored}]" if ignored else None},
     }
     return {
         name: {key: text for key, text in table.items() if text is not None}

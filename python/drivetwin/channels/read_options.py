@@ -54,7 +54,11 @@ class BusOptions:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """Options for reading a file."""
+    """Options for reading a file.
+
+    Columns whose name is `ignored` get no role by their name; a mapping may still name them.
+    """
 
     time: TimeColumn = field(default_factory=TimeColumn)
     bus: BusOptions = field(default_factory=BusOptions)
+    ignored: tuple[str, ...] = ()

@@ -82,8 +82,8 @@ def _is_same_unit(named: str, before: str | None) -> bool:
 def recall_options(stated: ReadOptions, remembered: ReadOptions, folder: Path) -> ReadOptions:
     """Return the stated options, completed by the remembered ones.
 
-    Time column and bus options are each taken as a whole. DBC files are those of the remembered
-    names in the `folder` of the log, as far as they exist.
+    Time column, bus options and ignored columns are each taken as a whole. DBC files are those of
+    the remembered names in the `folder` of the log, as far as they exist.
     """
     time = stated.time if stated.time != TimeColumn() else remembered.time
     bus = stated.bus
@@ -91,4 +91,4 @@ def recall_options(stated: ReadOptions, remembered: ReadOptions, folder: Path) -
         beside = (folder / path.name for path in remembered.bus.databases)
         databases = tuple(path for path in beside if path.is_file())
         bus = BusOptions(databases, remembered.bus.reference_torque)
-    return ReadOptions(time, bus)
+    return ReadOptions(time, bus, stated.ignored or remembered.ignored)

@@ -173,6 +173,9 @@ def is_unit(spelling: str) -> bool:
     return find_unit(spelling) is not None or refused or is_time_unit(spelling)
 
 
+_BEGIN = "(`drivetwin inspect LOG --write-mapping channels.toml` begins one)"
+
+
 def resolve_channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit:
     """Return the unit of a channel that measures `quantity`.
 
@@ -184,7 +187,7 @@ def resolve_channel_unit(spelling: str | None, quantity: Quantity, where: Where)
     usual = ", ".join(map(repr, list_first_spellings(quantity)))
     source = where.channel or "..."
     remedy = (
-        f'assert it in the channel mapping: channels.<role> = {{ source = "{source}", '
+        f'assert it in the channel mapping {_BEGIN}: channels.<role> = {{ source = "{source}", '
         f'unit = "..." }}, for a {quantity} one of {usual}'
     )
     if spelling is None or not spelling.strip():
@@ -211,7 +214,9 @@ def is_time_unit(spelling: str) -> bool:
 
 def get_time_factor(spelling: str | None, where: Where) -> float:
     """Return the factor to seconds of a time unit; raises UnitError if missing or unknown."""
-    remedy = 'assert it in the channel mapping: time = { unit = "s" } (or "ms", "us", "min")'
+    remedy = (
+        f'assert it in the channel mapping {_BEGIN}: time = {{ unit = "s" }} (or "ms", "us", "min")'
+    )
     if spelling is None or not spelling.strip():
         raise UnitError("the file names no unit for its time column", remedy, where)
     try:

@@ -235,7 +235,8 @@ def _report(
 ) -> None:
     """Report open entries of a draft, or implausible ones of a complete card."""
     if open_ := session.list_open():
-        print_line(f"{len(open_)} entries are open, as comments in the file:")
+        count = "1 entry is" if len(open_) == 1 else f"{len(open_)} entries are"
+        print_line(f"{count} open, as comments in the file:")
         for question in open_:
             print_paragraph(f"{question.prompt} ({question.option})")
         print_line(

@@ -101,7 +101,8 @@ def inspect(
         print_paragraph(text)
     if found.unitless:
         print_paragraph(
-            f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping"
+            f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping; "
+            "--write-mapping channels.toml --accept-proposals writes one"
         )
     print_findings(one for one in seen.findings if one.names.get("text") not in found.notes)
     if seen.refusal is not None:
@@ -128,13 +129,18 @@ def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
     """Survey a log and read it as for use; a log without a unit of time is surveyed in seconds."""
     from drivetwin.logs.formats.detect import open_recording
     from drivetwin.logs.raw import Remembered
-    from drivetwin.logs.survey import survey_recording
+    from drivetwin.plausibility.check import drop_card_findings
 
     try:
         with open_recording(log, stated.options) as opened:
             recording = Remembered(opened)
-            found = survey_recording(recording, str(log), card, stated)
-            return _Seen(found, *_read_as_mapped_log(recording, log, card, stated))
+            found, names, stated = _survey(recording, log, card, stated)
+            findings, refusal, refused_by = _read_as_mapped_log(
+                recording, log, names, stated, gearing=card is not None
+            )
+            if card is None:
+                findings = drop_card_findings(findings)
+            return _Seen(found, findings, refusal, refused_by)
     except UnitError as fault:
         if stated.options.time.unit is not None:
             raise
@@ -142,9 +148,35 @@ def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
     seconds = replace(stated.options, time=replace(stated.options.time, unit="s"))
     with open_recording(log, seconds) as opened:
         recording = Remembered(opened)
-        found = survey_recording(recording, str(log), card, stated)
+        found, _, _ = _survey(recording, log, card, stated)
         step = _find_step(recording)
     return _Seen(found, (), refusal, "shifts and identify refuse", step)
+
+
+def _survey(
+    recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped
+) -> tuple[Survey, VehicleCard | None, Mapped]:
+    """Survey a log; return also the card and mapping with the names of the pressures.
+
+    Without a card pressures are named after their columns.
+    """
+    from drivetwin.authoring.log_survey import find_pressure_columns, name_pressures
+    from drivetwin.logs.survey import survey_recording
+
+    names = card
+    specs = {}
+    if card is None:
+        specs = find_pressure_columns(recording.columns, stated, any_name=False)
+    if specs:
+        names, stated = name_pressures(specs, stated)
+    found = survey_recording(recording, str(log), names, stated)
+    if specs:
+        note = (
+            f"no vehicle card: pressures are named after their columns: {', '.join(specs)}; "
+            "--vehicle CARD names them after its elements"
+        )
+        found = replace(found, notes=(*found.notes, note))
+    return found, names, stated
 
 
 def _find_step(recording: Recording) -> float:
@@ -175,18 +207,20 @@ def _write_unread(
 
 
 def _read_as_mapped_log(
-    recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped
+    recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped, *, gearing: bool
 ) -> tuple[tuple[Finding, ...], DrivetwinError | None, str]:
     """Read a log as for use, missing roles allowed; return findings, error and who refuses it."""
     from drivetwin.channels.roles import FOR_SHIFTS
     from drivetwin.logs.read import Demands, read_recording
 
+    any_role, for_shifts = Demands((), None, gearing), Demands((), FOR_SHIFTS, gearing)
     try:
-        return read_recording(recording, log, card, stated, Demands(())).findings, None, ""
+        found = read_recording(recording, log, card, stated, any_role)
+        return found.findings, None, ""
     except DrivetwinError as fault:
         refusal = fault
     try:
-        found = read_recording(recording, log, card, stated, Demands((), FOR_SHIFTS))
+        found = read_recording(recording, log, card, stated, for_shifts)
     except DrivetwinError as fault:
         return (), fault, "shifts and identify refuse"
     return found.findings, refusal, "identify refuses"
@@ -226,7 +260,7 @@ def _build_table(columns: Sequence[Column], source: str) -> Table:
             _format_cell(low),
             _format_cell(high),
             str(column.gaps),
-            ", ".join(column.roles) or "-",
+            ", ".join(column.roles) or ("ignored" if column.ignored else "-"),
         )
     return table
 

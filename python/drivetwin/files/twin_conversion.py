@@ -75,6 +75,7 @@ def _flatten_options(options: ReadOptions) -> dict[str, Any] | None:
         "simultaneous": options.time.simultaneous,
         "reference_torque_Nm": options.bus.reference_torque,
         "dbc": [path.name for path in options.bus.databases],
+        "ignored": list(options.ignored),
     }
 
 

@@ -90,19 +90,21 @@ class ChannelRecord(Record):
 
 
 class LogRecord(Record):
-    """How logs are read as a whole: time column, reference torque and names of DBC files."""
+    """How logs are read as a whole: time column, reference torque, DBC files, ignored columns."""
 
     time_source: str | None = None
     time_unit: str | None = None
     simultaneous: bool = False
     reference_torque_Nm: OptionalFloat = None
     dbc: list[str] = Field(default_factory=list)
+    ignored: list[str] = Field(default_factory=list)
 
     def to_options(self) -> ReadOptions:
         """Return the options of reading; DBC files by their names alone."""
         time = TimeColumn(self.time_source, self.time_unit, self.simultaneous)
         names = tuple(Path(Path(name).name) for name in self.dbc)
-        return ReadOptions(time, BusOptions(names, self.reference_torque_Nm))
+        bus = BusOptions(names, self.reference_torque_Nm)
+        return ReadOptions(time, bus, tuple(self.ignored))
 
 
 class ConverterRecord(Record):

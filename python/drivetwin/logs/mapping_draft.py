@@ -120,7 +120,7 @@ def _list_stubs(survey: Survey) -> tuple[Stub, ...]:
             continue
         rivals = [one for one in survey.columns if role in one.roles]
         why = f"{role} has several candidates: choose one." if rivals else ""
-        found = rivals or [one for one in free if not one.roles]
+        found = rivals or [one for one in free if not (one.roles or one.ignored)]
         listed = [_make_candidate(one, role, survey, named=bool(rivals)) for one in found]
         candidates = sorted((one for one in listed if one is not None), key=_rank_candidate)
         stubs.append(Stub(role, why or _describe_role(role), tuple(candidates[:_MOST_CANDIDATES])))

@@ -12,7 +12,7 @@ from pathlib import Path
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
 from drivetwin.channels.filling import Filling
-from drivetwin.channels.mapping import Fallback, Mapped, resolve_roles
+from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.read_options import ReadOptions
@@ -149,9 +149,11 @@ def assemble_log(
     """
     elements = {} if card is None else card.elements
     kinds = {name: element.kind for name, element in elements.items()}
-    specs = {**({} if card is None else card.channels), **stated.channels}
+    ignored = stated.options.ignored
+    specs = combine_specs({} if card is None else card.channels, stated.channels, ignored)
     needed, sound = frozenset(demands.needed), demands.sound
-    fallback = Fallback({} if card is None else card.remembered.channels, stated.names)
+    remembered = {} if card is None else card.remembered.channels
+    fallback = Fallback(remembered, stated.names, ignored)
     mapped = resolve_roles(recording.columns, specs, kinds, needed, source, sound, fallback)
     strict = _select_strict_roles(mapped.channels, card, specs, needed, sound)
     _refuse_unitless(recording, mapped.channels, strict, source)

@@ -12,7 +12,7 @@ import numpy as np
 from drivetwin._util.time_steps import remember_for_arrays
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.filling import Filling, FillKind
-from drivetwin.channels.mapping import Mapped, make_spec, select_free
+from drivetwin.channels.mapping import Mapped, combine_specs, make_spec, select_free
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions
@@ -29,6 +29,7 @@ class Column:
     """One column as recorded: `rate` [Hz] of its updates, `range` in the file's unit.
 
     `gaps` counts missing numbers and interruptions in time; `roles` are what it is, or might be.
+    A column that is `ignored` gets no role by its name.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Column:
     range: tuple[float, float] | None
     gaps: int
     roles: tuple[str, ...]
+    ignored: bool = False
 
     def to_document(self) -> dict[str, Any]:
         """For JSON and tables."""
@@ -90,9 +92,10 @@ def survey_recording(
     these become notes.
     """
     columns = list(recording.columns)
-    specs = {**({} if card is None else card.channels), **stated.channels}
+    ignored = stated.options.ignored
+    specs = combine_specs({} if card is None else card.channels, stated.channels, ignored)
     kinds = {} if card is None else {name: spec.kind for name, spec in card.elements.items()}
-    free = select_free(columns, specs.values())
+    free = select_free(columns, specs.values(), ignored)
     candidates = {
         **infer_candidates(free, kinds, stated.names),
         **{role: [one for one in columns if spec.matches(one)] for role, spec in specs.items()},
@@ -111,7 +114,8 @@ def survey_recording(
         try:
             channel = recording.load(index)
             filling = channel.filling if _is_rising(channel.time) else None
-            looked.append(_make_column(column, channel, filling, roles))
+            is_ignored = column.name in ignored and not roles
+            looked.append(_make_column(column, channel, filling, roles, ignored=is_ignored))
             if filling is not None and column not in mapped:
                 filled.append(_describe_filling(column, filling))
         except DamagedChannelError as fault:
@@ -128,7 +132,12 @@ def survey_recording(
 
 
 def _make_column(
-    column: LogColumn, channel: RawChannel, filling: Filling | None, roles: tuple[str, ...]
+    column: LogColumn,
+    channel: RawChannel,
+    filling: Filling | None,
+    roles: tuple[str, ...],
+    *,
+    ignored: bool,
 ) -> Column:
     if filling is None:
         rate = _estimate_update_rate(channel)
@@ -142,6 +151,7 @@ def _make_column(
         range=channel.range,
         gaps=int(np.count_nonzero(~np.isfinite(channel.values))) + channel.pauses,
         roles=roles,
+        ignored=ignored,
     )
 
 

@@ -21,6 +21,11 @@ FROM_READING = {Code.FINAL_DRIVE_DIFFERS: "final_drive", Code.TORQUES_DIFFER: "g
 ENGINE_INERTIA, OUTPUT_INERTIA = "inertia.J_prime_kgm2", "inertia.J_out_kgm2"
 
 
+def drop_card_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return the findings of the log reader that do not concern a card."""
+    return tuple(one for one in findings if one.code not in FROM_READING)
+
+
 def check_card(
     card: VehicleCard, log: ShiftLog | None = None, shifts: Sequence[Shift] = ()
 ) -> tuple[Finding, ...]:

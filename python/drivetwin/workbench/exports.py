@@ -105,9 +105,7 @@ def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
             from drivetwin.channels.mapping_text import format_mapping
 
             survey = work.require_opened().survey
-            return format_mapping(
-                {**survey.mapping, **work.channels}, survey.options, survey.names
-            ).encode()
+            return format_mapping(survey.mapping, survey.options, survey.names).encode()
     return _read_file(path)
 
 

@@ -22,7 +22,7 @@ _WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Input of an identification; `card` includes the fixed values, the shifts manual edits."""
+    """Input of an identification: `card` with the fixed values, shifts with the manual edits."""
 
     sources: Sequence[Source]
     card: VehicleCard
@@ -79,7 +79,7 @@ def _run_method(task: Task, method: Method) -> Outcome | Refusal:
 
 
 def render_log_report(emit: Emit, found: Identification, logs: Sequence[ShiftLog]) -> None:
-    """The report of an identification as HTML text; emits it. `logs` are those fitted, in order."""
+    """Emit the report of an identification as HTML; `logs` are those fitted, in order."""
     from drivetwin.report.html import render_report
     from drivetwin.report.together import render_joint_report
 

@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import make_spec
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.roles import ROLES, get_quantity
 from drivetwin.channels.shiftlog import Quantity
@@ -36,9 +36,18 @@ class Entry:
     reversed: bool
 
 
+@dataclass(frozen=True)
+class Corrections:
+    """Corrections of a log's mapping: specs by role, and columns that get none by their name."""
+
+    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
+
+
 def list_roles(survey: Survey) -> tuple[str, ...]:
-    """List the roles that a column may have, the pressures of the elements last."""
-    return (*ROLES, *(make_pressure_role(element) for element in survey.elements or ()))
+    """List the roles that a column may have, pressures and commands of the elements last."""
+    elements = survey.elements or ()
+    return (*ROLES, *map(make_pressure_role, elements), *map(make_command_role, elements))
 
 
 def list_unit_names() -> list[str]:
@@ -52,11 +61,11 @@ def list_rows(survey: Survey) -> list[Row]:
     return [_make_row(column, survey) for column in survey.columns]
 
 
-def apply_entries(survey: Survey, entries: Sequence[Entry]) -> dict[str, ChannelSpec]:
-    """Channel specs by role as the user states them; scale, offset and time shift stay.
+def apply_entries(survey: Survey, entries: Sequence[Entry]) -> Corrections:
+    """Return the mapping as the user states it; scale, offset and time shift stay.
 
-    Raises MappingError where two columns have one role or a column that is recognised by its name
-    is set aside while no other takes its role, UnitError for a unit that does not fit the role.
+    Raises MappingError where two columns have one role, UnitError for a unit that does not fit the
+    role.
     """
     if len(entries) != len(survey.columns):
         raise MappingError(
@@ -81,8 +90,7 @@ def apply_entries(survey: Survey, entries: Sequence[Entry]) -> dict[str, Channel
             unit=_parse_assertion(entry, column),
             sign=-1 if entry.reversed else 1,
         )
-    _refuse_set_aside(survey, found)
-    return found
+    return Corrections(found, _list_ignored(survey, found))
 
 
 def _make_row(column: Column, survey: Survey) -> Row:
@@ -114,12 +122,8 @@ def _parse_assertion(entry: Entry, column: Column) -> str | None:
     return unit
 
 
-def _refuse_set_aside(survey: Survey, found: Mapping[str, ChannelSpec]) -> None:
-    """Raise if a column is set aside although the reader would recognise its role by its name."""
-    for role, spec in survey.mapping.items():
-        used = any(one.source == spec.source for one in found.values())
-        if role not in found and not used:
-            raise MappingError(
-                f"column {spec.source!r} is recognised as {role} by its name",
-                "give that role to another column, or rename the column in the file",
-            )
+def _list_ignored(survey: Survey, found: Mapping[str, ChannelSpec]) -> tuple[str, ...]:
+    """List the columns without a role that would get one by their name."""
+    used = {spec.source for spec in found.values()}
+    recognised = (one.name for one in survey.columns if one.roles or one.ignored)
+    return tuple(dict.fromkeys(name for name in recognised if name not in used))

@@ -7,13 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.card import VehicleCard
+from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.phases import Boundary, move_boundaries
 from drivetwin.workbench.sandboxed_parse import Opened
+
+MOST_LOGS = 6
+"""Maximum number of logs of a session."""
 
 
 @dataclass(frozen=True)
@@ -29,14 +32,14 @@ class Source:
 class OpenLog:
     """A log as read.
 
-    `channels` are the corrections of the mapping, `moves` the boundaries set by hand [s] by index
-    of the shift. `held` are the indices of the shifts that are predicted instead of fitted.
+    `corrections` are those of the mapping, `moves` the boundaries set by hand [s] by index of the
+    shift. `held` are the indices of the shifts that are predicted instead of fitted.
     """
 
     source: Source
     opened: Opened
     mapping: Path | None = None
-    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    corrections: Corrections = field(default_factory=Corrections)
     shifts: tuple[Shift, ...] = ()
     moves: Mapping[int, Mapping[Boundary, float]] = field(default_factory=dict)
     held: frozenset[int] = frozenset()

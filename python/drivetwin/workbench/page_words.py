@@ -42,6 +42,7 @@ _PHRASES = (
         r"correct \g<thing> in the step Channels",
     ),
     (r"map (?P<thing>.*) with --channels", r"give \g<thing> a role in the step Channels"),
+    (r" \(`drivetwin inspect LOG --write-mapping[^`]*` begins one\)", ""),
     (r" \(examine --friction free\)", ""),
     (r"state them by these options, or run .*", "answer them in the form"),
     (

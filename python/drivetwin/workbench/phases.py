@@ -17,6 +17,7 @@ from drivetwin.report.style import ACCENT, MUTED
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.workbench.plot_events import parse_number
 
 LEAST_PHASE = 5e-3
 """Shortest phase [s] that can be set by hand; only the torque phase may be empty."""
@@ -145,10 +146,10 @@ def plot_phases(log: ShiftLog, shift: Shift) -> Figure:
 
 
 def parse_drag(figure: Figure, change: Mapping[str, object]) -> dict[Boundary, float]:
-    """Boundaries that a relayout event of the `plot_phases` has moved, with their time [s]."""
+    """Return the boundaries that a relayout event of `plot_phases` has moved, with time [s]."""
     found: dict[Boundary, float] = {}
     for index, shape in enumerate(figure.layout.shapes):
-        time = change.get(f"shapes[{index}].x0")
-        if shape.name in set(Boundary) and isinstance(time, int | float):
-            found[Boundary(shape.name)] = float(time)
+        time = parse_number(change.get(f"shapes[{index}].x0"))
+        if shape.name in set(Boundary) and time is not None:
+            found[Boundary(shape.name)] = time
     return found

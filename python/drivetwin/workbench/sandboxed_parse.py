@@ -18,27 +18,26 @@ from drivetwin._util.process_limits import limit_memory
 from drivetwin.authoring.log_survey import (
     LogSurvey,
     find_pressure_columns,
-    make_blank_card,
+    name_pressures,
     survey_log,
 )
-from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.mapping import Mapped, combine_specs
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import format_mapping
-from drivetwin.channels.pressure_roles import get_element, make_pressure_role
+from drivetwin.channels.pressure_roles import get_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError, InputError
 from drivetwin.findings import Finding
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.formats.parser_limits import compute_parser_limits
-from drivetwin.logs.raw import Recording
 from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Survey, survey_recording
-from drivetwin.plausibility.check import FROM_READING, check_card, select_card_findings
+from drivetwin.plausibility.check import check_card, drop_card_findings, select_card_findings
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.workbench.jobs import Emit
+from drivetwin.workbench.mapping import Corrections
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ class Opened:
 
 @dataclass(frozen=True)
 class Request:
-    """Files to open, and the channels as corrected by the user.
+    """Files to open, and the user's corrections of the mapping.
 
     The labels name the files in messages and results; without a card `card` is None.
     """
@@ -70,7 +69,7 @@ class Request:
     card: Path | None = None
     card_label: str = ""
     mapping: Path | None = None
-    channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
+    corrections: Corrections = field(default_factory=Corrections)
 
 
 @dataclass(frozen=True)
@@ -103,7 +102,10 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
         card = _load_card(request)
         stated = _read_stated(request, card)
         with open_recording(request.log, stated.options) as recording:
-            names, stated = _name_pressures(recording, card, stated)
+            names = card
+            if names is None:
+                specs = find_pressure_columns(recording.columns, stated)
+                names, stated = name_pressures(specs, stated)
             looked = survey_recording(recording, str(request.log), names, stated)
     try:
         with _apply_labels(_get_labels(request)):
@@ -111,8 +113,7 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
             read = read_log(request.log, names, mapping, gearing=card is not None)
             log = replace(read, source=request.label, mappings={})
             if card is None:
-                remarks = (one for one in log.findings if one.code not in FROM_READING)
-                log = replace(log, findings=tuple(remarks))
+                log = replace(log, findings=drop_card_findings(log.findings))
             found = None if card is None else detect_shifts(log, card)
     except InputError as error:
         emit(Opened(looked, card, fault=str(error)))
@@ -178,24 +179,15 @@ def _read_stated(request: Request, card: VehicleCard | None) -> Mapped:
     stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
     corrected = {
         role: spec
-        for role, spec in request.channels.items()
+        for role, spec in request.corrections.channels.items()
         if card is None or (element := get_element(role)) is None or element in card.elements
     }
-    return replace(stated, channels={**stated.channels, **corrected})
-
-
-def _name_pressures(
-    recording: Recording, card: VehicleCard | None, stated: Mapped
-) -> tuple[VehicleCard, Mapped]:
-    """Return the card that names the pressures, and the mapping with the pressures.
-
-    Without a card they have the labels of their columns.
-    """
-    if card is not None:
-        return card, stated
-    specs = find_pressure_columns(recording.columns, stated.channels)
-    pressures = {make_pressure_role(label): spec for label, spec in specs.items()}
-    return make_blank_card(specs), replace(stated, channels={**stated.channels, **pressures})
+    ignored = tuple(dict.fromkeys((*stated.options.ignored, *request.corrections.ignored)))
+    return replace(
+        stated,
+        channels=combine_specs(stated.channels, corrected, request.corrections.ignored),
+        options=replace(stated.options, ignored=ignored),
+    )
 
 
 def _check_card(card: VehicleCard, log: ShiftLog, found: FoundShifts) -> tuple[Finding, ...]:

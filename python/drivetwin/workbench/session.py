@@ -16,7 +16,6 @@ from typing import IO, Any
 from drivetwin._util.atomic import write_text
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.log_survey import LogSurvey
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_file import find_project_mapping
 from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.method import Method
@@ -28,8 +27,8 @@ from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.identifying import Task, identify_all
-from drivetwin.workbench.mapping import Entry, apply_entries
-from drivetwin.workbench.open_log import OpenLog, Source
+from drivetwin.workbench.mapping import Corrections, Entry, apply_entries
+from drivetwin.workbench.open_log import MOST_LOGS, OpenLog, Source
 from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.sample import write_sample
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
@@ -40,9 +39,10 @@ from drivetwin.workbench.zoom import View
 MOST_SESSIONS = 16
 """Maximum number of sessions; opening another closes the one that was idle longest."""
 MOST_UPLOADS = 8
-"""Maximum number of uploads of a session; the oldest one that is not open is deleted."""
-MOST_LOGS = 6
-"""Maximum number of logs of a session; below `MOST_UPLOADS`, as all may be uploads."""
+"""Maximum number of uploads of a session; the oldest one that is not open is deleted.
+
+Above `MOST_LOGS`, as all logs and the card may be uploads.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Live:
 
 @dataclass(eq=False)
 class Session:
-    """The mutable shell around an immutable `Work`; every change goes through its lock."""
+    """Mutable shell around an immutable `SessionState`; every change holds its lock."""
 
     folder: Folder
     scratch: Path
@@ -102,7 +102,7 @@ class Session:
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
         with self.lock:
-            fresh = self._read_log(log, card, mapping, {})
+            fresh = self._read_log(log, card, mapping, Corrections())
             self.cancel()
             self._set(SessionState(logs=(fresh,), card=card))
             self.form = None
@@ -124,7 +124,7 @@ class Session:
                 raise InputError(
                     f"{MOST_LOGS} logs are open, which is the limit", "remove one in the step Log"
                 )
-            fresh = self._read_log(log, work.card, like.mapping, like.channels)
+            fresh = self._read_log(log, work.card, like.mapping, like.corrections)
             self.cancel()
             self._set(replace(work, logs=(*work.logs, fresh)).drop_results())
 
@@ -153,7 +153,7 @@ class Session:
         with self.lock:
             self.work.require_opened()
             logs = tuple(
-                self._read_log(one.source, card, one.mapping, one.channels)
+                self._read_log(one.source, card, one.mapping, one.corrections)
                 for one in self.work.logs
             )
             self.cancel()
@@ -170,7 +170,7 @@ class Session:
             one = self.work.require_open_log()
             key = make_column_key(one.opened.survey, index)
             if self.preview is None or self.preview[0] != key:
-                request = _make_request(one.source, self.work.card, one.mapping, {})
+                request = _make_request(one.source, self.work.card, one.mapping, Corrections())
                 limit = compute_parser_limits(request.log).seconds
                 preview = jobs.call(sandboxed_parse.read_column, request, key, limit=limit)
                 self.preview = (key, preview)
@@ -180,7 +180,7 @@ class Session:
         """Begin the form of a new card from the log. Raises the typed errors of the readers."""
         with self.lock:
             one = self.work.require_open_log()
-            request = _make_request(one.source, None, one.mapping, one.channels)
+            request = _make_request(one.source, None, one.mapping, one.corrections)
             surveyed: LogSurvey = jobs.call(
                 sandboxed_parse.survey_for_card,
                 request,
@@ -217,8 +217,8 @@ class Session:
         """
         with self.lock:
             one = self.work.require_open_log()
-            channels = apply_entries(one.opened.survey, entries)
-            fresh = self._read_log(one.source, self.work.card, one.mapping, channels)
+            corrections = apply_entries(one.opened.survey, entries)
+            fresh = self._read_log(one.source, self.work.card, one.mapping, corrections)
             self.cancel()
             self._set(self.work.set_log(fresh))
 
@@ -349,7 +349,7 @@ class Session:
             content = workspace.load_workspace(source.path, source.name)
             logs, card = workspace.locate_sources(content, self.folder, source.name)
             read = tuple(
-                self._read_log(one, card, None, entry.to_specs())
+                self._read_log(one, card, None, entry.to_corrections())
                 for one, entry in zip(logs, content.logs, strict=True)
             )
             work = workspace.restore_workspace(content, SessionState(logs=read, card=card))
@@ -374,9 +374,9 @@ class Session:
         log: Source,
         card: Source | None,
         mapping: Path | None,
-        channels: Mapping[str, ChannelSpec],
+        corrections: Corrections,
     ) -> OpenLog:
-        request = _make_request(log, card, mapping, channels)
+        request = _make_request(log, card, mapping, corrections)
         opened: sandboxed_parse.Opened = jobs.call(
             sandboxed_parse.open_log,
             request,
@@ -384,11 +384,11 @@ class Session:
             limit=compute_parser_limits(request.log).seconds,
         )
         shifts = () if opened.found is None else opened.found.shifts
-        return OpenLog(log, opened, mapping, channels, shifts)
+        return OpenLog(log, opened, mapping, corrections, shifts)
 
 
 def _make_request(
-    log: Source, card: Source | None, mapping: Path | None, channels: Mapping[str, ChannelSpec]
+    log: Source, card: Source | None, mapping: Path | None, corrections: Corrections
 ) -> sandboxed_parse.Request:
     """The files to read; a log of the folder has the mapping of its project."""
     project = None if log.uploaded else find_project_mapping(log.path)
@@ -398,7 +398,7 @@ def _make_request(
         card=None if card is None else card.path,
         card_label="" if card is None else card.name,
         mapping=mapping or project,
-        channels=channels,
+        corrections=corrections,
     )
 
 

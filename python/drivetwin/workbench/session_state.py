@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
@@ -62,11 +61,6 @@ class SessionState:
         return self.logs[self.at].shifts if self.logs else ()
 
     @property
-    def channels(self) -> Mapping[str, ChannelSpec]:
-        """Corrections of the selected log's mapping."""
-        return self.logs[self.at].channels if self.logs else {}
-
-    @property
     def all_shifts(self) -> tuple[Shift, ...]:
         """Shifts of all logs."""
         return tuple(shift for one in self.logs for shift in one.shifts)
@@ -106,7 +100,7 @@ class SessionState:
         return replace(self, logs=tuple(logs))
 
     def apply_moves(self, index: int, changes: Mapping[Boundary, float]) -> SessionState:
-        """With boundaries of a shift of the selected log by hand; none: as detected."""
+        """Set boundaries of a shift of the selected log by hand; none: as detected."""
         fresh = self.require_open_log().apply_moves(self.require_card(), index, changes)
         logs = tuple(fresh if k == self.at else one for k, one in enumerate(self.logs))
         return replace(self, logs=logs)

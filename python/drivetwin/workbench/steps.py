@@ -79,7 +79,7 @@ def _describe_logs(work: SessionState) -> str:
 
 
 def _find_unreadable(work: SessionState) -> str:
-    """Return what is wrong if a log cannot be read as mapped; empty without one."""
+    """Return the fault of the first log that cannot be read as mapped; empty without one."""
     names = [one.source.name for one in work.logs if one.opened.log is None]
     return f"{names[0]} cannot be read as mapped." if names else ""
 
@@ -122,16 +122,19 @@ def _describe_shifts(work: SessionState) -> str:
     """Name the shifts of one log, or count those of several; and those held out."""
     count = len(work.all_shifts)
     held = sum(len(one.held) for one in work.logs)
-    text = f"{count} shifts of {len(work.logs)} logs found"
     if len(work.logs) == 1:
         text = f"{', '.join(make_shift_labels(work.shifts))} found"
+    else:
+        text = f"{count} {'shift' if count == 1 else 'shifts'} of {len(work.logs)} logs found"
     return f"{text}, {held} held out." if held else f"{text}."
 
 
 def _assess_identification(work: SessionState, running: bool) -> StepState:
     if running:
         return StepState(Step.IDENTIFY, Status.RUNNING, "The identification is running.")
-    if not work.all_shifts or _find_unreadable(work):
+    if fault := _find_unreadable(work):
+        return StepState(Step.IDENTIFY, Status.BLOCKED, fault, Step.CHANNELS)
+    if not work.all_shifts:
         return StepState(Step.IDENTIFY, Status.BLOCKED, "There is no shift.", Step.SHIFTS)
     if not any(one.fitted for one in work.logs):
         text = "Every shift is held out."

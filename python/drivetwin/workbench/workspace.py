@@ -23,7 +23,8 @@ from drivetwin.files.twin_conversion import build_twin_file, restore_twin
 from drivetwin.files.twin_file import TwinFile
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.identifying import Outcome
-from drivetwin.workbench.open_log import OpenLog, Source
+from drivetwin.workbench.mapping import Corrections
+from drivetwin.workbench.open_log import MOST_LOGS, OpenLog, Source
 from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.uploads import LIMITS
@@ -49,13 +50,14 @@ class LockEntry(StrictModel):
 
 
 class LogEntry(StrictModel):
-    """A log with the corrections of its mapping.
+    """A log with the corrections of its mapping: `channels` by role, `ignored` columns.
 
     `phases` [s] go by index of the shift; `held` are the indices of the shifts to predict.
     """
 
     file: FileEntry
     channels: dict[str, ChannelTable] = Field(default_factory=dict)
+    ignored: list[str] = Field(default_factory=list)
     phases: dict[int, dict[Boundary, float]] = Field(default_factory=dict)
     held: list[int] = Field(default_factory=list)
 
@@ -69,9 +71,10 @@ class LogEntry(StrictModel):
                 raise ValueError(f"{role!r} is no channel role") from None
         return channels
 
-    def to_specs(self) -> dict[str, ChannelSpec]:
-        """Corrections of the mapping by role."""
-        return {role: table.to_spec() for role, table in self.channels.items()}
+    def to_corrections(self) -> Corrections:
+        """Return the corrections of the mapping."""
+        channels = {role: table.to_spec() for role, table in self.channels.items()}
+        return Corrections(channels, tuple(self.ignored))
 
 
 class WorkspaceFile(StrictModel):
@@ -80,7 +83,7 @@ class WorkspaceFile(StrictModel):
     format: Literal["drivetwin workspace"] = "drivetwin workspace"
     version: Literal[2] = 2
     program: str
-    logs: list[LogEntry] = Field(min_length=1, max_length=100)
+    logs: list[LogEntry] = Field(min_length=1, max_length=MOST_LOGS)
     card: FileEntry
     log: int = Field(default=0, ge=0)
     locks: dict[str, LockEntry] = Field(default_factory=dict)
@@ -88,6 +91,14 @@ class WorkspaceFile(StrictModel):
     method: Method | None = None
     shift: int = Field(default=0, ge=0)
     sliders: dict[str, float] = Field(default_factory=dict)
+
+    @field_validator("logs")
+    @classmethod
+    def _check_names(cls, logs: list[LogEntry]) -> list[LogEntry]:
+        """Refuse a log that is listed twice, as results go by the name of their log."""
+        if len({one.file.path for one in logs}) < len(logs):
+            raise ValueError("a log is listed twice")
+        return logs
 
     def to_locks(self) -> dict[str, Lock]:
         """Locks by parameter id."""
@@ -198,7 +209,10 @@ def compute_digest(path: Path) -> str:
 def _make_log_entry(one: OpenLog, beside: Path, folder: Folder) -> LogEntry:
     return LogEntry(
         file=_make_file_entry(one.source, beside, folder),
-        channels={role: _make_channel_table(spec) for role, spec in one.channels.items()},
+        channels={
+            role: _make_channel_table(spec) for role, spec in one.corrections.channels.items()
+        },
+        ignored=list(one.corrections.ignored),
         phases={index: dict(times) for index, times in one.moves.items()},
         held=sorted(one.held),
     )

@@ -47,10 +47,12 @@ class Folder:
     def make_new_path(self, name: str, suffix: str) -> Path:
         """Return the path of a new file called `name`; append `suffix` if it is missing.
 
-        Raises RefusedError for a path that leads outside or into a folder that does not exist.
+        Raises RefusedError for a path that leads outside, into a folder that does not exist, or to
+        something that is no regular file.
         """
         path = self._resolve_inside(name if name.endswith(suffix) else name + suffix)
-        if path.name == suffix or not path.parent.is_dir() or path.is_dir():
+        is_other = path.exists() and not path.is_file()
+        if path.name == suffix or not path.parent.is_dir() or is_other:
             raise RefusedError(
                 "no file can be written there",
                 f"give a name in an existing folder inside {self.root}",

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import base64
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -14,19 +13,22 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display
 from drivetwin.report.decimate import decimate_around
 from drivetwin.report.figures.stack import Curve, Panel
+from drivetwin.workbench.plot_events import parse_number
 
 View = tuple[float, float]
 """First and last time [s] of a figure."""
-_FINE = 500.0
-"""Magnitude below which single precision is enough for a time [s] or a value."""
+_TIME_RESOLUTION = 5e-5
+"""Largest step between the times that are sent [s]."""
+_VALUE_RESOLUTION = 1e-4
+"""Largest step between the values that are sent, over their range."""
 
 
 def parse_view(change: Mapping[str, object]) -> View | None:
     """Return the time window of a relayout event [s]; None if the window did not change."""
     both = change.get("xaxis.range")
     ends = both if isinstance(both, list) else [change.get(f"xaxis.range[{k}]") for k in (0, 1)]
-    numbers = [float(one) for one in ends if isinstance(one, int | float)]
-    if len(numbers) != 2 or not all(map(math.isfinite, numbers)) or numbers[0] >= numbers[1]:
+    numbers = [number for one in ends if (number := parse_number(one)) is not None]
+    if len(numbers) != 2 or numbers[0] >= numbers[1]:
         return None
     return numbers[0], numbers[1]
 
@@ -46,13 +48,24 @@ def encode_curves(
     """
     found = {}
     for place, (display, curve) in curves:
-        time, values = decimate_around(curve.time, curve.values, view)
-        found[place] = {"x": _encode(time), "y": _encode(display.to_display(values), "<f4")}
+        time, recorded = decimate_around(curve.time, curve.values, view)
+        values = display.to_display(recorded)
+        known = values[np.isfinite(values)]
+        span = np.ptp(known) if known.size else 0.0
+        found[place] = {
+            "x": _encode(time, _TIME_RESOLUTION),
+            "y": _encode(values, _VALUE_RESOLUTION * span),
+        }
     return found
 
 
-def _encode(values: FloatArray, kind: str = "") -> dict[str, str]:
-    """Encode an array as plotly.js reads it without a number being spelled out."""
-    kind = kind or ("<f4" if np.abs(values).max(initial=0.0) < _FINE else "<f8")
-    packed = base64.b64encode(values.astype(kind).tobytes()).decode()
-    return {"dtype": kind[1:], "bdata": packed}
+def _encode(values: FloatArray, resolution: float) -> dict[str, str]:
+    """Encode an array as plotly.js reads it without a number being spelled out.
+
+    Single precision is used where its steps are at most the `resolution`.
+    """
+    largest = np.abs(values).max(initial=0.0, where=np.isfinite(values))
+    is_single = np.spacing(np.float32(largest)) <= resolution
+    kind = "f4" if is_single else "f8"
+    packed = base64.b64encode(values.astype(f"<{kind}").tobytes()).decode()
+    return {"dtype": kind, "bdata": packed}

@@ -47,8 +47,7 @@ def layout() -> list[Component]:
 
 
 def register(page: ui.Page) -> None:
-    """Showing and correcting the mapping."""
-
+    """Register the callbacks that show and correct the mapping."""
     _register_preview(page)
     log_choice.register(page, Place.CHANNELS)
     zooming.register(page, "preview-plot", _get_preview_panels)

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal
+from enum import StrEnum
+from typing import Any
 
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
@@ -32,10 +33,12 @@ from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import ControlId, Index
 from drivetwin.workbench.views.log_choice import Place, build_log_choice
 
-_SHIFT_HEAD = ("shift", "kind", "elements", "starts", "locks")
-_USES = {"fit": "fit", "hold": "hold out"}
-Use = Literal["fit", "hold"]
-"""Use of a shift in the identification."""
+
+class Use(StrEnum):
+    """Use of a shift in the identification."""
+
+    FIT = "fit"
+    HOLD_OUT = "hold out"
 
 
 _HOLD_OUT = (
@@ -53,7 +56,7 @@ def layout() -> list[Component]:
 
 
 def register(page: ui.Page) -> None:
-    """Moving boundaries, and holding shifts out."""
+    """Register the callbacks by which boundaries are moved and shifts held out."""
     log_choice.register(page, Place.SHIFTS)
     zooming.register(page, "phases-plot", _get_phase_panels)
     _register_uses(page)
@@ -94,25 +97,26 @@ def _register_uses(page: ui.Page) -> None:
     @page.callback(
         Input({"part": "use", "id": ALL}, "data-value"), State({"part": "use", "id": ALL}, "id")
     )
-    def use(session: Session, uses: Sequence[Use], ids: Sequence[ControlId]) -> None:
+    def choose_uses(session: Session, uses: Sequence[Use], ids: Sequence[ControlId]) -> None:
         """Fit a shift, or hold it out."""
-        held = {one.id for one, use in zip(ids, uses, strict=True) if use == "hold"}
+        chosen = {one.id for one, use in zip(ids, uses, strict=True) if use is Use.HOLD_OUT}
         logs = session.work.logs
-        chosen = [
-            frozenset(k for k in range(len(one.shifts)) if _make_use_id(at, k) in held)
+        held = [
+            frozenset(k for k in range(len(one.shifts)) if _make_use_id(at, k) in chosen)
             for at, one in enumerate(logs)
         ]
-        if not ids or chosen == [one.held for one in logs]:
+        if not ids or held == [one.held for one in logs]:
             return
-        session.hold_out(chosen)
+        session.hold_out(held)
         ui.notify_topic(ui.Topic.HELD)
-        count = len(held)
-        ui.notify(
-            f"The next identification predicts {count} {'shift' if count == 1 else 'shifts'} "
-            "instead of fitting"
-            if held
-            else "The next identification fits all shifts"
-        )
+        ui.notify(_describe_held_out(len(chosen)))
+
+
+def _describe_held_out(count: int) -> str:
+    if count == 0:
+        return "The next identification fits all shifts"
+    shifts = "1 shift" if count == 1 else f"{count} shifts"
+    return f"The next identification predicts {shifts} instead of fitting"
 
 
 def _make_use_id(log: int, shift: int) -> str:
@@ -152,24 +156,26 @@ def _register_fields(page: ui.Page) -> None:
 
 def _build_shifts(work: SessionState) -> list[Component]:
     """List the shifts of all logs, and the reasons why other gear changes are not used."""
-    found = [one for one in work.logs if one.opened.found is not None]
+    rejected = [text for one in work.logs for text in _list_rejected(work, one)]
+    if not work.all_shifts:
+        return [ui.make_notes("No usable shift", rejected, "doubtful")]
+    log = ["log"] if len(work.logs) > 1 else []
+    use = ["use"] if len(work.all_shifts) > 1 else []
+    head = ["shift", *log, "kind", "elements", "starts", "locks", *use]
     rows = [row for at, one in enumerate(work.logs) for row in _build_rows(work, at, one)]
-    head = ["shift", *(["log"] if len(work.logs) > 1 else []), *_SHIFT_HEAD[1:]]
-    caption = "Shifts of the log" if len(work.logs) == 1 else "Shifts of all logs"
-    rejected = [
-        f"{f'{one.source.name}, ' if len(work.logs) > 1 else ''}"
-        f"{other.time[0]:.2f} s to {other.time[1]:.2f} s: {replace_options(other.reason)}"
-        for one in found
-        for other in (one.opened.found.rejected if one.opened.found is not None else ())
-    ]
-    uses = len(rows) > 1
     return [
-        *([ui.make_hint(_HOLD_OUT)] if uses else []),
-        *([ui.make_table([*head, *(["use"] if uses else [])], rows, caption)] if rows else []),
-        ui.make_notes(
-            "Not used" if rows else "No usable shift", rejected, "plain" if rows else "doubtful"
-        ),
+        *([ui.make_hint(_HOLD_OUT)] if use else []),
+        ui.make_table(head, rows, "Shifts of all logs" if log else "Shifts of the log"),
+        ui.make_notes("Not used", rejected, "plain"),
     ]
+
+
+def _list_rejected(work: SessionState, log: OpenLog) -> Iterator[str]:
+    """Yield the gear changes of a log that are not used, with the reason."""
+    where = f"{log.source.name}, " if len(work.logs) > 1 else ""
+    for one in () if log.opened.found is None else log.opened.found.rejected:
+        span = f"{one.time[0]:.2f} s to {one.time[1]:.2f} s"
+        yield f"{where}{span}: {replace_options(one.reason)}"
 
 
 def _build_rows(work: SessionState, at: int, log: OpenLog) -> Iterator[list[ui.Content]]:
@@ -185,9 +191,10 @@ def _build_rows(work: SessionState, at: int, log: OpenLog) -> Iterator[list[ui.C
         ]
         if len(work.all_shifts) > 1:
             name = f"use of shift {label} of {log.source.name}"
-            use = "hold" if k in log.held else "fit"
+            use = Use.HOLD_OUT if k in log.held else Use.FIT
             id: ui.Id = {"part": "use", "id": _make_use_id(at, k)}
-            row.append(ui.make_choice(id, name, _USES, use, hidden_label=True))
+            uses = {one.value: one.value for one in Use}
+            row.append(ui.make_choice(id, name, uses, use.value, hidden_label=True))
         yield row
 
 
