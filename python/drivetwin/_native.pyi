@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 __all__ = [
     "ScannedTable",
     "TableScanner",
+    "actuator_pressure",
     "batch_sensitivities",
     "gear_statics",
     "linearise",
