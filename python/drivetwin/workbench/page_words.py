@@ -44,6 +44,10 @@ _PHRASES = (
     (r"map (?P<thing>.*) with --channels", r"give \g<thing> a role in the step Channels"),
     (r" \(`drivetwin inspect LOG --write-mapping[^`]*` begins one\)", ""),
     (r" \(examine --friction free\)", ""),
+    (
+        "use --drop-part to leave that out",
+        "export twin.toml; the command line exports models from it without that",
+    ),
     (r"state them by these options, or run .*", "answer them in the form"),
     (
         r"name (?P<thing>it|one) in a channel mapping",
