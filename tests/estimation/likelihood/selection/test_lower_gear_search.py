@@ -51,6 +51,10 @@ def test_backlash_that_the_dual_clutch_cannot_follow_is_identified() -> None:
         (one.value - truth[one.id]) / one.std_total
         for one in found.estimates.values()
         if one.verdict is Verdict.IDENTIFIED and one.value is not None and one.std_total
+        if one.id in truth
     ]
     assert len(errors) >= 8
     assert np.max(np.abs(errors)) < 4.0
+    largest = np.max(np.abs(made.recorded.trajectory.shaft_torque))
+    gap = 2.0 * SIZE * largest / made.recorded.scenario.model.k_o
+    assert found.estimates["backlash"].value == pytest.approx(gap, rel=0.15)
