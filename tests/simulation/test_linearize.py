@@ -269,7 +269,7 @@ def test_torques_at_ports_are_outputs() -> None:
 
 
 @pytest.mark.parametrize(
-    ("outputs", "told"),
+    ("outputs", "message"),
     [
         ([("sped", "a")], r"unknown kind; did you mean 'speed'\?"),
         ([("torque", "G.c")], r"output \('torque', 'G.c'\): no port 'c'"),
@@ -279,9 +279,9 @@ def test_torques_at_ports_are_outputs() -> None:
     ],
 )
 def test_outputs_that_a_linear_system_lacks_are_named(
-    outputs: list[tuple[str, str]], told: str
+    outputs: list[tuple[str, str]], message: str
 ) -> None:
-    with pytest.raises(InputError, match=told) as caught:
+    with pytest.raises(InputError, match=message) as caught:
         linearise(SHAFT, [], outputs=outputs)
     assert "line 1" not in str(caught.value)
 

@@ -12,25 +12,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
+from drivetwin._util.first_order_lag import apply_lag
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import InputError, Where
 
 FloatArray = NDArray[np.float64]
-
-
-def apply_lag(values: FloatArray, step: float, time_constant: float) -> FloatArray:
-    """Apply a first-order lag [s] to `values` (n,), sampled every `step` [s], at rest before them.
-
-    The lag is solved exactly for an input that is linear between the samples.
-    """
-    decay = np.exp(-step / time_constant)
-    mean = time_constant / step * (1.0 - decay)
-    b, a = np.array([1.0 - mean, mean - decay]), np.array([1.0, -decay])
-    lagged, _ = signal.lfilter(b, a, values, zi=signal.lfilter_zi(b, a) * values[0])
-    return np.asarray(lagged, dtype=np.float64)
 
 
 @dataclass(frozen=True)

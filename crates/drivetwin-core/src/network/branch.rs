@@ -121,7 +121,7 @@ pub(super) fn scaled<T: Number>(series: &Series<T>, factor: f64) -> Series<T> {
     series.map(|c| c * factor)
 }
 
-pub(super) fn weighted<T: Number>(a: &Series<T>, wa: T, b: &Series<T>, wb: T) -> Series<T> {
+pub(super) fn add_weighted<T: Number>(a: &Series<T>, wa: T, b: &Series<T>, wb: T) -> Series<T> {
     std::array::from_fn(|k| a[k] * wa + b[k] * wb)
 }
 

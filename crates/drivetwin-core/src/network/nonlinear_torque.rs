@@ -5,7 +5,7 @@
 //! crossings of the branch's boundaries.
 
 use super::branch::{
-    Branch, BranchBoundary, between, loss_boundaries, scaled, slip_boundaries, weighted,
+    Branch, BranchBoundary, add_weighted, between, loss_boundaries, scaled, slip_boundaries,
 };
 use super::linalg::is_zero;
 use crate::model::converter_map::ConverterMap;
@@ -362,7 +362,7 @@ impl<T: Number> NonlinearTorque<T> {
                 let ends = [(from, sign, -1), (to, -sign, 1)];
                 let border = |(end, side, step): (f64, f64, isize)| {
                     let next = Branch::Converter { index: index.wrapping_add_signed(step), sign };
-                    (weighted(r, T::of(side), s, T::of(-side * end)), next)
+                    (add_weighted(r, T::of(side), s, T::of(-side * end)), next)
                 };
                 let ends = ends.into_iter().filter(|e| e.0.is_finite()).map(border);
                 // Where the pump alone stops, the speed ratio goes from one infinity to the other.
@@ -383,7 +383,7 @@ impl<T: Number> NonlinearTorque<T> {
             }
             (TorqueLaw::Regions(regions), Branch::Region { index }) => {
                 let border = |&(form, next): &(TwistForm<T>, usize)| {
-                    let mut series = weighted(s, form.per_twist, r, form.per_rate);
+                    let mut series = add_weighted(s, form.per_twist, r, form.per_rate);
                     series[0] += form.constant;
                     (series, Branch::Region { index: next })
                 };

@@ -49,7 +49,7 @@ impl<T: Number> HybridState<'_, T> {
     /// Adopt the cells anew, as where a gear turns round.
     pub(crate) fn settle_cells(&mut self) -> Result<(), Status> {
         self.evaluate_at_t_plus()?;
-        let (trial, candidates) = (self.assignment(), self.at_zero_speed());
+        let (trial, candidates) = (self.assignment(), self.list_at_zero_speed());
         let mode = Arc::clone(&self.mode);
         self.basis_now(&trial, &candidates, &mode).map(drop)
     }

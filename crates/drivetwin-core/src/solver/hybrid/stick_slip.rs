@@ -36,7 +36,7 @@ impl<T: Number> HybridState<'_, T> {
     /// its bound, with the torque's sign.
     pub(crate) fn decide(&mut self, overloaded: Option<(RowId, f64)>) -> Result<(), Status> {
         self.evaluate_at_t_plus()?;
-        let candidates = self.at_zero_speed();
+        let candidates = self.list_at_zero_speed();
         self.check_forced(&candidates)?;
         let mut trial = self.assignment();
         match overloaded {
@@ -208,7 +208,7 @@ impl<T: Number> HybridState<'_, T> {
         ActiveSet { rows: self.rows.clone(), gears: self.gears.clone() }
     }
 
-    pub(super) fn at_zero_speed(&self) -> Vec<RowId> {
+    pub(super) fn list_at_zero_speed(&self) -> Vec<RowId> {
         let near = |row: RowId| {
             let slip = self.network.slip_of(row);
             let terms = slip.iter().zip(&self.x);

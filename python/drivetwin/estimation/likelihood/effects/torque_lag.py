@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import signal
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.first_order_lag import apply_lag
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
@@ -31,19 +31,10 @@ def build(at: OperatingPoint, std: float) -> list[Disturbance]:
     if at.record.of_speeds is not None or raster.size < 2:
         return []
     torque = np.interp(raster, steady.time, steady.values)
-    lagged = _apply_lag(torque, std) if std > 0.0 else _remove_lag(torque, -std)
+    lagged = apply_lag(torque, STEP_S, std) if std > 0.0 else _remove_lag(torque, -std)
     age = at.part.structure.get_value(at.point, "te_delay")
     change = np.interp(raster + std, raster, lagged) - torque
     return [Disturbance(inputs={TORQUE: np.interp(at.middle + age, raster, change)})]
-
-
-def _apply_lag(torque: FloatArray, lag: float) -> FloatArray:
-    """Apply a first-order lag [s] to a torque (n,), linear between samples and at rest before."""
-    decay = np.exp(-STEP_S / lag)
-    mean = lag / STEP_S * (1.0 - decay)
-    b, a = np.array([1.0 - mean, mean - decay]), np.array([1.0, -decay])
-    lagged, _ = signal.lfilter(b, a, torque, zi=signal.lfilter_zi(b, a) * torque[0])
-    return np.asarray(lagged)
 
 
 def _remove_lag(torque: FloatArray, lag: float) -> FloatArray:

@@ -20,22 +20,25 @@ from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.spread import PredictedSpread
 
 
-def predict_spread(fit: LikelihoodFit, told: Correction) -> tuple[dict[str, PredictedSpread], ...]:
+def predict_spread(
+    fit: LikelihoodFit, corrected: Correction
+) -> tuple[dict[str, PredictedSpread], ...]:
     """Predict the distribution of measured less simulated signals, for each shift by signal.
 
     The simulation is that of the chosen plant with the corrected unknowns and none of the other
     effects. A shift that cannot be simulated with them has no prediction.
     """
     found: list[dict[str, PredictedSpread]] = []
-    joint = told.joint_covariance
+    joint = corrected.joint_covariance
     for part, slopes, z, residual in zip(
         fit.problem.parts,
         fit.normal.slopes,
-        told.step.columns.matrices or [np.zeros((p.record.size, 0)) for p in fit.problem.parts],
-        told.residuals,
+        corrected.step.columns.matrices
+        or [np.zeros((p.record.size, 0)) for p in fit.problem.parts],
+        corrected.residuals,
         strict=True,
     ):
-        run = part.simulate(told.mean)
+        run = part.simulate(corrected.mean)
         if run is None:
             found.append({})
             continue
