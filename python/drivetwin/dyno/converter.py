@@ -10,6 +10,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from drivetwin.simulation.converter_map import Converter
+from drivetwin.simulation.driveline_motion import (
+    OUTPUT,
+    SHAFT,
+    WHEEL,
+    build_trajectory,
+    list_motion_outputs,
+)
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
@@ -17,11 +24,10 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Trajectory,
 )
-from drivetwin.simulation.network import Element, Output, Start, build_element, simulate
+from drivetwin.simulation.network import Element, Start, build_element, simulate
 from drivetwin.simulation.shift_path import build_path, get_side_nodes
 
-_CRANK, _TURBINE, _INPUT, _OUTPUT = "crankshaft", "turbine", "input", "output"
-_AXLE, _WHEEL, _SHAFT = "axle", "wheel", "output shaft"
+_CRANK, _TURBINE, _INPUT, _AXLE = "crankshaft", "turbine", "input", "axle"
 _TORQUE = "engine torque"
 _STALL = 0.05
 """Least speed ratio looked at for the steady state."""
@@ -67,23 +73,9 @@ class OpenConverter:
             {**pressures, _TORQUE: engine_torque},
             _start(model, start, crank),
             time,
-            _list_outputs(names),
+            [*list_motion_outputs(names, _TURBINE), ("speed", _CRANK)],
         )
-        motion = run.columns
-        trajectory = Trajectory(
-            time=time,
-            engine_speed=motion["speed", _TURBINE],
-            output_speed=motion["speed", _OUTPUT],
-            wheel_speed=motion["speed", _WHEEL],
-            twist=motion["twist", _SHAFT],
-            shaft_torque=motion["shaft_torque", _SHAFT],
-            clutch_torque={name: motion["friction_torque", name] for name in names},
-            slip={name: motion["slip", name] for name in names},
-            events=run.events,
-            status=run.status,
-            audit=run.audit,
-        )
-        return trajectory, motion["speed", _CRANK]
+        return build_trajectory(run, names, _TURBINE), run.columns["speed", _CRANK]
 
     def _build_elements(self, model: DualClutch) -> list[Element]:
         """The dual clutch in general elements, the converter before it."""
@@ -101,19 +93,19 @@ class OpenConverter:
             build_element("inertia", "J1", node=_TURBINE, inertia=model.J1),
             build_element("gear", "input gear", a=_TURBINE, b=_INPUT, ratio=model.i_in, loss=loss),
             build_element("inertia", "J2e", node=_INPUT, inertia=model.J2e * model.i_in**2),
-            *(part for each in model.elements for part in build_path(each, _INPUT, _OUTPUT)),
-            build_element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
+            *(part for each in model.elements for part in build_path(each, _INPUT, OUTPUT)),
+            build_element("inertia", "Jo", node=OUTPUT, inertia=model.J_out),
             build_element(
                 "spring_damper",
-                _SHAFT,
-                a=_OUTPUT,
+                SHAFT,
+                a=OUTPUT,
                 b=_AXLE,
                 stiffness=model.k_o,
                 damping=model.c_o,
             ),
-            build_element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
-            build_element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
-            build_element("road_load", "load", node=_WHEEL, **asdict(model.load)),
+            build_element("gear", "final drive", a=_AXLE, b=WHEEL, ratio=model.i_f),
+            build_element("inertia", "vehicle", node=WHEEL, inertia=model.J_v),
+            build_element("road_load", "load", node=WHEEL, **asdict(model.load)),
         ]
 
 
@@ -123,21 +115,11 @@ def _start(model: DualClutch, start: State, crank: float) -> Start:
         _CRANK: crank,
         _TURBINE: start.engine_speed,
         _INPUT: inlet,
-        _OUTPUT: start.output_speed,
+        OUTPUT: start.output_speed,
         _AXLE: model.i_f * start.wheel_speed,
-        _WHEEL: start.wheel_speed,
+        WHEEL: start.wheel_speed,
     }
     for one in model.elements:
         driving, driven = get_side_nodes(one.name)
         speeds |= {driving: inlet / one.i_c, driven: one.i_out * start.output_speed}
-    return Start(speeds, {_SHAFT: start.twist}, start.locked)
-
-
-def _list_outputs(elements: list[str]) -> list[Output]:
-    return [
-        *(("speed", node) for node in (_CRANK, _TURBINE, _OUTPUT, _WHEEL)),
-        ("twist", _SHAFT),
-        ("shaft_torque", _SHAFT),
-        *(("slip", name) for name in elements),
-        *(("friction_torque", name) for name in elements),
-    ]
+    return Start(speeds, {SHAFT: start.twist}, start.locked)

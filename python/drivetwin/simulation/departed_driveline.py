@@ -10,6 +10,13 @@ import numpy as np
 
 from drivetwin.simulation.departed_start import QuasiSteadyState, compute_quasi_steady_state
 from drivetwin.simulation.departure import Departure
+from drivetwin.simulation.driveline_motion import (
+    OUTPUT,
+    SHAFT,
+    WHEEL,
+    build_trajectory,
+    list_motion_outputs,
+)
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,
@@ -17,12 +24,11 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Trajectory,
 )
-from drivetwin.simulation.network import Element, Output, Start, build_element, simulate
+from drivetwin.simulation.network import Element, Start, build_element, simulate
 from drivetwin.simulation.shift_path import build_path, get_side_nodes
 
-_CRANK, _ENGINE, _INPUT, _OUTPUT = "crankshaft", "engine", "input", "output"
-_AXLE, _WHEEL, _VEHICLE = "axle", "wheel", "vehicle"
-_INPUT_SHAFT, _SHAFT = "input shaft", "output shaft"
+_CRANK, _ENGINE, _INPUT, _INPUT_SHAFT = "crankshaft", "engine", "input", "input shaft"
+_AXLE, _VEHICLE = "axle", "vehicle"
 _TORQUE, _WALK = "engine torque", "load walk"
 _LEAST_SPEED = 0.5
 """Speed of the vehicle at the wheel [rad/s] below which a tyre is a damper."""
@@ -62,22 +68,9 @@ class DepartedDriveline:
             {**pressures, **walks, _TORQUE: engine_torque},
             self._build_start(start, state),
             time,
-            _list_outputs(names),
+            list_motion_outputs(names, _ENGINE),
         )
-        motion = run.columns
-        return Trajectory(
-            time=time,
-            engine_speed=motion["speed", _ENGINE],
-            output_speed=motion["speed", _OUTPUT],
-            wheel_speed=motion["speed", _WHEEL],
-            twist=motion["twist", _SHAFT],
-            shaft_torque=motion["shaft_torque", _SHAFT],
-            clutch_torque={name: motion["friction_torque", name] for name in names},
-            slip={name: motion["slip", name] for name in names},
-            events=run.events,
-            status=run.status,
-            audit=run.audit,
-        )
+        return build_trajectory(run, names, _ENGINE)
 
     def _build_elements(self) -> list[Element]:
         model = self.model
@@ -88,10 +81,10 @@ class DepartedDriveline:
             build_element("gear", "input gear", a=_ENGINE, b=_INPUT, ratio=model.i_in, loss=loss),
             build_element("inertia", "J2e", node=_INPUT, inertia=model.J2e * model.i_in**2),
             *(part for name in self.gears for part in self._build_gear(name)),
-            build_element("inertia", "Jo", node=_OUTPUT, inertia=model.J_out),
+            build_element("inertia", "Jo", node=OUTPUT, inertia=model.J_out),
             self._build_shaft(),
-            build_element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
-            *_build_drag("brake drag", _WHEEL, self.departure.brake_drag),
+            build_element("gear", "final drive", a=_AXLE, b=WHEEL, ratio=model.i_f),
+            *_build_drag("brake drag", WHEEL, self.departure.brake_drag),
             *self._build_vehicle(),
         ]
 
@@ -118,29 +111,29 @@ class DepartedDriveline:
         factor = 1.0 + steps * self.departure.efficiency / self.model.eta
         loss = {"law": self.model.loss_law, "eta": factor} if factor != 1.0 else None
         (element,) = (each for each in self.departure.elements if each.name == name)
-        return build_path(element, _INPUT, _OUTPUT, loss)
+        return build_path(element, _INPUT, OUTPUT, loss)
 
     def _build_shaft(self) -> Element:
         model, table, gap = self.model, self.departure.shaft_table, self.departure.gap
-        fields = {"a": _OUTPUT, "b": _AXLE, "damping": model.c_o}
+        fields = {"a": OUTPUT, "b": _AXLE, "damping": model.c_o}
         if table is not None:
             curve = {"twist": table.twist.tolist(), "torque": table.torque.tolist()}
-            return build_element("spring_table", _SHAFT, **fields, **curve)
+            return build_element("spring_table", SHAFT, **fields, **curve)
         fields |= {"stiffness": model.k_o}
         if gap > 0.0:
-            return build_element("backlash", _SHAFT, **fields, gap=gap)
-        return build_element("spring_damper", _SHAFT, **fields)
+            return build_element("backlash", SHAFT, **fields, gap=gap)
+        return build_element("spring_damper", SHAFT, **fields)
 
     def _build_vehicle(self) -> list[Element]:
         """Vehicle and load at the wheel, or behind a tyre."""
-        inertia, tyre, body = self.model.J_v, self.departure.tyre, _WHEEL
+        inertia, tyre, body = self.model.J_v, self.departure.tyre, WHEEL
         parts = []
         if tyre is not None:
             body, inertia = _VEHICLE, inertia - tyre.rim_inertia
             fields = {"slip_stiffness": tyre.slip_stiffness, "least_speed": _LEAST_SPEED}
             parts = [
-                build_element("inertia", "rim", node=_WHEEL, inertia=tyre.rim_inertia),
-                build_element("tyre", "tyre", a=_WHEEL, b=_VEHICLE, **fields),
+                build_element("inertia", "rim", node=WHEEL, inertia=tyre.rim_inertia),
+                build_element("tyre", "tyre", a=WHEEL, b=_VEHICLE, **fields),
             ]
         parts += [
             build_element("inertia", "vehicle", node=body, inertia=inertia),
@@ -153,9 +146,9 @@ class DepartedDriveline:
     def _build_start(self, start: State, state: QuasiSteadyState) -> Start:
         engine, output = start.engine_speed, start.output_speed
         inlet = engine / self.model.i_in
-        speeds = {_ENGINE: engine, _INPUT: inlet, _OUTPUT: output}
-        speeds |= {_AXLE: self.model.i_f * start.wheel_speed, _WHEEL: start.wheel_speed}
-        twists = {_SHAFT: state.twist}
+        speeds = {_ENGINE: engine, _INPUT: inlet, OUTPUT: output}
+        speeds |= {_AXLE: self.model.i_f * start.wheel_speed, WHEEL: start.wheel_speed}
+        twists = {SHAFT: state.twist}
         if self.departure.input_shaft is not None:
             speeds[_CRANK], twists[_INPUT_SHAFT] = engine, state.input_twist
         if self.departure.tyre is not None:
@@ -172,13 +165,3 @@ def _build_drag(name: str, node: str, torque: float) -> list[Element]:
         return []
     table = {"speed": [0.0, 1.0], "torque": [torque, torque], "peak": 1.0}
     return [build_element("bearing", name, a=node, b="ground", **table)]
-
-
-def _list_outputs(elements: Sequence[str]) -> list[Output]:
-    return [
-        *(("speed", node) for node in (_ENGINE, _OUTPUT, _WHEEL)),
-        ("twist", _SHAFT),
-        ("shaft_torque", _SHAFT),
-        *(("slip", name) for name in elements),
-        *(("friction_torque", name) for name in elements),
-    ]
