@@ -14,7 +14,8 @@ from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch
 from benchmarks.estimation.validity import FAR, judge
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
-from drivetwin.findings import Code
+from drivetwin.findings import Code, sort_by_severity
+from drivetwin.logs.quality.consistency_checks import check_final_drive
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
@@ -135,15 +136,17 @@ def check_entry(number: int, seed: int) -> str:
     log, card = entry.change(made.log, made.card)
     if entry.name.startswith("card of"):
         card = make_mismatch_log(seed + 1, None, 0.0, Rates.LOGGER).card
+    read = (*log.findings, *check_final_drive(log.channels, card))  # as a reader of the file
+    log = replace(log, findings=read)
     try:
         found = identify(log, card, detect_shifts(log, card))
         found = attach_validation(found, build_twin(found, card), log)
     except DrivetwinError as error:
-        return f"{entry.name:36s} refused: {error.what[:120]}"
+        return f"{entry.name:36s} refused: {error.what}"
     row = judge(seed, "", 0.0, found, made.recorded.truth.parameters)
     far = [f"{name} {z:+.0f}" for name, z in row.identified.items() if abs(z) > FAR]
     suspects = [one.text for one in found.findings if one.code is Code.CARD_SUSPECT]
-    texts = suspects or [one.text for one in found.findings]
+    texts = suspects or [one.text for one in sort_by_severity(found.findings)]
     place = next((k for k, text in enumerate(texts, 1) if re.search(entry.named, text)), 0)
     return (
         f"{entry.name:36s} {found.status.value:17s} identified {len(row.identified)}, far {far}, "

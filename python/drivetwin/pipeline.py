@@ -12,7 +12,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.data.actuators import identify_actuators
 from drivetwin.estimation.data.compare_logs import require_compatible
-from drivetwin.estimation.data.prepare import DetectedShifts, prepare
+from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
@@ -20,6 +20,7 @@ from drivetwin.estimation.multi_log.fit import identify_joint
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.check import check_card
+from drivetwin.shifts.detect import FoundShifts
 from drivetwin.vehicle.locks import apply_locks, collect_locks
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -27,7 +28,7 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 def identify(
     log: ShiftLog,
     card: VehicleCard,
-    shifts: DetectedShifts,
+    shifts: FoundShifts,
     method: Method = DEFAULT_METHOD,
     *,
     fixed: Mapping[str, float] = MappingProxyType({}),
@@ -96,7 +97,7 @@ def _report_excess(
 
 
 def identify_jointly(
-    logs: Sequence[ShiftLog], card: VehicleCard, shifts: Sequence[DetectedShifts]
+    logs: Sequence[ShiftLog], card: VehicleCard, shifts: Sequence[FoundShifts]
 ) -> Identification:
     """Identify one driveline from two or more logs, by the likelihood of all their shifts.
 
@@ -120,7 +121,7 @@ def attach_actuators(
     return replace(found, actuators=actuators, findings=(*found.findings, *findings))
 
 
-def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> PreparedLog:
+def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLog:
     """Prepare a log, with what is implausible on the card among its findings."""
     prepared = prepare(log, card, shifts)
     doubts = check_card(card, log, shifts.shifts)

@@ -12,10 +12,10 @@ import pytest
 
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.noise import estimate_white_noise
+from drivetwin.estimation.data.quantization_error import estimate_quantization_error
 from drivetwin.estimation.data.segments import MOMENTUM, find_off_going_release
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
 from drivetwin.estimation.linear.friction_points import evaluate_fitted_stribeck
-from drivetwin.estimation.linear.momentum_balance import estimate_rounding_error
 from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
@@ -169,7 +169,7 @@ def test_what_was_known_beforehand_is_told_with_the_values(stepped: Run, ring: b
     found = identify_shift(signals, told, 12.0)
     assert ("shaft" in found.refusals) != ring
     design = {"J_out": PriorValue(0.9, 0.09), "P0.B3": PriorValue(8e4, 5e3)}
-    rounding = estimate_rounding_error(signals.engine_torque, signals.torque_resolution)
+    rounding = estimate_quantization_error(signals.engine_torque, signals.torque_resolution)
     torque = {
         "te_delay": MOMENTUM.delay_prior,
         "te_rounding": PriorValue(0.0, rounding),

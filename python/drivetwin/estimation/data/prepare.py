@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
 from drivetwin._util.progress import scale_progress
 from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel, ShiftLog
-from drivetwin.errors import DamagedChannelError, IdentificationError, NoShiftError, Where
+from drivetwin.errors import DamagedChannelError, IdentificationError
 from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
 from drivetwin.estimation.data.shift_data import (
@@ -30,6 +29,7 @@ from drivetwin.estimation.data.shift_data import (
     TorqueOfSpeeds,
 )
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
+from drivetwin.shifts.detect import FoundShifts, refuse_without_shifts
 from drivetwin.shifts.lockup_clutch import (
     check_lockup_observed,
     refer_to_turbine,
@@ -50,30 +50,13 @@ SECANT = 1e-3
 """Least change of a speed [rad/s] over which the slope of a converter's torque is taken."""
 
 
-class DetectedShifts(Protocol):
-    """Result of the shift detection."""
-
-    @property
-    def shifts(self) -> tuple[Shift, ...]:
-        """Usable shifts."""
-
-    @property
-    def rejected(self) -> tuple[RejectedShift, ...]:
-        """Rejected candidates with the reason."""
-
-
-def prepare(log: ShiftLog, card: VehicleCard, shifts: DetectedShifts) -> PreparedLog:
+def prepare(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLog:
     """Prepare the shifts of a log for the estimators.
 
     Raises NoShiftError without a shift, MissingChannelError for a missing channel, and if no shift
     can be used DamagedChannelError or IdentificationError.
     """
-    if not shifts.shifts:
-        raise NoShiftError(
-            "the log holds no usable gear shift",
-            "record from a second before the torque phase to a second after lock-up",
-            Where(file=log.source),
-        )
+    refuse_without_shifts(log, shifts)
     sampler = _Sampler()
     usable, refused = _split_usable(log, card, shifts.shifts)
     with scale_progress(0.0, 0.05, "loads of the shifts"):

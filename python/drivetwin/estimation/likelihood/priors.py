@@ -16,6 +16,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import InputError
+from drivetwin.estimation.data.quantization_error import estimate_quantization_error
 from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
@@ -34,7 +35,7 @@ from drivetwin.estimation.likelihood.parametrization import (
 )
 from drivetwin.estimation.linear.friction_points import LAW_PRIOR
 from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE, compute_mean_speed
-from drivetwin.estimation.linear.momentum_balance import DELAY, estimate_rounding_error
+from drivetwin.estimation.linear.momentum_balance import DELAY
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS
@@ -233,7 +234,7 @@ def _collect_priors(
     for s in signals:
         own = map_log_names(s.log)
         found |= {own[name]: found[name] for name in own if name in found}
-        rounding = estimate_rounding_error(s.engine_torque, s.torque_resolution)
+        rounding = estimate_quantization_error(s.engine_torque, s.torque_resolution)
         if rounding > 0.0:
             found.setdefault(own.get(TE_OFFSET, TE_OFFSET), PriorValue(0.0, rounding))
     if AERO in guess:

@@ -23,8 +23,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.data.quantization_error import estimate_quantization_error
 from drivetwin.estimation.data.segments import MomentumSettings, Segment, find_segments
-from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.regression.errors_in_variables import (
     Fit,
     Prior,
@@ -50,9 +51,6 @@ class DelaySettings:
     """Standard error above which the delay counts as not determined [s]."""
     min_rise: float = 30.0
     """Smallest rise of Q over the scanned delays of a significant minimum [1]."""
-    max_rounding: float = 1e-3
-    """Mean rounding error over the noise of a sample that is negligible [ratio]: in the mean of a
-    thousand samples it is thirty times as large."""
 
 
 DELAY = DelaySettings()
@@ -198,25 +196,11 @@ class _Equations:
         return [self.engine_torque(theta), *self.others(theta), self.rounding(theta)]
 
 
-def estimate_rounding_error(torque: MeasuredSignal, step: float) -> float:
-    """Standard deviation [N m] of the mean error that rounding to `step` leaves.
-
-    Noise of standard deviation σ dithers the rounding; what stays of its mean error is periodic
-    in the level with amplitude (step/π)·exp(-2π²σ²/step²) (Widrow and Kollár 2008). `torque.sigma`
-    holds noise and rounding together. 0 where it is lost in the noise.
-    """
-    if step == 0.0:
-        return 0.0
-    square = max(torque.sigma**2 - step**2 / 12.0, 0.0)
-    left = float(step / np.pi * np.exp(-2.0 * np.pi**2 * square / step**2) / np.sqrt(2.0))
-    return left if left > DELAY.max_rounding * torque.sigma else 0.0
-
-
 def _build_priors(
     signals: ShiftSignals, driveline: KnownDriveline, settings: MomentumSettings
 ) -> dict[str, PriorValue]:
     """Build the priors of the parameters, by name."""
-    rounding = estimate_rounding_error(signals.engine_torque, signals.torque_resolution)
+    rounding = estimate_quantization_error(signals.engine_torque, signals.torque_resolution)
     found = {"te_delay": settings.delay_prior, "te_rounding": PriorValue(0.0, rounding)}
     if driveline.J_out is not None:
         found["J_out"] = driveline.J_out

@@ -43,7 +43,10 @@ def test_each_stay_at_a_level_has_an_error_of_its_own() -> None:
 @pytest.mark.parametrize(("step", "noise"), [(0.0, 1.0), (1.0, 2.0)])
 def test_what_noise_dithers_leaves_nothing(step: float, noise: float) -> None:
     time = np.arange(0.0, 1.0, 0.01)
-    assert estimate_quantization(MeasuredSignal(time, 100.0 + 0.0 * time, noise), step) is None
+    values = 100.0 + noise * np.random.default_rng(1).standard_normal(time.size)
+    rounded = np.round(values / step) * step if step else values
+    found = estimate_quantization(MeasuredSignal(time, rounded, noise), step)
+    assert found is None
 
 
 def test_intervals_hold_where_the_engine_torque_has_no_noise_but_its_rounding(

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.data.quantization_error import estimate_quantization_error
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
-from drivetwin.estimation.linear.momentum_balance import estimate_rounding_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Quantization:
 def estimate_quantization(signal: MeasuredSignal, step: float) -> Quantization | None:
     """Compute the errors that quantization to `step` leaves, in the signal's unit; None if noise
     dithers them."""
-    error = estimate_rounding_error(signal, step)
+    error = estimate_quantization_error(signal, step)
     if error == 0.0:
         return None
     level = np.round(smooth_adaptive(signal) / step)
