@@ -111,7 +111,7 @@ ENTRIES = (
     WrongEntry("gain of both x10", scale_gains(10.0, "B2", "B3"), r"gain of B[23]"),
     WrongEntry("ratio +1 %", scale_ratio, r"ratio"),
     WrongEntry("final drive +3 %", scale_final_drive, r"final_drive"),
-    WrongEntry("P0 +0.5 bar", raise_fill_pressure, r"P0\.B3"),
+    WrongEntry("P0 +0.5 bar", raise_fill_pressure, r"P0"),
     WrongEntry("elements swapped", swap_elements, r"swap|element|gain|pressure"),
     WrongEntry("drums not stated", keep, r"drum"),
     WrongEntry("inertia ranges of another vehicle", shift_ranges, r"range"),

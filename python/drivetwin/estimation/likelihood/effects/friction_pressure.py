@@ -35,6 +35,6 @@ EFFECT = Effect(
     0.03,
     "typical range of paper linings: μ falls by 2 to 5 % per MPa; see Mäki, Wet Clutch Tribology, "
     "2005, on friction over pressure",
-    "record shifts at two pressure levels",
+    "check P0 of the element on the card, which acts alike; record shifts at two pressure levels",
     build,
 )
