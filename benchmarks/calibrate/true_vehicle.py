@@ -119,12 +119,17 @@ class MadeVehicle:
         self, shift: Maneuver, torque: Signal, pressures: dict[str, Signal], time: FloatArray
     ) -> Trajectory:
         """Simulate a shift with pressures at the clutches on `time` (n,) [s]."""
+        start = replace(shift, model=self.scenario.model).build_start()
+        return self.driveline.simulate(*self.build_acting(torque, pressures), start, time)
+
+    def build_acting(
+        self, torque: Signal, pressures: dict[str, Signal]
+    ) -> tuple[Signal, dict[str, Signal]]:
+        """Return engine torque and pressures as they act on the vehicle."""
         given = _LogRanges(
             self.scenario.model, self.nominal.trajectory, torque, pressures, self.nominal
         )
-        acting = build_acting_inputs(given, self.effects, self.nominal.trajectory)
-        start = replace(shift, model=self.scenario.model).build_start()
-        return self.driveline.simulate(*acting, start, time)
+        return build_acting_inputs(given, self.effects, self.nominal.trajectory)
 
 
 def make_vehicle(seed: int, *, whole: bool = True) -> MadeVehicle:
@@ -241,11 +246,11 @@ def _add_hydraulics(scenario: Scenario, random: np.random.Generator) -> Scenario
 
 
 def _identify(vehicle: Vehicle, recorded: DynoRun) -> Twin:
-    """Identify the log of a vehicle as it is written and read."""
+    """Identify the log of a vehicle as it is written and read; the twin has no part beside."""
     with tempfile.TemporaryDirectory() as folder:
         log_file, card_file = Path(folder) / "log.csv", Path(folder) / "card.toml"
         write_log(log_file, convert_channels(recorded))
         card_file.write_text(vehicle.card, encoding="utf-8")
         card = load_card(card_file)
         log = read_log(log_file, card)
-        return build_twin(identify(log, card, detect_shifts(log, card)), card)
+        return build_twin(identify(log, card, detect_shifts(log, card)), card).drop_part()

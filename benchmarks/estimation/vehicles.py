@@ -7,12 +7,13 @@ over 10 ms on a bus. The card has design values drawn about the truth.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import tomlkit
 
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.shiftlog import Channel, Quantity
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import Actuator, Program, Vibration
 from drivetwin.dyno.dyno import DynoRun
@@ -90,11 +91,18 @@ def draw_errors(seed: int, scenario: Scenario) -> dict[str, tuple[float, float]]
 def misread(recorded: DynoRun, seed: int) -> DynoRun:
     """Return the run as sensors with errors of gain and offset read it."""
     errors = draw_errors(seed, recorded.scenario)
-    channels = []
-    for channel in recorded.channels:
+    return replace(recorded, channels=misread_channels(recorded.channels, errors))
+
+
+def misread_channels(
+    channels: Sequence[Channel], errors: Mapping[str, tuple[float, float]]
+) -> tuple[Channel, ...]:
+    """Return channels as sensors with errors of gain and offset, by role, read them."""
+    misread = []
+    for channel in channels:
         gain, offset = errors.get(channel.role, (0.0, 0.0))
-        channels.append(replace(channel, values=(1.0 + gain) * channel.values + offset))
-    return replace(recorded, channels=tuple(channels))
+        misread.append(replace(channel, values=(1.0 + gain) * channel.values + offset))
+    return tuple(misread)
 
 
 def add_tolerances(text: str, scenario: Scenario) -> str:

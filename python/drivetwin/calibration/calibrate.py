@@ -151,6 +151,8 @@ def polish_from(task: Task, plant: Plant, start: FloatArray) -> Candidate:
 
 def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
     settings, space = task.settings, Space(task.policy)
+    if settings.starts == 0:
+        return [Candidate(space.start, float("inf"))]
     draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
     coarse = set_coarse_step(plant)
 

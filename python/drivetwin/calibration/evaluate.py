@@ -71,11 +71,12 @@ class Plant:
             return self._run_closed_loops([control], scenarios, outputs)[0]
         self.count.runs += scenarios.count
         shift = self.maneuver
+        sampled = control.sample(shift.time)
         pressures = {
-            shift.offgoing.name: control.offgoing,
-            shift.oncoming.name: control.oncoming,
+            shift.offgoing.name: sampled.offgoing,
+            shift.oncoming.name: sampled.oncoming,
         }
-        given = Scenario(control.engine_torque, pressures, shift.build_start())
+        given = Scenario(sampled.engine_torque, pressures, shift.build_start())
         batch = simulate_batch(
             shift.model,
             [given],

@@ -6,6 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import Signal
 
@@ -26,6 +29,19 @@ class Profiles:
             "pressure.offgoing": self.offgoing,
             "pressure.oncoming": self.oncoming,
         }
+
+    def sample(self, time: FloatArray) -> Profiles:
+        """Return the profiles with corners at `time` (n,) [s] alone.
+
+        The core passes samples of one distance with one operator; corners between them need their
+        own in every run.
+        """
+        return Profiles(
+            *(
+                Signal(time, np.interp(time, one.time, one.values))
+                for one in (self.engine_torque, self.offgoing, self.oncoming)
+            )
+        )
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ class CalibrationSettings:
     """Effort and tolerances of search, polish and certificate."""
 
     starts: int = 4
-    """Independent searches; the problem has many local minima."""
+    """Independent searches; the problem has many local minima. 0 polishes the start alone."""
     finalists: int = 2
     """Searches that are continued and polished."""
     population: int = 24

@@ -15,6 +15,11 @@ import typer
 
 from drivetwin.calibration.policy_kind import PolicyKind
 from drivetwin.cli.arguments import RESULT, TWIN, DropPart, TwinFile
+from drivetwin.cli.calibrate_logs import (
+    correct_by_logs,
+    print_correction,
+    to_correction_document,
+)
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -122,13 +127,23 @@ def calibrate(
         bool,
         typer.Option("--resume", help="Continue an interrupted calibration from DIR.resume.json."),
     ] = False,
+    from_logs: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--from-logs",
+            metavar="LOG",
+            help="Log of the vehicle's shifts with an earlier calibration (may be repeated): it "
+            "corrects the twin. With --start the calibration is polished from there, not searched.",
+        ),
+    ] = None,
     drop_part: DropPart = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Find shift profiles with a small peak jerk over the spread of made units.
 
     Minimise the tail mean of peak jerk under limits, and certify the result on fresh draws. Write
-    calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx into DIR.
+    calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx into DIR;
+    with --from-logs also the corrected twin.toml.
     Where a limit is out of reach, the best calibration found is written and the exit code is 2.
     """
     from drivetwin.calibration.identified_range import check_identified_range
@@ -140,7 +155,12 @@ def calibrate(
     given = Requirements(()) if limits is None else load_limits(limits)
     model = _load_valid_twin(twin)
     model = model.drop_part() if drop_part else model
-    gears = parse_gears(shift)
+    gears, logs = parse_gears(shift), from_logs or []
+    correction = correct_by_logs(model, logs, gears, given.spread) if logs else None
+    model = model if correction is None else correction.twin
+    settings = CalibrationSettings(certificate_draws=draws).scale_effort(effort)
+    if correction is not None and start is not None:
+        settings = replace(settings, starts=0)
     request = Request(
         gears=gears,
         wheel_radius=wheel_radius,
@@ -153,7 +173,7 @@ def calibrate(
         spread=given.spread,
         start=_load_start(start, policy),
         seed=seed,
-        settings=CalibrationSettings(certificate_draws=draws).scale_effort(effort),
+        settings=settings,
     )
     named = {
         "shift": shift,
@@ -169,20 +189,25 @@ def calibrate(
         "number of draws": str(draws),
         "seed": str(seed),
     }
-    stages = _open_stages(output, {"twin": twin, "limits": limits, "start": start}, named, resume)
+    read = {f"log {number}": path for number, path in enumerate(logs, 1)}
+    files = {"twin": twin, "limits": limits, "start": start, **read}
+    stages = _open_stages(output, files, named, resume)
     results = _calibrate(model, request, (grid, front), stages)
     found = results[0]
     findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
     with show_step(f"writing {output}"):
-        _write_results(output, results, findings, (model, request, twin))
+        _write_results(output, results, findings, (model, request, (twin, *logs)))
     stages.remove()
     infeasible = _find_excess(found, output)
     if as_json:
         fault = {} if infeasible is None else to_error_document(infeasible)
-        print_json({**_to_document(results, findings, output), **fault})
+        learned = {} if correction is None else {"correction": to_correction_document(correction)}
+        print_json({**_to_document(results, findings, output), **learned, **fault})
         if infeasible is not None:
             raise typer.Exit(infeasible.exit_code)
         return
+    if correction is not None:
+        print_correction(correction)
     _print_results(found)
     _print_around(*results[1:])
     print_findings(findings)
@@ -332,7 +357,7 @@ def _write_results(
     output: Path,
     results: Results,
     findings: tuple[Finding, ...],
-    origin: tuple[Twin, Request, Path],
+    origin: tuple[Twin, Request, tuple[Path, ...]],
 ) -> None:
     from drivetwin._util.atomic import write_text
     from drivetwin._util.version import get_program_version
@@ -346,16 +371,17 @@ def _write_results(
         hash_file,
         write_calibration_file,
     )
+    from drivetwin.files.twin_conversion import save_twin
     from drivetwin.report.calibration import render_calibration
 
-    (found, front, mapped), (twin, request, source) = results, origin
+    (found, front, mapped), (twin, request, sources) = results, origin
     label = "-".join(request.gears)
     provenance = Provenance(
         get_program_version(),
         twin.name,
         label,
         request.policy,
-        {source.name: hash_file(source)},
+        {one.name: hash_file(one) for one in sources},
         request.spread,
     )
     name = f"{twin.name} {label}"
@@ -370,6 +396,8 @@ def _write_results(
             write_parameters(content, folder / f"calibration.{kind.value}", kind)
         page = render_calibration(found, f"Calibration of {name}", findings, front, mapped)
         write_text(folder / REPORT, page)
+        if len(sources) > 1:
+            save_twin(folder / TWIN, twin)
 
 
 def _print_results(found: Calibration) -> None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,44 +65,64 @@ def run(
         )
     sizes = check_effects(effects or {})
     sensors = apply_delay(scenario.sensors, sizes)
-    stamps = {sensor.role: sensor.compute_stamps(scenario.duration) for sensor in sensors}
-    looks = {
-        sensor.role: _compute_sampling_instants(sensor, stamps[sensor.role]) for sensor in sensors
-    }
-    seen = np.unique(np.concatenate([instants.ravel() for instants in looks.values()]))
-    trajectory, inputs, error = _simulate_effects(scenario, sizes, seed, seen)
-    generators = np.random.SeedSequence(seed).spawn(len(sensors))
-    channels = tuple(
-        sensor.read(
-            stamps[sensor.role],
-            _compute_quantity(sensor, looks[sensor.role], (trajectory, scenario.model.i_in), inputs)
-            + error.compute(sensor.role, stamps[sensor.role]),
-            noise,
-            np.random.default_rng(generator),
-        )
-        for sensor, generator in zip(sensors, generators, strict=True)
+    seen = list_sampling_instants(sensors, scenario.duration)
+    motion = _simulate_effects(scenario, sizes, seed, seen)
+    channels = record_channels(sensors, scenario.duration, motion, noise, seed)
+    truth = compute_truth(scenario, motion.trajectory, sizes)
+    return DynoRun(scenario, seed, noise, channels, truth, motion.trajectory)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion at all instants that a sensor samples, and what it does not hold.
+
+    `inputs` by role are signals beside the trajectory, `error` is that of the torque sensor.
+    """
+
+    trajectory: Trajectory
+    i_in: float
+    inputs: Mapping[str, Signal]
+    error: TorqueError
+
+
+def list_sampling_instants(sensors: Sequence[Sensor], duration: float) -> FloatArray:
+    """List the instants (n,) [s] at which any sensor samples until `duration` [s], increasing."""
+    looks = (
+        _compute_sampling_instants(one, one.compute_stamps(duration)).ravel() for one in sensors
     )
-    truth = compute_truth(scenario, trajectory, sizes)
-    return DynoRun(scenario, seed, noise, channels, truth, trajectory)
+    return np.unique(np.concatenate(list(looks)))
 
 
-def _simulate_effects(
-    scenario: Scenario, effects: Effects, seed: int, time: FloatArray
-) -> tuple[Trajectory, dict[str, Signal], TorqueError]:
-    """The motion at `time`, the quantities that it does not hold, and the torque sensor's error."""
-    given = _build_inputs(scenario)
+def record_channels(
+    sensors: Sequence[Sensor], duration: float, motion: Motion, noise: float, seed: int
+) -> tuple[Channel, ...]:
+    """Record a motion until `duration` [s]; `noise` scales the white noise of all sensors."""
+    generators = np.random.SeedSequence(seed).spawn(len(sensors))
+    channels = []
+    for sensor, generator in zip(sensors, generators, strict=True):
+        stamps = sensor.compute_stamps(duration)
+        exact = _compute_quantity(sensor, _compute_sampling_instants(sensor, stamps), motion)
+        exact = exact + motion.error.compute(sensor.role, stamps)
+        channels.append(sensor.read(stamps, exact, noise, np.random.default_rng(generator)))
+    return tuple(channels)
+
+
+def _simulate_effects(scenario: Scenario, effects: Effects, seed: int, time: FloatArray) -> Motion:
+    given, i_in = _build_inputs(scenario), scenario.model.i_in
     if not effects:
-        return *_simulate(scenario, given, time), compute_torque_error({}, 0.0, seed, 0.0)
+        trajectory, inputs = _simulate(scenario, given, time)
+        return Motion(trajectory, i_in, inputs, compute_torque_error({}, 0.0, seed, 0.0))
     departed = is_departed(scenario, effects)
     grid = given.engine_torque.time
     reference, _ = _simulate(scenario, given, grid[grid <= scenario.duration])
     nominal = NominalRun(scenario.model, reference, given.engine_torque, given.pressures)
     error = compute_torque_error(effects, nominal.largest_shaft_torque, seed, scenario.duration)
     if not departed:
-        return *_simulate(scenario, given, time), error
+        trajectory, inputs = _simulate(scenario, given, time)
+        return Motion(trajectory, i_in, inputs, error)
     trajectory = simulate_departed(scenario, nominal, effects, seed, time)
     _check_completed(scenario, trajectory)
-    return trajectory, given.list_by_role(scenario), error
+    return Motion(trajectory, i_in, given.list_by_role(scenario), error)
 
 
 def _compute_sampling_instants(sensor: Sensor, stamps: FloatArray) -> FloatArray:
@@ -169,20 +189,15 @@ def _check_completed(scenario: Scenario, trajectory: Trajectory) -> None:
         )
 
 
-def _compute_quantity(
-    sensor: Sensor, at: FloatArray, motion: tuple[Trajectory, float], inputs: dict[str, Signal]
-) -> FloatArray:
-    """The exact quantity (n,) that `sensor` sees as means over the instants `at` (n, m).
-
-    `motion` is the trajectory and i_in.
-    """
-    trajectory, i_in = motion
-    if sensor.role in inputs:
-        signal = inputs[sensor.role]
+def _compute_quantity(sensor: Sensor, at: FloatArray, motion: Motion) -> FloatArray:
+    """The exact quantity (n,) that `sensor` sees as means over the instants `at` (n, m)."""
+    trajectory = motion.trajectory
+    if sensor.role in motion.inputs:
+        signal = motion.inputs[sensor.role]
         return _compute_means(at, signal.time, signal.values)
     outputs = {
         "output_torque": trajectory.shaft_torque,
-        "input_speed": trajectory.engine_speed / i_in,
+        "input_speed": trajectory.engine_speed / motion.i_in,
         "output_speed": trajectory.output_speed,
         "wheel_speed": trajectory.wheel_speed,
     }

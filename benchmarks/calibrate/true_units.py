@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""Units made like a true vehicle, with its departures: shifts with profiles, and logs of them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.calibrate.true_vehicle import MadeVehicle
+from benchmarks.estimation.vehicles import draw_errors, misread_channels
+from drivetwin.calibration.closed_loop import Control
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics
+from drivetwin.calibration.profiles import Profiles
+from drivetwin.calibration.scenarios import scale_units
+from drivetwin.calibration.spread import Spread
+from drivetwin.channels.pressure_roles import get_command_element
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
+from drivetwin.dyno.sensor_effects import compute_torque_error
+from drivetwin.logs.read import read_log
+from drivetwin.logs.write import convert_to_recorded_units, write_log
+from drivetwin.simulation.departed_driveline import DepartedDriveline
+from drivetwin.simulation.dual_clutch import Signal
+
+_BEFORE, _AFTER = 1.5, 1.0
+"""Time of a log before and after the maneuver [s]."""
+_METRICS = (Metric.PEAK_JERK, Metric.SHIFT_TIME)
+
+
+@dataclass(frozen=True, eq=False)
+class TrueUnits:
+    """Made units around a true vehicle, with its departures; `shift` has the operating point."""
+
+    made: MadeVehicle
+    shift: Maneuver
+    units: Sequence[DepartedDriveline]
+
+    def evaluate_all(self, controls: Sequence[Control]) -> list[Outcome]:
+        """Return the metrics of each control over all units."""
+        return [self.evaluate(one) for one in controls]
+
+    def evaluate(self, control: Control) -> Outcome:
+        """Return the metrics of profiles over all units."""
+        assert isinstance(control, Profiles)
+        shift, names = self.shift, (self.shift.offgoing.name, self.shift.oncoming.name)
+        pressures = dict(zip(names, (control.offgoing, control.oncoming), strict=True))
+        acting = self.made.build_acting(control.engine_torque, pressures)
+        start = shift.build_start()
+        runs, locks = [], []
+        for unit in self.units:
+            run = unit.simulate(*acting, start, shift.time)
+            pairs = [one[name] for name in names for one in (run.clutch_torque, run.slip)]
+            runs.append(np.stack([run.shaft_torque, *pairs]))
+            held = [
+                one.time for one in run.events if one.kind == "lock" and one.element == names[1]
+            ]
+            locks.append(held[-1] if held else float("nan"))
+        vehicle = np.full(len(runs), shift.model.J_v)
+        return compute_metrics(shift, np.stack(runs), np.array(locks), vehicle, _METRICS)
+
+
+def draw_true_units(
+    made: MadeVehicle, shift: Maneuver, spread: Spread, count: int, seed: int
+) -> TrueUnits:
+    """Draw `count` units around a true vehicle."""
+    random = np.random.default_rng([made.seed, 43, seed])
+    model, departure = made.scenario.model, made.driveline.departure
+    units = []
+    for _ in range(count):
+        drawn = scale_units(replace(model, elements=departure.elements), spread, random)
+        own = replace(departure, elements=drawn.elements)
+        units.append(replace(made.driveline, model=drawn, departure=own))
+    return TrueUnits(made, replace(shift, model=model), units)
+
+
+def record_shift(made: MadeVehicle, shift: Maneuver, control: Profiles, seed: int) -> ShiftLog:
+    """Record a shift of the true vehicle with profiles, by the sensors of its first log."""
+    scenario = made.scenario
+    sensors = [one for one in scenario.sensors if get_command_element(one.role) is None]
+    true = replace(shift, model=scenario.model)
+    rate = true.ratios[0] * true.compute_acceleration(shift.point.engine_torque, true.ratios[0])
+    speed = shift.point.engine_speed - _BEFORE * rate
+    early = replace(true, point=replace(true.point, engine_speed=speed))
+    duration = _BEFORE + shift.horizon + _AFTER
+    inputs = {
+        "engine_torque": _move(control.engine_torque, duration),
+        f"pressure.{shift.offgoing.name}": _move(control.offgoing, duration),
+        f"pressure.{shift.oncoming.name}": _move(control.oncoming, duration),
+    }
+    pressures = {one.name: inputs[f"pressure.{one.name}"] for one in true.model.elements}
+    seen = list_sampling_instants(sensors, duration)
+    run = made.simulate(early, inputs["engine_torque"], pressures, seen)
+    error = compute_torque_error({}, 0.0, seed, 0.0)
+    channels = record_channels(
+        sensors, duration, Motion(run, scenario.model.i_in, inputs, error), 1.0, seed
+    )
+    read = misread_channels(channels, draw_errors(made.seed, scenario))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"bench-{seed}.csv"
+        write_log(path, tuple(convert_to_recorded_units(one) for one in read))
+        return read_log(path, made.twin.build_card())
+
+
+def _move(signal: Signal, duration: float) -> Signal:
+    """Move a signal to the request of a log, constant beyond its ends."""
+    time = np.concatenate([[0.0], signal.time + _BEFORE, [duration + 1.0]])
+    values = np.concatenate([signal.values[:1], signal.values, signal.values[-1:]])
+    return Signal(time, values)

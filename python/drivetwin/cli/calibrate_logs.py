@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin calibrate TWIN --from-logs LOG`: the twin is corrected by logs of its vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drivetwin.cli.arguments import read_twin_log
+from drivetwin.cli.output import make_table, print_table, show_step
+from drivetwin.errors import InputError, Where
+
+if TYPE_CHECKING:
+    from drivetwin.calibration.learn import Correction, LoggedShift
+    from drivetwin.calibration.spread import Spread
+    from drivetwin.twin.twin import Twin
+
+
+def correct_by_logs(
+    twin: Twin, logs: Sequence[Path], gears: tuple[str, str], spread: Spread
+) -> Correction:
+    """Correct a twin by the shifts between two gears in logs of one vehicle.
+
+    Raises InputError for a log without such a shift, and what reading and simulation raise.
+    """
+    from drivetwin.calibration.learn import correct_twin
+
+    logged = [one for path in logs for one in _collect_shifts(twin, path, gears)]
+    with show_step(f"correcting {twin.name} by {len(logged)} shifts"):
+        return correct_twin(twin, logged, spread)
+
+
+def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[LoggedShift]:
+    from drivetwin.calibration.learn import LoggedShift
+    from drivetwin.shifts.detect import require_shifts
+
+    log, card = read_twin_log(twin, path, None, None)
+    shifts = require_shifts(log, card).shifts
+    chosen = [one for one in shifts if (one.start_gear, one.end_gear) == gears]
+    if not chosen:
+        seen = ", ".join(f"{one.start_gear}-{one.end_gear}" for one in shifts)
+        raise InputError(
+            f"the log has no shift {'-'.join(gears)}, only {seen}",
+            "give logs of the shift that is calibrated",
+            Where(file=str(path)),
+        )
+    return [LoggedShift(log, one) for one in chosen]
+
+
+def print_correction(found: Correction) -> None:
+    """Print the deviations of the logged shifts before and after the correction."""
+    table = make_table(
+        "Logged shifts: RMS deviation of the simulation",
+        "signal", "unit", "before", "after", right=("before", "after"),
+    )  # fmt: skip
+    for name, before in found.before.items():
+        unit = "N·m" if name.endswith("torque") else "rad/s"
+        table.add_row(name, unit, f"{before:.3g}", f"{found.after[name]:.3g}")
+    print_table(table)
+
+
+def to_correction_document(found: Correction) -> dict[str, Any]:
+    """Convert a correction to JSON-serialisable types, SI."""
+    values = {name: one.value for name, one in found.twin.parameters.items()}
+    return {"rms_before": found.before, "rms_after": found.after, "parameters": values}
