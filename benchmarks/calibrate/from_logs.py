@@ -29,13 +29,13 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, find_best, make_quick_plant
 from drivetwin.calibration.learn import LoggedShift, correct_twin
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
+from drivetwin.calibration.objective import Objective, compute_tail_mean
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.twin_task import Request, build_task, derive_limits
+from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import DrivetwinError
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin

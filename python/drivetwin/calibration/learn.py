@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Correction of a twin by logged shifts of one vehicle, in a Bayes step by Gauss-Newton.
 
-The prior is the twin's covariance together with the spread of made units; the likelihood that of
-the measured torque and speeds of each shift, simulated from its logged inputs. Source: C. M. Bishop,
-Pattern Recognition and Machine Learning (2006), section 4.4 (Laplace approximation).
+The prior is the twin's covariance together with the spread of made units; the likelihood is that of
+the measured torque and speeds of each shift, which is simulated from its logged inputs.
+
+Source: C. M. Bishop, Pattern Recognition and Machine Learning (2006), section 4.4.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class LoggedShift:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """Corrected twin, and the RMS deviation (SI) of each signal over all shifts before and after."""
+    """Corrected twin; RMS deviations (SI) by signal over all shifts, `before` and `after`."""
 
     twin: Twin
     before: dict[str, float]

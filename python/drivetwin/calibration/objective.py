@@ -56,7 +56,11 @@ def compute_tail_mean(values: FloatArray, share: float) -> float:
 
 @dataclass(frozen=True)
 class Objective:
-    """Tail mean of peak jerk beyond the quantile `share`, plus `weight` times relative excesses."""
+    """Tail mean of peak jerk beyond the quantile `share`, plus penalties.
+
+    These are `weight` times the relative excesses over the limits, and times the share of units
+    whose on-coming element slips again after its lock-up.
+    """
 
     limits: Sequence[Limit]
     share: float
@@ -66,7 +70,7 @@ class Objective:
         """Return the value [m/s^3] of an outcome; smaller is better."""
         comfort = compute_tail_mean(outcome.values[Metric.PEAK_JERK], self.share)
         excess = sum(float(one.compute_excess(outcome).mean()) for one in self.limits)
-        return comfort + self.weight * excess
+        return comfort + self.weight * (excess + float(outcome.relocked.mean()))
 
     def set_share(self, share: float) -> Objective:
         """Return the objective with another quantile."""

@@ -17,6 +17,7 @@ from drivetwin.calibration.policy_kind import PolicyKind
 from drivetwin.cli.arguments import RESULT, TWIN, DropPart, TwinFile
 from drivetwin.cli.calibrate_logs import (
     correct_by_logs,
+    name_logs,
     print_correction,
     to_correction_document,
 )
@@ -159,8 +160,7 @@ def calibrate(
     correction = correct_by_logs(model, logs, gears, given.spread) if logs else None
     model = model if correction is None else correction.twin
     settings = CalibrationSettings(certificate_draws=draws).scale_effort(effort)
-    if correction is not None and start is not None:
-        settings = replace(settings, starts=0)
+    warm = correction is not None and start is not None
     request = Request(
         gears=gears,
         wheel_radius=wheel_radius,
@@ -173,7 +173,7 @@ def calibrate(
         spread=given.spread,
         start=_load_start(start, policy),
         seed=seed,
-        settings=settings,
+        settings=replace(settings, starts=0) if warm else settings,
     )
     named = {
         "shift": shift,
@@ -189,8 +189,7 @@ def calibrate(
         "number of draws": str(draws),
         "seed": str(seed),
     }
-    read = {f"log {number}": path for number, path in enumerate(logs, 1)}
-    files = {"twin": twin, "limits": limits, "start": start, **read}
+    files = {"twin": twin, "limits": limits, "start": start, **name_logs(logs)}
     stages = _open_stages(output, files, named, resume)
     results = _calibrate(model, request, (grid, front), stages)
     found = results[0]
@@ -201,13 +200,12 @@ def calibrate(
     infeasible = _find_excess(found, output)
     if as_json:
         fault = {} if infeasible is None else to_error_document(infeasible)
-        learned = {} if correction is None else {"correction": to_correction_document(correction)}
+        learned = to_correction_document(correction)
         print_json({**_to_document(results, findings, output), **learned, **fault})
         if infeasible is not None:
             raise typer.Exit(infeasible.exit_code)
         return
-    if correction is not None:
-        print_correction(correction)
+    print_correction(correction)
     _print_results(found)
     _print_around(*results[1:])
     print_findings(findings)

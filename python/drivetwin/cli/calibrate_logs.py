@@ -48,8 +48,15 @@ def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[Logg
     return [LoggedShift(log, one) for one in chosen]
 
 
-def print_correction(found: Correction) -> None:
-    """Print the deviations of the logged shifts before and after the correction."""
+def name_logs(logs: Sequence[Path]) -> dict[str, Path]:
+    """Name the logs in their order."""
+    return {f"log {number}": path for number, path in enumerate(logs, 1)}
+
+
+def print_correction(found: Correction | None) -> None:
+    """Print the deviations of the logged shifts before and after a correction, if there is one."""
+    if found is None:
+        return
     table = make_table(
         "Logged shifts: RMS deviation of the simulation",
         "signal", "unit", "before", "after", right=("before", "after"),
@@ -60,7 +67,15 @@ def print_correction(found: Correction) -> None:
     print_table(table)
 
 
-def to_correction_document(found: Correction) -> dict[str, Any]:
-    """Convert a correction to JSON-serialisable types, SI."""
+def to_correction_document(found: Correction | None) -> dict[str, Any]:
+    """Convert a correction to JSON-serialisable types, SI; nothing without one."""
+    if found is None:
+        return {}
     values = {name: one.value for name, one in found.twin.parameters.items()}
-    return {"rms_before": found.before, "rms_after": found.after, "parameters": values}
+    return {
+        "correction": {
+            "rms_before": found.before,
+            "rms_after": found.after,
+            "parameters": values,
+        }
+    }

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""Correction of a twin by logged shifts of a vehicle that differs from it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.calibration.learn import Correction, LoggedShift, correct_twin
+from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.vehicle_unknowns import METHOD, build_unknowns
+from drivetwin.logs.read import read_log
+from drivetwin.shifts.detect import require_shifts
+from drivetwin.twin.nominal_shift import build_nominal_shift
+from drivetwin.twin.twin import Twin
+from tests.calibration.bench import write_bench_log
+from tests.calibration.twins import STD, make_twin
+
+STRONG, TORQUE = 1.05, 1.02
+"""Friction of the on-coming clutch and η of the vehicle, over those of the twin."""
+
+
+@pytest.fixture(scope="module")
+def twin() -> Twin:
+    return make_twin()
+
+
+@pytest.fixture(scope="module")
+def logged(twin: Twin, tmp_path_factory: pytest.TempPathFactory) -> LoggedShift:
+    model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
+    old, new = model.elements
+    model = replace(
+        model, eta=TORQUE * model.eta, J1=model.J1 / TORQUE,
+        elements=(old, replace(new, gain=STRONG * new.gain)),
+    )  # fmt: skip
+    path = tmp_path_factory.mktemp("bench") / "bench.csv"
+    write_bench_log(path, model)
+    log = read_log(path, twin.build_card())
+    (shift,) = require_shifts(log, twin.build_card()).shifts
+    return LoggedShift(log, shift)
+
+
+@pytest.fixture(scope="module")
+def found(twin: Twin, logged: LoggedShift) -> Correction:
+    return correct_twin(twin, [logged], Spread())
+
+
+def test_a_correction_finds_the_friction_and_the_engine_torque_of_the_vehicle(
+    twin: Twin, found: Correction
+) -> None:
+    scale = found.twin.friction["B3"].mu / twin.friction["B3"].mu
+    np.testing.assert_allclose(scale, STRONG, rtol=0.01)
+    before, after = (one.get_value("eta", 0.0) for one in (twin, found.twin))
+    assert after / before == pytest.approx(TORQUE, abs=0.01)
+    assert found.after["output_torque"] < 0.25 * found.before["output_torque"]
+    assert found.after["output_torque"] < 1.3 * 15.0  # the noise of the sensor
+
+
+def test_the_corrected_twin_has_narrower_intervals_and_only_simulated_values(
+    twin: Twin, found: Correction
+) -> None:
+    eta = found.twin.parameters["eta"]
+    assert eta.std_total is not None
+    assert eta.std_total < 0.5 * STD * twin.get_value("eta", 0.0)
+    assert eta.method == METHOD
+    assert found.twin.covariance is not None
+    assert np.linalg.eigvalsh(found.twin.covariance)[0] >= 0.0
+
+
+def test_inertias_of_both_gears_belong_to_one_engine_side(found: Correction) -> None:
+    twin = found.twin
+    engine = [
+        twin.get_value(f"J_prime_{gear}", 0.0)
+        - twin.get_value("J_out", 0.0) / twin.get_gear(gear).ratio ** 2
+        for gear in "23"
+    ]
+    assert engine[0] == pytest.approx(engine[1], rel=1e-12)
+
+
+def test_without_a_deviation_the_twin_stays(found: Correction, logged: LoggedShift) -> None:
+    again = correct_twin(found.twin, [logged], Spread()).twin
+    for name in found.twin.covariance_ids:
+        value, moved = (one.parameters[name] for one in (found.twin, again))
+        assert value.value is not None
+        assert moved.value is not None
+        assert value.std_total is not None
+        assert abs(moved.value - value.value) < 3.0 * value.std_total + 1e-9
+
+
+def test_the_spread_widens_the_prior(twin: Twin) -> None:
+    shift = build_nominal_shift(twin, ("2", "3"))
+    stds = [
+        np.linalg.norm(build_unknowns(twin, shift, spread).root, axis=1)
+        for spread in (Spread(gain=0.0, engine_torque=0.0), Spread())
+    ]
+    names = (*build_unknowns(twin, shift, Spread()).ids, "B2", "B3")
+    wider = {name for name, a, b in zip(names, *stds, strict=True) if b > 1.01 * a}
+    assert wider == {"eta", "B2", "B3"}
