@@ -27,7 +27,7 @@ from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
 from benchmarks.estimation.vehicles import SHIFT
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, find_best, make_quick_plant
-from drivetwin.calibration.learn import LoggedShift, correct_twin
+from drivetwin.calibration.learn import correct_twin
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Objective, compute_tail_mean
 from drivetwin.calibration.policy import Space
@@ -39,6 +39,7 @@ from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import DrivetwinError
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin
+from drivetwin.validation.logged_shift import LoggedShift
 
 ITERATIONS = 5
 _SHARE, _EXCESS = 50 / 60, 0.05

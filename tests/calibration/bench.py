@@ -40,9 +40,6 @@ def write_bench_log(path: Path, model: DualClutch, seed: int = 1) -> None:
         "engine_torque": given.engine_torque,
         **{f"pressure.{name}": one for name, one in pressures.items()},
     }
-    held = {
-        name: Signal(seen, np.interp(seen, one.time, one.values)) for name, one in inputs.items()
-    }
-    motion = Motion(run, model.i_in, held, compute_torque_error({}, 0.0, seed, 0.0))
+    motion = Motion(run, model.i_in, inputs, compute_torque_error({}, 0.0, seed, 0.0))
     channels = record_channels(SENSORS, shift.horizon, motion, 1.0, seed)
     write_log(path, tuple(convert_to_recorded_units(one) for one in channels))

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.calibration.learn import Correction, LoggedShift, correct_twin
+from drivetwin.calibration.learn import Correction, correct_twin
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.vehicle_unknowns import METHOD, build_unknowns
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.nominal_shift import build_nominal_shift
 from drivetwin.twin.twin import Twin
+from drivetwin.validation.logged_shift import LoggedShift
 from tests.calibration.bench import write_bench_log
 from tests.calibration.twins import STD, make_twin
 

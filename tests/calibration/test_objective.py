@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -39,6 +41,13 @@ def test_penalty_is_relative_to_the_bound() -> None:
     mean = Objective((Limit(Metric.SHIFT_TIME, 0.75, Statistic.MEAN),), 0.5, 100.0)
     assert mean.evaluate(outcome) == pytest.approx(20.0)
     assert mean.tighten([0.2]).evaluate(outcome) == pytest.approx(20.0 + 100.0 * 0.25)
+
+
+def test_units_that_slip_again_are_penalised_by_their_share() -> None:
+    outcome = _outcome([10.0, 20.0], [0.6, 0.9])
+    again = replace(outcome, relocked=np.array([True, False]))
+    objective = Objective((), 0.5, 100.0)
+    assert objective.evaluate(again) == pytest.approx(objective.evaluate(outcome) + 50.0)
 
 
 @pytest.mark.parametrize("bound", [0.0, -1.0, float("nan"), float("inf")])

@@ -18,12 +18,10 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import notify_progress
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.vehicle_unknowns import VehicleUnknowns, build_unknowns
-from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
+from drivetwin.validation.logged_shift import LoggedShift
 
 _ROUNDS = 4
 """Gauss-Newton steps."""
@@ -33,14 +31,6 @@ _CORRELATION = 0.02
 """Time [s] within which errors of the model are the same: samples in it count as one."""
 _LEAST_STEP = 0.1
 """Share of a step below which the correction ends."""
-
-
-@dataclass(frozen=True, eq=False)
-class LoggedShift:
-    """A shift of a log."""
-
-    log: ShiftLog
-    shift: Shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +49,7 @@ def correct_twin(twin: Twin, logged: Sequence[LoggedShift], spread: Spread) -> C
     `simulate_shift` raises.
     """
     unknowns = build_unknowns(twin, logged[0].shift, spread)
-    first = [simulate_shift(twin, one.log, one.shift) for one in logged]
+    first = [one.simulate(twin) for one in logged]
     shown = _Shown(unknowns, logged, first)
     z, covariance = np.zeros(unknowns.root.shape[1]), np.eye(unknowns.root.shape[1])
     deviations = shown.compute(z)
@@ -98,7 +88,7 @@ class _Shown:
         twin = self.unknowns.build_twin(z, np.eye(z.size))
         parts: dict[str, list[FloatArray]] = {}
         for one, begun in zip(self.logged, self.first, strict=True):
-            run = rerun_shift(begun, twin, one.log, twin.build_dual_clutch(one.shift))
+            run = one.rerun(begun, twin)
             if run.status != "completed":
                 return None
             low, high = begun.phases["torque"][0], begun.phases["after"][1]
@@ -140,8 +130,7 @@ class _Shown:
         """Weight of a sample by signal: its errors have the size of the present deviations."""
         found = {}
         for name, values in deviations.items():
-            period = float(np.median(np.diff(self.logged[0].log[name].time)))
-            alike = max(1.0, _CORRELATION / period)
+            alike = max(1.0, _CORRELATION / self.logged[0].get_period(name))
             found[name] = 1.0 / float(np.sqrt(alike * np.mean(values**2)))
         return found
 

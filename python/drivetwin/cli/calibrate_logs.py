@@ -12,9 +12,10 @@ from drivetwin.cli.output import make_table, print_table, show_step
 from drivetwin.errors import InputError, Where
 
 if TYPE_CHECKING:
-    from drivetwin.calibration.learn import Correction, LoggedShift
+    from drivetwin.calibration.learn import Correction
     from drivetwin.calibration.spread import Spread
     from drivetwin.twin.twin import Twin
+    from drivetwin.validation.logged_shift import LoggedShift
 
 
 def correct_by_logs(
@@ -32,8 +33,8 @@ def correct_by_logs(
 
 
 def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[LoggedShift]:
-    from drivetwin.calibration.learn import LoggedShift
     from drivetwin.shifts.detect import require_shifts
+    from drivetwin.validation.logged_shift import LoggedShift
 
     log, card = read_twin_log(twin, path, None, None)
     shifts = require_shifts(log, card).shifts
