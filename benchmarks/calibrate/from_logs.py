@@ -48,7 +48,7 @@ _POLISHED, _FRESH = 20, 120
 _ITERATIONS = 5
 """Linear programs of each polish of the optimum."""
 _LIGHT = CalibrationSettings(tail_draws=128, check_draws=400, repairs=2)
-"""Settings with fewer draws than the defaults, for CPU time."""
+"""Settings with fewer draws than the defaults, for CPU time; the effort scales the first search."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def learn_vehicle(made: MadeVehicle, effort: float) -> Trial:
         twin = correct_twin(made.twin, logged, request.spread).twin
         names = (one.name for one in task.policy.parameters)
         start = dict(zip(names, values[-1].tolist(), strict=True))
-        warm = replace(request.settings, starts=0)
+        warm = replace(_LIGHT, threads=1, starts=0)
         values.append(_calibrate(twin, replace(request, start=start, settings=warm)))
     return _compare(made, task.set_limits(limits), values)
 

@@ -60,3 +60,6 @@ def test_logs_correct_the_twin_and_the_next_calibration_starts_from_the_last(
     other = ["calibrate", str(source), "--shift", "3-2", "--from-logs", str(log)]
     assert main([*other, "-o", str(tmp_path / "none")]) == 2
     assert "has no shift 3-2, only 2-3" in capsys.readouterr().err
+    again = ["calibrate", str(second / "twin.toml"), "--shift", "2-3", "--from-logs", str(log)]
+    assert main([*again, "-o", str(tmp_path / "none")]) == 2
+    assert "contains this log already" in capsys.readouterr().err

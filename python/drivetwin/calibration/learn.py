@@ -31,6 +31,8 @@ _CORRELATION = 0.02
 """Time [s] within which errors of the model are the same: samples in it count as one."""
 _LEAST_STEP = 0.1
 """Share of a step below which the correction ends."""
+_LEAST_RMS = 1e-6
+"""Deviation (SI) below which a signal counts as exact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,7 @@ class Correction:
 def correct_twin(twin: Twin, logged: Sequence[LoggedShift], spread: Spread) -> Correction:
     """Correct a twin by shifts of one vehicle between the same two gears.
 
-    Raises IdentificationError where the twin simulates none of them to its end, and what
+    Raises IdentificationError where a simulation of them does not reach its end, and what
     `simulate_shift` raises.
     """
     unknowns = build_unknowns(twin, logged[0].shift, spread)
@@ -55,7 +57,7 @@ def correct_twin(twin: Twin, logged: Sequence[LoggedShift], spread: Spread) -> C
     deviations = shown.compute(z)
     if deviations is None:
         raise IdentificationError(
-            "the twin simulates the logged shifts to no end",
+            "the simulation of a logged shift by the twin does not reach its end",
             "check that the logs are of this vehicle, and identify it again",
         )
     before = _compute_rms(deviations)
@@ -108,7 +110,7 @@ class _Shown:
             columns.append(-change / _DIFFERENCE)
         slope = np.stack(columns, axis=1)
         covariance = np.linalg.inv(slope.T @ slope + np.eye(z.size))
-        return covariance @ (slope.T @ base - z), covariance
+        return np.asarray(covariance @ (slope.T @ base - z)), np.asarray(covariance)
 
     def search(
         self, z: FloatArray, step: FloatArray, deviations: _Deviations
@@ -130,8 +132,10 @@ class _Shown:
         """Weight of a sample by signal: its errors have the size of the present deviations."""
         found = {}
         for name, values in deviations.items():
-            alike = max(1.0, _CORRELATION / self.logged[0].get_period(name))
-            found[name] = 1.0 / float(np.sqrt(alike * np.mean(values**2)))
+            period = min(one.get_period(name) for one in self.logged if name in one.log)
+            alike = max(1.0, _CORRELATION / period)
+            rms = max(float(np.sqrt(np.mean(values**2))), _LEAST_RMS)
+            found[name] = 1.0 / (float(np.sqrt(alike)) * rms)
         return found
 
 

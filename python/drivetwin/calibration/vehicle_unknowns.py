@@ -87,22 +87,25 @@ class VehicleUnknowns:
     def _move_inertias(self, changed: Mapping[str, Estimate]) -> dict[str, Estimate]:
         """Move J′ of the other gears: Je = J′ - Jo′/i_g² is the same in all."""
         twin, ending = self.twin, OVER_ETA if self.twin.over_eta else ""
-        gear = twin.select_inertia_gear(self.shift)
 
-        def measure(parameters: Mapping[str, Estimate], of: str) -> float:
-            inertia, out = (parameters.get(f"{one}{ending}") for one in (f"J_prime_{of}", "J_out"))
-            known = inertia is not None and inertia.value is not None
-            share = (out.value if out and out.value else 0.0) / twin.get_gear(of).ratio ** 2
-            return inertia.value - share if known else float("nan")
+        def read(parameters: Mapping[str, Estimate], name: str) -> float:
+            one = parameters.get(name + ending)
+            return float("nan") if one is None or one.value is None else one.value
 
-        rise = measure(changed, gear) - measure(twin.parameters, gear)
+        def measure(parameters: Mapping[str, Estimate], gear: str) -> float:
+            share = read(parameters, "J_out") / twin.get_gear(gear).ratio ** 2
+            return read(parameters, f"J_prime_{gear}") - share
+
+        chosen = twin.select_inertia_gear(self.shift)
+        rise = measure(changed, chosen) - measure(twin.parameters, chosen)
         found = {}
-        for other in twin.gears:
-            name = f"J_prime_{other}{ending}"
-            before = measure(twin.parameters, other)
-            if other != gear and np.isfinite(before + rise):
-                value = changed[name].value + before + rise - measure(changed, other)
-                found[name] = replace(changed[name], value=value, method=METHOD)
+        for gear in twin.gears:
+            name = f"J_prime_{gear}"
+            value = read(changed, name) + rise + measure(twin.parameters, gear)
+            value -= measure(changed, gear)
+            if gear != chosen and np.isfinite(value):
+                one = changed[name + ending]
+                found[name + ending] = replace(one, value=value, method=METHOD)
         return found
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,13 +24,16 @@ def correct_by_logs(
 ) -> Correction:
     """Correct a twin by the shifts between two gears in logs of one vehicle.
 
-    Raises InputError for a log without such a shift, and what reading and simulation raise.
+    Raises InputError for a log without such a shift and for one that the twin contains, and what
+    reading and simulation raise.
     """
     from drivetwin.calibration.learn import correct_twin
 
     logged = [one for path in logs for one in _collect_shifts(twin, path, gears)]
     with show_step(f"correcting {twin.name} by {len(logged)} shifts"):
-        return correct_twin(twin, logged, spread)
+        found = correct_twin(twin, logged, spread)
+    read = {name: sha for one in logged for name, sha in one.log.inputs.items()}
+    return replace(found, twin=replace(found.twin, inputs={**twin.inputs, **read}))
 
 
 def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[LoggedShift]:
@@ -37,6 +41,12 @@ def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[Logg
     from drivetwin.validation.logged_shift import LoggedShift
 
     log, card = read_twin_log(twin, path, None, None)
+    if set(log.inputs.values()) & set(twin.inputs.values()):
+        raise InputError(
+            f"the twin {twin.name!r} contains this log already",
+            "give logs that it was not identified or corrected from, or the first twin",
+            Where(file=str(path)),
+        )
     shifts = require_shifts(log, card).shifts
     chosen = [one for one in shifts if (one.start_gear, one.end_gear) == gears]
     if not chosen:
