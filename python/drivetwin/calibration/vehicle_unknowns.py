@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.scenarios import TwinDraws, compute_friction_std
 from drivetwin.calibration.spread import Spread
-from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
+from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Stribeck
@@ -164,10 +164,7 @@ def _find_curve(twin: Twin, name: str, elements: tuple[str, ...]) -> FrictionCur
 
 
 def _change(before: Estimate, value: float, std: float) -> Estimate:
-    verdict = Verdict.IDENTIFIED if before.verdict is Verdict.DESIGN else before.verdict
-    return replace(
-        before, value=value, std_noise=std, std_systematic=None, verdict=verdict, method=METHOD
-    )
+    return replace(before, value=value, std_noise=std, std_systematic=None, method=METHOD)
 
 
 def _scale_curve(curve: FrictionCurve | None, scale: float, std: float) -> FrictionCurve:
