@@ -153,16 +153,17 @@ def test_rest_is_not_filled() -> None:
     assert find_filling(time, np.zeros(time.size)) is None
 
 
-def test_ignores_missing_values() -> None:
-    """Rows without a value are no samples."""
+@pytest.mark.parametrize("value", [np.nan, 1e300])
+def test_ignores_missing_and_damaged_values(value: float) -> None:
+    """Rows without a value are no samples, nor are numbers whose square overflows."""
     knots = np.arange(0.0, 5.0, 0.01)
     time = np.arange(0.0, 4.9, STEP)
     values = np.interp(time, knots, measure_speed(knots, 5))
-    values[1000:1100] = np.nan
+    values[1000:1100] = value
     found = find_filling(time, values)
     assert found is not None
     assert found.period == pytest.approx(0.01)
-    assert np.isfinite(found.values).all()
+    assert (np.abs(found.values) < 1e6).all()
 
 
 def test_steps_on_a_raster_are_no_knots() -> None:

@@ -33,7 +33,16 @@ COMMANDS = tuple(commands(typer.main.get_command(app)))
 def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--help"]) == 0
     text = capsys.readouterr().out
-    assert all(f"│ {command} " in text for command, *_ in COMMANDS)
+    assert all(f"\n  {command} " in text for command, *_ in COMMANDS)
+    assert "..." not in text.partition("Commands:")[2]
+
+
+@pytest.mark.parametrize("group", [(), ("fleet",), ("card",)], ids=" ".join)
+def test_a_group_without_a_command_prints_its_help(
+    group: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(group) == 2
+    assert "\nCommands:\n" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
@@ -43,7 +52,8 @@ def test_every_command_has_help_and_all_but_the_workbench_json(
     assert main([*command, "--help"]) == 0
     text = capsys.readouterr().out
     assert ("--json" in text) == (command != ("app",))
-    assert max(len(line) for line in text.splitlines()) <= 80
+    # A list of choices is one word.
+    assert max(len(line) for line in text.splitlines() if "|" not in line) <= 80
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

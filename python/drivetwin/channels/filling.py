@@ -103,6 +103,8 @@ class FillingSettings:
 
 FILLING = FillingSettings()
 
+_LARGEST = 1e150
+"""Magnitude of a damaged value, whose square overflows."""
 _NO_BEND = 10.0
 """Bends below so many round-offs count as none."""
 _BENDS_OF_A_KNOT = 2
@@ -132,8 +134,8 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     Filling or None
         None where each sample may be measured.
     """
-    finite = np.isfinite(values)
-    time, values = time[finite], values[finite]
+    usable = np.abs(values) < _LARGEST
+    time, values = time[usable], values[usable]
     if time.size < FILLING.least or not is_time_axis(time):
         return None
     for part in _list_windows(time, values):

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
-from drivetwin._util.visible_text import escape_line
 from drivetwin.cli.calibrate import calibrate
 from drivetwin.cli.card import card
+from drivetwin.cli.command_group import PLAIN, CommandGroup, Entry
 from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
@@ -20,7 +19,6 @@ from drivetwin.cli.export import export
 from drivetwin.cli.fleet import fleet
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
-from drivetwin.cli.inputs import protect_inputs
 from drivetwin.cli.inspect import inspect
 from drivetwin.cli.observe import observe
 from drivetwin.cli.output import show_error
@@ -33,56 +31,41 @@ from drivetwin.cli.synth import synth
 from drivetwin.cli.workbench import workbench
 from drivetwin.errors import INTERRUPTED, DrivetwinError, InputError, Where
 
+COMMANDS: dict[str, Entry] = {
+    "demo": demo,
+    "synth": synth,
+    "inspect": inspect,
+    "shifts": shifts,
+    "identify": identify,
+    "examine": examine,
+    "simulate": simulate,
+    "observe": observe,
+    "calibrate": calibrate,
+    "report": report,
+    "export": export,
+    "gearbox": gearbox,
+    "reduce": reduce,
+    "drive": drive,
+    "schema": schema,
+    "app": workbench,
+    "fleet": fleet,
+    "card": card,
+}
 
-class _EscapingGroup(TyperGroup):
-    """Commands whose usage errors quote arguments, such as names of files, with escapes."""
 
-    def invoke(self, ctx: Any) -> Any:
-        """Invoke a command."""
-        try:
-            return super().invoke(ctx)
-        except Exception as fault:
-            message = getattr(fault, "message", None)
-            if isinstance(message, str):
-                vars(fault)["message"] = escape_line(message)
-            raise
+class Program(CommandGroup):
+    """The commands of the program."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(entries=COMMANDS, **attributes)
 
 
 app = typer.Typer(
     name="drivetwin",
-    cls=_EscapingGroup,
+    cls=Program,
     help="From gear-shift logs to validated driveline models.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
+    **PLAIN,
 )
-for command in (
-    demo,
-    synth,
-    inspect,
-    shifts,
-    identify,
-    examine,
-    simulate,
-    observe,
-    calibrate,
-    report,
-    export,
-    gearbox,
-    reduce,
-    drive,
-    schema,
-):
-    app.command()(command)
-app.command(name="app")(workbench)
-app.add_typer(fleet, name="fleet")
-app.add_typer(card, name="card")
-for entry in (
-    *app.registered_commands,
-    *fleet.registered_commands,
-    *card.registered_commands,
-):
-    if entry.callback is not None:
-        entry.callback = protect_inputs(entry.callback)
 
 
 def _print_version(wanted: bool) -> None:

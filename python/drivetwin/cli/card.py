@@ -10,6 +10,7 @@ import typer
 
 from drivetwin.cli.arguments import ChannelsFile, find_mapping
 from drivetwin.cli.card_new import new
+from drivetwin.cli.command_group import CommandGroup
 from drivetwin.cli.output import (
     JsonFlag,
     print_findings,
@@ -28,11 +29,7 @@ if TYPE_CHECKING:
 IMPLAUSIBLE = 3
 """Exit code of a card with findings, with --strict."""
 
-card = typer.Typer(help="Write or check a vehicle card.", no_args_is_help=True)
-card.command()(new)
 
-
-@card.command()
 def check(
     card_file: Annotated[Path, typer.Argument(metavar="CARD", help="Vehicle card (TOML).")],
     log: Annotated[
@@ -119,3 +116,8 @@ def _describe_ratios(log: Path | None, channels: Path | None) -> str:
         return ""
     ratios = ", ".join(f"{one.ratio:.4g}" for one in held)
     return f"; {log.name} holds the ratios {ratios} of input and output speed" if held else ""
+
+
+card = CommandGroup(
+    name="card", entries={"new": new, "check": check}, help="Write or check a vehicle card."
+)

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
+from drivetwin.cli.command_group import CommandGroup
 from drivetwin.cli.output import (
     JsonFlag,
     make_table,
@@ -28,21 +28,6 @@ if TYPE_CHECKING:
 RUN = "run"
 
 
-class LogsOrCommand(TyperGroup):
-    """`drivetwin fleet LOGS` is `drivetwin fleet run LOGS`: what is no command is a log."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put in the command that is meant."""
-        if args and args[0] not in (*self.commands, "--help"):
-            args = [RUN, *args]
-        return super().parse_args(ctx, args)
-
-
-fleet = typer.Typer(
-    cls=LogsOrCommand,
-    help="Identify many logs into a store; report, estimate and query it. Runs can be resumed.",
-    no_args_is_help=True,
-)
 StoreFolder = Annotated[Path, typer.Argument(metavar="STORE", help="Folder of `fleet -o`.")]
 
 
@@ -85,7 +70,6 @@ Traces = Annotated[
 Events = Annotated[bool, typer.Option("--json", help="Print one JSON event per line on stdout.")]
 
 
-@fleet.command(RUN)
 def run(
     *,
     logs: Logs = None,
@@ -156,7 +140,6 @@ def _print_summary(summary: Summary, output: Path) -> None:
             "JOIN logs USING (log) WHERE error <> ''\"")  # fmt: skip
 
 
-@fleet.command()
 def report(
     store: StoreFolder,
     output: Annotated[
@@ -183,7 +166,6 @@ def report(
     print_line(f"wrote {page}")
 
 
-@fleet.command()
 def estimate(
     store: StoreFolder,
     parameter: Annotated[
@@ -283,7 +265,6 @@ def _describe_drift(one: JointEstimate) -> tuple[str, str, str]:
     return *format_estimate(drift.slope * factor, ends, one.si_unit)[:2], per
 
 
-@fleet.command()
 def query(
     store: StoreFolder,
     sql: Annotated[str, typer.Argument(metavar="SQL", help="SELECT over parameters, files, …")],
@@ -329,3 +310,20 @@ def _format_cell(value: object) -> str:
     if value is None:
         return ""
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+class LogsOrCommand(CommandGroup):
+    """`drivetwin fleet LOGS` is `drivetwin fleet run LOGS`: what is no command is a log."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put in the command that is meant."""
+        if args and args[0] not in (*self.commands, "--help"):
+            args = [RUN, *args]
+        return super().parse_args(ctx, args)
+
+
+fleet = LogsOrCommand(
+    name="fleet",
+    entries={RUN: run, "report": report, "estimate": estimate, "query": query},
+    help="Identify many logs into a store; report, estimate and query it. Runs can be resumed.",
+)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 ScenarioOption = Annotated[
     ScenarioName,
     typer.Option(
+        metavar="NAME",
         help="paper: the paper's numbers at constant engine torque; paper_steps: the same with "
         "throttle steps; throttle_steps: a long, strongly modulated 2nd gear; gearbox: a whole "
         "gearbox with drums that have inertia; gearbox_chain: the same from 2nd to 4th gear; "

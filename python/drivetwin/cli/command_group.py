@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Groups of commands of which each is built when it is called, not when help lists it.
+
+Help is plain text: loading the library that frames it takes longer than all the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from inspect import getdoc
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from drivetwin._util.visible_text import escape_line
+from drivetwin.cli.inputs import protect_inputs
+
+WRONG_USAGE = 2
+"""Exit code of a call without a command."""
+PLAIN: dict[str, Any] = {"rich_markup_mode": None, "pretty_exceptions_enable": False}
+"""Settings of every command: help and faults without frames."""
+
+
+class CommandGroup(TyperGroup):
+    """Group of lazy commands; usage errors quote arguments, such as file names, with escapes."""
+
+    def __init__(self, *, entries: Mapping[str, Entry], **attributes: Any) -> None:
+        super().__init__(**{**attributes, "rich_markup_mode": None})
+        self.commands: Any = LazyCommands(entries)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; without any, print the help and exit with code 2."""
+        if not args and not ctx.resilient_parsing:
+            typer.echo(ctx.get_help(), err=True)
+            ctx.exit(WRONG_USAGE)
+        return super().parse_args(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
+        """Write the names of the commands, each with its summary."""
+        rows = [(name, self.commands.summarize(name)) for name in self.commands]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Invoke a command."""
+        try:
+            return super().invoke(ctx)
+        except Exception as fault:
+            message = getattr(fault, "message", None)
+            if isinstance(message, str):
+                vars(fault)["message"] = escape_line(message)
+            raise
+
+
+Entry = Callable[..., None] | CommandGroup
+"""A command as its function, or a group of commands."""
+
+
+class LazyCommands(Mapping[str, Any]):
+    """Commands by name; the parameters of a command are read when it is looked up."""
+
+    def __init__(self, entries: Mapping[str, Entry]) -> None:
+        self.entries = entries
+
+    def __getitem__(self, name: str) -> Any:
+        return build_command(name, self.entries[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.entries)
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def summarize(self, name: str) -> str:
+        """Return the first paragraph of the help of a command, on one line."""
+        entry = self.entries[name]
+        text = entry.help if isinstance(entry, CommandGroup) else getdoc(entry)
+        return " ".join((text or "").split("\n\n")[0].split())
+
+
+@cache
+def build_command(name: str, entry: Entry) -> Any:
+    """Return a group as it is; build a command from its function, whose inputs it protects."""
+    if isinstance(entry, CommandGroup):
+        return entry
+    single = typer.Typer(add_completion=False, **PLAIN)
+    single.command(name)(protect_inputs(entry))
+    return typer.main.get_command(single)
