@@ -106,6 +106,14 @@ def show_view(page: Page, name: str) -> None:
     expect(page.locator(f"#view-{name}")).to_be_visible()
 
 
+def wait_for_whole_contents(page: Page) -> None:
+    """Wait until all tables and plots end within the page; a plot follows the width of its view."""
+    page.wait_for_function(
+        "() => Array.from(document.querySelectorAll('.table, .js-plotly-plot'))"
+        ".every((one) => one.scrollWidth <= one.clientWidth)"
+    )
+
+
 def expect_message(page: Page, text: str) -> None:
     expect(page.locator("#message")).to_contain_text(text)
 

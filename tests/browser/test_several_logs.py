@@ -13,7 +13,14 @@ from playwright.sync_api import Page, expect
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from tests.browser.bench import PATIENCE, expect_message, serve_folder, show_view, wait_for_rest
+from tests.browser.bench import (
+    PATIENCE,
+    expect_message,
+    serve_folder,
+    show_view,
+    wait_for_rest,
+    wait_for_whole_contents,
+)
 from tests.browser.watch import grave_findings
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(900)]
@@ -77,6 +84,7 @@ def test_a_held_out_log_is_predicted(opened: Page, pictures: Path) -> None:
             page.emulate_media(color_scheme=scheme)
             for name in ("log", "shifts", "identify", "model"):
                 show_view(page, name)
+                wait_for_whole_contents(page)
                 page.screenshot(
                     path=pictures / f"several-{name}-{width}-{scheme}.png", full_page=True
                 )

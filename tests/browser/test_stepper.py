@@ -10,7 +10,14 @@ from typing import Literal
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.bench import PATIENCE, STEPS, VIEWS, Bench, show_view
+from tests.browser.bench import (
+    PATIENCE,
+    STEPS,
+    VIEWS,
+    Bench,
+    show_view,
+    wait_for_whole_contents,
+)
 from tests.browser.watch import grave_findings
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
@@ -119,6 +126,7 @@ def test_each_view_is_accessible_wide_and_narrow_in_light_and_dark(
             page.emulate_media(color_scheme=scheme)
             for name in VIEWS:
                 show_view(page, name)
+                wait_for_whole_contents(page)
                 page.screenshot(path=pictures / f"workbench-{name}-{width}-{scheme}.png")
                 only = () if scheme == "light" else ("color-contrast",)
                 findings[width, scheme, name] = grave_findings(page, *only)

@@ -65,6 +65,11 @@ def test_there_are_such_messages() -> None:
             "name it in a channel mapping file (--channels) or in [channels] of the card",
             "correct it in the step Channels",
         ),
+        (
+            "assert it in the channel mapping (`drivetwin inspect LOG --write-mapping "
+            'channels.toml` begins one): time = { unit = "s" } (or "ms", "us", "min")',
+            "state the unit of the time column in the step Channels",
+        ),
         ("check it with `drivetwin inspect`", "check it with the step Channels"),
         ("one for each gear with --gears", "one for each gear with the names of the gears"),
         ("a-b --names", "a-b --names"),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.errors import InputError, RefusedError
+from drivetwin.errors import InputError, RefusedError, UnitError
 from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
 from drivetwin.logs.formats import parser_limits
@@ -95,6 +95,34 @@ def test_a_correction_reads_the_log_again(session: Session) -> None:
         session.identify([Method.PAPER])
     session.correct_mapping([Entry(one.role, one.unit, one.reversed) for one in rows])
     assert len(session.work.shifts) == 1
+
+
+def test_units_that_a_table_does_not_name_are_proposed_and_stated(
+    session: Session, place: Path
+) -> None:
+    """First the unit of time, then those of the channels: a table as MATLAB writes it."""
+    names, _, *rows = (place / LOG).read_text(encoding="utf-8").splitlines()
+    stamps = [row.partition(",") for row in rows]
+    bare = [f"{1e3 * float(stamp):.6g},{rest}" for stamp, _, rest in stamps]
+    path = place / "no_units.csv"
+    path.write_text("\n".join([names, *bare]), encoding="utf-8")
+    session.open(session.get_folder_source(path.name), session.get_folder_source(CARD))
+    opened = session.work.require_opened()
+    assert "no_units.csv, channel 'time': the file names no unit" in opened.fault
+    assert [one.unit for one in opened.time_units] == ["ms"]
+    with pytest.raises(UnitError, match="use one of s, ms"):
+        session.correct_mapping(_list_entries(session), "bar")
+    session.correct_mapping(_list_entries(session), " ms ")
+    assert len(session.work.shifts) == 1
+    assert session.work.require_log()["input_speed"].time[-1] == pytest.approx(5.0)
+    assert session.read_column(0).time[-1] == pytest.approx(5.0)
+    session.reopen(session.get_folder_source(session.save("units")))
+    assert len(session.work.shifts) == 1
+
+
+def _list_entries(session: Session) -> list[Entry]:
+    rows = list_rows(session.work.require_opened().survey)
+    return [Entry(one.role, one.unit, one.reversed) for one in rows]
 
 
 @pytest.mark.parametrize("with_card", [True, False])

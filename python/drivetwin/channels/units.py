@@ -225,6 +225,11 @@ def get_time_factor(spelling: str | None, where: Where) -> float:
         raise UnitError(f"unknown time unit {spelling!r}", remedy, where) from None
 
 
+def list_time_spellings() -> list[str]:
+    """Return the first spelling of each unit of time."""
+    return list({factor: unit for unit, factor in reversed(_TIME.items())}.values())[::-1]
+
+
 def list_first_spellings(quantity: Quantity) -> list[str]:
     """Return the first spelling of each size of unit of a quantity, SI among them."""
     return [spellings.split()[0] for spellings in _SPELLINGS[quantity].values()]

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -24,7 +23,7 @@ from drivetwin.cli.output import (
     show_step,
     to_error_document,
 )
-from drivetwin.errors import DamagedChannelError, DrivetwinError, InputError, UnitError
+from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
 
 if TYPE_CHECKING:
@@ -129,6 +128,7 @@ def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
     """Survey a log and read it as for use; a log without a unit of time is surveyed in seconds."""
     from drivetwin.logs.formats.detect import open_recording
     from drivetwin.logs.raw import Remembered
+    from drivetwin.logs.survey import find_shortest_step
     from drivetwin.plausibility.check import drop_card_findings
 
     try:
@@ -149,7 +149,7 @@ def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
     with open_recording(log, seconds) as opened:
         recording = Remembered(opened)
         found, _, _ = _survey(recording, log, card, stated)
-        step = _find_step(recording)
+        step = find_shortest_step(recording)
     return _Seen(found, (), refusal, "shifts and identify refuse", step)
 
 
@@ -177,15 +177,6 @@ def _survey(
         )
         found = replace(found, notes=(*found.notes, note))
     return found, names, stated
-
-
-def _find_step(recording: Recording) -> float:
-    """Return the shortest time between samples of any column; 0 without samples."""
-    steps = []
-    for index in range(len(recording.columns)):
-        with suppress(DamagedChannelError):
-            steps.append(recording.load(index).step)
-    return min((step for step in steps if step is not None and step > 0.0), default=0.0)
 
 
 def _write_unread(

@@ -26,7 +26,7 @@ ScenarioOption = Annotated[
         "power_on_down, power_off_up, power_off_down: the other kinds of shift; input_gear: behind "
         "an input gear of 1.2; dual_clutch, manual: a car with such a gearbox; "
         "open_converter: behind an open torque converter; hydraulics: with the commands of the "
-        "controller."
+        "controller.",
     ),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the sensor noise.")]

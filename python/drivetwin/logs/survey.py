@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -129,6 +130,15 @@ def survey_recording(
         names=stated.names,
         notes=(*recording.warnings, *faults, *filled, *_describe_open_roles(candidates, card)),
     )
+
+
+def find_shortest_step(recording: Recording) -> float:
+    """Return the shortest time between samples of any column; 0 without samples."""
+    steps = []
+    for index in range(len(recording.columns)):
+        with suppress(DamagedChannelError):
+            steps.append(recording.load(index).step)
+    return min((step for step in steps if step is not None and step > 0.0), default=0.0)
 
 
 def _make_column(

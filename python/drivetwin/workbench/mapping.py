@@ -12,19 +12,29 @@ from drivetwin.channels.pressure_roles import make_command_role, make_pressure_r
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.roles import ROLES, get_quantity
 from drivetwin.channels.shiftlog import Quantity
-from drivetwin.channels.units import list_first_spellings, resolve_channel_unit
+from drivetwin.channels.units import (
+    is_time_unit,
+    list_first_spellings,
+    list_time_spellings,
+    resolve_channel_unit,
+)
 from drivetwin.errors import MappingError, UnitError, Where
+from drivetwin.logs.mapping_draft import draft_mapping
 from drivetwin.logs.survey import Column, Survey
 
 
 @dataclass(frozen=True)
 class Row:
-    """A column as recorded and what it is taken for; an empty `role`: not used."""
+    """A column as recorded and what it is taken for; an empty `role`: not used.
+
+    A unit that is `proposed` follows from the values, because neither file nor mapping names one.
+    """
 
     column: Column
     role: str
     unit: str
     reversed: bool
+    proposed: bool = False
 
 
 @dataclass(frozen=True)
@@ -38,10 +48,14 @@ class Entry:
 
 @dataclass(frozen=True)
 class Corrections:
-    """Corrections of a log's mapping: specs by role, and columns that get none by their name."""
+    """Corrections of a log's mapping: specs by role, and columns that get none by their name.
+
+    `time_unit` is the unit of the time column; None: as the file or its mapping states it.
+    """
 
     channels: Mapping[str, ChannelSpec] = field(default_factory=dict)
     ignored: tuple[str, ...] = ()
+    time_unit: str | None = None
 
 
 def list_roles(survey: Survey) -> tuple[str, ...]:
@@ -58,10 +72,12 @@ def list_unit_names() -> list[str]:
 
 def list_rows(survey: Survey) -> list[Row]:
     """The columns with the role, unit and sign that they are read with."""
-    return [_make_row(column, survey) for column in survey.columns]
+    gaps = draft_mapping(survey).units
+    likely = {role: gap.proposals[0].unit for role, gap in gaps.items() if len(gap.proposals) == 1}
+    return [_make_row(column, survey, likely) for column in survey.columns]
 
 
-def apply_entries(survey: Survey, entries: Sequence[Entry]) -> Corrections:
+def apply_entries(survey: Survey, entries: Sequence[Entry], time_unit: str = "") -> Corrections:
     """Return the mapping as the user states it; scale, offset and time shift stay.
 
     Raises MappingError where two columns have one role, UnitError for a unit that does not fit the
@@ -90,13 +106,16 @@ def apply_entries(survey: Survey, entries: Sequence[Entry]) -> Corrections:
             unit=_parse_assertion(entry, column),
             sign=-1 if entry.reversed else 1,
         )
-    return Corrections(found, _list_ignored(survey, found))
+    return Corrections(found, _list_ignored(survey, found), _parse_time_unit(time_unit))
 
 
-def _make_row(column: Column, survey: Survey) -> Row:
+def _make_row(column: Column, survey: Survey, likely: Mapping[str, str]) -> Row:
     role, spec = _make_spec(column, survey.mapping)
     unit = spec.unit if spec is not None and spec.unit is not None else column.unit
-    return Row(column, role, unit or "", spec is not None and spec.sign < 0)
+    proposed = not (unit or "").strip() and role in likely
+    if proposed:
+        unit = likely[role]
+    return Row(column, role, unit or "", spec is not None and spec.sign < 0, proposed)
 
 
 def _make_spec(
@@ -120,6 +139,15 @@ def _parse_assertion(entry: Entry, column: Column) -> str | None:
         usual = ", ".join(list_first_spellings(get_quantity(entry.role)))
         raise UnitError(error.what, f"use one of {usual}", where) from None
     return unit
+
+
+def _parse_time_unit(text: str) -> str | None:
+    """Return a unit of time that is known; None for a blank text."""
+    unit = text.strip()
+    if unit and not is_time_unit(unit):
+        listed = ", ".join(list_time_spellings())
+        raise UnitError(f"unknown time unit {unit!r}", f"use one of {listed}")
+    return unit or None
 
 
 def _list_ignored(survey: Survey, found: Mapping[str, ChannelSpec]) -> tuple[str, ...]:

@@ -42,6 +42,19 @@ _PHRASES = (
         r"correct \g<thing> in the step Channels",
     ),
     (r"map (?P<thing>.*) with --channels", r"give \g<thing> a role in the step Channels"),
+    (
+        r'assert it in the channel mapping[^:,]*[:,] time = \{ unit = "\w+" \}(?: \(or [^)]*\))?',
+        "state the unit of the time column in the step Channels",
+    ),
+    (
+        r"check its unit of time; the channel mapping asserts one: time = .*",
+        "correct the unit of the time column in the step Channels",
+    ),
+    (r", if they are these: channels\..*", ""),
+    (
+        r"assert it in the channel mapping[^:]*: channels\.\S+ = \{[^}]*\}",
+        "correct it in the step Channels",
+    ),
     (r" \(`drivetwin inspect LOG --write-mapping[^`]*` begins one\)", ""),
     (r" \(examine --friction free\)", ""),
     (

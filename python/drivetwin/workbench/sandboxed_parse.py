@@ -26,13 +26,14 @@ from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.pressure_roles import get_element
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import DrivetwinError, InputError
+from drivetwin.channels.unit_proposals import Proposal, propose_time_units
+from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.formats.parser_limits import compute_parser_limits
 from drivetwin.logs.read import read_log
-from drivetwin.logs.survey import Survey, survey_recording
+from drivetwin.logs.survey import Survey, find_shortest_step, survey_recording
 from drivetwin.plausibility.check import check_card, drop_card_findings, select_card_findings
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
@@ -47,6 +48,7 @@ class Opened:
     `card` is None as long as none is open: pressures then have the labels of their columns.
     `log` and `found` are None if the log cannot be read as mapped; `fault` then holds the reason.
     `found` is also None without a card. `doubts` are the implausible entries of the card.
+    `time_units` are proposed where the file names no unit of time.
     """
 
     survey: Survey
@@ -55,6 +57,7 @@ class Opened:
     found: FoundShifts | None = None
     doubts: tuple[Finding, ...] = ()
     fault: str = ""
+    time_units: tuple[Proposal, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -101,12 +104,15 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     with _apply_labels(_get_labels(request)):
         card = _load_card(request)
         stated = _read_stated(request, card)
-        with open_recording(request.log, stated.options) as recording:
-            names = card
-            if names is None:
-                specs = find_pressure_columns(recording.columns, stated)
-                names, stated = name_pressures(specs, stated)
-            looked = survey_recording(recording, str(request.log), names, stated)
+        try:
+            looked, names, stated, _ = _survey(request.log, card, stated)
+        except UnitError as error:
+            if stated.options.time.unit is not None:
+                raise
+            opened = _open_without_time_unit(request.log, card, stated)
+            fault = _apply_labels_to(error, _get_labels(request))
+            emit(replace(opened, fault=str(fault)))
+            return
     try:
         with _apply_labels(_get_labels(request)):
             mapping = _write_mapping(scratch, stated)
@@ -120,6 +126,30 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
         return
     doubts = () if card is None or found is None else _check_card(card, log, found)
     emit(Opened(looked, card, log, found, doubts))
+
+
+def _survey(
+    path: Path, card: VehicleCard | None, stated: Mapped
+) -> tuple[Survey, VehicleCard, Mapped, float]:
+    """Survey a log; return also card and mapping with names for the pressures, and the time step.
+
+    Without a card pressures are named after their columns.
+    """
+    with open_recording(path, stated.options) as recording:
+        names = card
+        if names is None:
+            specs = find_pressure_columns(recording.columns, stated)
+            names, stated = name_pressures(specs, stated)
+        survey = survey_recording(recording, str(path), names, stated)
+        return survey, names, stated, find_shortest_step(recording)
+
+
+def _open_without_time_unit(path: Path, card: VehicleCard | None, stated: Mapped) -> Opened:
+    """Survey a log in numbers of its time column, so that the unit can be stated."""
+    options = replace(stated.options, time=replace(stated.options.time, unit="s"))
+    survey, _, _, step = _survey(path, card, replace(stated, options=options))
+    survey = replace(survey, options=stated.options)
+    return Opened(survey, card, time_units=propose_time_units(step))
 
 
 def read_column(emit: Emit, request: Request, key: ColumnKey) -> None:
@@ -183,10 +213,12 @@ def _read_stated(request: Request, card: VehicleCard | None) -> Mapped:
         if card is None or (element := get_element(role)) is None or element in card.elements
     }
     ignored = tuple(dict.fromkeys((*stated.options.ignored, *request.corrections.ignored)))
+    time = stated.options.time
+    time = replace(time, unit=request.corrections.time_unit or time.unit)
     return replace(
         stated,
         channels=combine_specs(stated.channels, corrected, request.corrections.ignored),
-        options=replace(stated.options, ignored=ignored),
+        options=replace(stated.options, ignored=ignored, time=time),
     )
 
 
@@ -211,11 +243,16 @@ def _apply_labels(labels: Mapping[Path, str]) -> Iterator[None]:
     try:
         yield
     except DrivetwinError as error:
-        what, file = error.what, error.where.file
-        for path, label in labels.items():
-            what = what.replace(str(path), label)
-            file = label if file == str(path) else file
-        raise InputError(what, error.remedy, replace(error.where, file=file)) from None
+        raise _apply_labels_to(error, labels) from None
+
+
+def _apply_labels_to(error: DrivetwinError, labels: Mapping[Path, str]) -> InputError:
+    """Return the error with labels in place of paths."""
+    what, file = error.what, error.where.file
+    for path, label in labels.items():
+        what = what.replace(str(path), label)
+        file = label if file == str(path) else file
+    return InputError(what, error.remedy, replace(error.where, file=file))
 
 
 def _write_mapping(path: Path, stated: Mapped) -> Path:

@@ -170,7 +170,8 @@ class Session:
             one = self.work.require_open_log()
             key = make_column_key(one.opened.survey, index)
             if self.preview is None or self.preview[0] != key:
-                request = _make_request(one.source, self.work.card, one.mapping, Corrections())
+                corrections = Corrections(time_unit=one.corrections.time_unit)
+                request = _make_request(one.source, self.work.card, one.mapping, corrections)
                 limit = compute_parser_limits(request.log).seconds
                 preview = jobs.call(sandboxed_parse.read_column, request, key, limit=limit)
                 self.preview = (key, preview)
@@ -210,14 +211,14 @@ class Session:
             write_text(path, text)
             return Source(self.folder.get_name(path), path)
 
-    def correct_mapping(self, entries: Sequence[Entry]) -> None:
+    def correct_mapping(self, entries: Sequence[Entry], time_unit: str = "") -> None:
         """Read the selected log again with the corrected mapping; discard the previous results.
 
         Raises MappingError, UnitError; the work stays as it was then, and goes on.
         """
         with self.lock:
             one = self.work.require_open_log()
-            corrections = apply_entries(one.opened.survey, entries)
+            corrections = apply_entries(one.opened.survey, entries, time_unit)
             fresh = self._read_log(one.source, self.work.card, one.mapping, corrections)
             self.cancel()
             self._set(self.work.set_log(fresh))

@@ -154,7 +154,7 @@ def _assess_use(work: SessionState, running: bool) -> Iterator[StepState]:
             yield StepState(step, Status.BLOCKED, text, Step.IDENTIFY)
         return
     if work.has_viewed:
-        yield StepState(Step.MODEL, Status.DONE, "Simulation and measurement are shown.")
+        yield StepState(Step.MODEL, Status.DONE, "Simulation and measurement were compared.")
     else:
         yield StepState(Step.MODEL, Status.OPEN, "Compare simulation and measurement.")
     if work.has_exported:

@@ -50,7 +50,7 @@ class LockEntry(StrictModel):
 
 
 class LogEntry(StrictModel):
-    """A log with the corrections of its mapping: `channels` by role, `ignored` columns.
+    """A log with corrections of its mapping: `channels` by role, `ignored` columns, `time_unit`.
 
     `phases` [s] go by index of the shift; `held` are the indices of the shifts to predict.
     """
@@ -58,6 +58,7 @@ class LogEntry(StrictModel):
     file: FileEntry
     channels: dict[str, ChannelTable] = Field(default_factory=dict)
     ignored: list[str] = Field(default_factory=list)
+    time_unit: str | None = Field(default=None, max_length=40)
     phases: dict[int, dict[Boundary, float]] = Field(default_factory=dict)
     held: list[int] = Field(default_factory=list)
 
@@ -74,7 +75,7 @@ class LogEntry(StrictModel):
     def to_corrections(self) -> Corrections:
         """Return the corrections of the mapping."""
         channels = {role: table.to_spec() for role, table in self.channels.items()}
-        return Corrections(channels, tuple(self.ignored))
+        return Corrections(channels, tuple(self.ignored), self.time_unit)
 
 
 class WorkspaceFile(StrictModel):
@@ -213,6 +214,7 @@ def _make_log_entry(one: OpenLog, beside: Path, folder: Folder) -> LogEntry:
             role: _make_channel_table(spec) for role, spec in one.corrections.channels.items()
         },
         ignored=list(one.corrections.ignored),
+        time_unit=one.corrections.time_unit,
         phases={index: dict(times) for index, times in one.moves.items()},
         held=sorted(one.held),
     )

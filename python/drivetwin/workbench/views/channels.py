@@ -10,6 +10,7 @@ from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import Display
+from drivetwin.channels.units import list_time_spellings
 from drivetwin.errors import InputError
 from drivetwin.logs.survey import Column
 from drivetwin.report.figure import Figure
@@ -27,6 +28,10 @@ from drivetwin.workbench.views.fields import Index
 from drivetwin.workbench.views.log_choice import Place, build_log_choice
 
 _PREVIEW_HEIGHT = 330
+_PROPOSED = (
+    "The file names no unit for some columns. The table has the units that fit their values: check "
+    "them, then apply."
+)
 _SIGNS = {"+": "as recorded", "-": "reversed"}
 
 
@@ -37,6 +42,7 @@ def layout() -> list[Component]:
             "Each column of the file with its proposed role. Correct role, unit or sign, then "
             "apply: the log is read again. Set 'not used' to ignore a column."
         ),
+        html.Datalist([html.Option(value=name) for name in list_time_spellings()], id="time-units"),
         html.Datalist([html.Option(value=name) for name in list_unit_names()], id="unit-names"),
         html.Div(id="channels-content"),
         html.H3("Preview of a column"),
@@ -76,6 +82,7 @@ def register(page: ui.Page) -> None:
         State({"part": "role", "column": ALL}, "data-value"),
         State({"part": "unit", "column": ALL}, "value"),
         State({"part": "sign", "column": ALL}, "data-value"),
+        State("time-unit", "value"),
         busy="apply-mapping",
     )
     def apply(
@@ -84,6 +91,7 @@ def register(page: ui.Page) -> None:
         roles: Sequence[str],
         units: Sequence[str | None],
         signs: Sequence[Literal["+", "-"]],
+        time_unit: str | None,
     ) -> None:
         """Read the log with the mapping as it stands in the table."""
         if not clicks:
@@ -92,7 +100,8 @@ def register(page: ui.Page) -> None:
             [
                 Entry(role, unit or "", sign == "-")
                 for role, unit, sign in zip(roles, units, signs, strict=True)
-            ]
+            ],
+            time_unit or "",
         )
         ui.notify_topic(ui.Topic.LOG)
         ui.notify_opened_log("The log is read as mapped", session.work.require_open_log())
@@ -100,14 +109,17 @@ def register(page: ui.Page) -> None:
 
 def _build_content(opened: Opened) -> list[Component]:
     roles = {"": "not used", **{role: role for role in list_roles(opened.survey)}}
-    rows = [_build_row(number, one, roles) for number, one in enumerate(list_rows(opened.survey))]
+    listed = list_rows(opened.survey)
+    rows = [_build_row(number, one, roles) for number, one in enumerate(listed)]
+    proposed = [_PROPOSED] if any(one.proposed for one in listed) else []
     head = ("column", "unit in the file", "Hz", "min", "max", "gaps", "role", "unit", "sign")
     return [
         ui.make_notes(
             "The log cannot be read as mapped", filter(None, [replace_options(opened.fault)])
         ),
-        ui.make_notes("About the columns", map(replace_options, opened.survey.notes)),
+        ui.make_notes("About the columns", [*proposed, *map(replace_options, opened.survey.notes)]),
         ui.make_table(head, rows, name="mapping"),
+        _build_time_unit(opened),
         ui.make_row(
             ui.make_button("Apply the mapping", "apply-mapping", main=True),
             ui.make_button(
@@ -115,6 +127,22 @@ def _build_content(opened: Opened) -> list[Component]:
             ),
         ),
     ]
+
+
+def _build_time_unit(opened: Opened) -> Component:
+    """Build the field of the unit of time, with what the steps between samples make likely."""
+    likely = "; ".join(f"{one.unit}: {one.reason}" for one in opened.time_units)
+    hint = likely or "Leave it empty to use the unit that the file states."
+    unit = opened.survey.options.time.unit or ""
+    if len(opened.time_units) == 1:
+        unit = opened.time_units[0].unit
+    return ui.make_row(
+        ui.make_field(
+            "time-unit", "Unit of the time column", type="text", value=unit, list="time-units",
+            size="8",
+        ),
+        ui.make_hint(hint),
+    )  # fmt: skip
 
 
 def _build_choice(opened: Opened) -> Component:
