@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drivetwin._util.signal_processing import (
     compute_moving_mean,
@@ -64,6 +68,13 @@ def test_true_runs_are_half_open() -> None:
     mask = np.array([True, True, False, True, False, False, True])
     assert find_true_runs(mask) == [(0, 2), (3, 4), (6, 7)]
     assert find_true_runs(np.zeros(3, np.bool_)) == []
+
+
+@given(mask=st.lists(st.booleans(), max_size=40), least=st.integers(1, 4))
+def test_true_runs_of_a_least_length_are_all_of_them(mask: list[bool], least: int) -> None:
+    runs = find_true_runs(np.asarray(mask, np.bool_), least)
+    edges = "".join("x" if one else " " for one in mask)
+    assert runs == [found.span() for found in re.finditer("x+", edges) if len(found[0]) >= least]
 
 
 def test_trapezoids_of_a_line_are_its_integral() -> None:

@@ -42,13 +42,21 @@ def integrate_trapezoids(values: FloatArray, time: FloatArray) -> FloatArray:
     return np.concatenate([np.zeros(1), np.cumsum(areas)])
 
 
-def find_true_runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return first index and end (one past the last) of each run of True in `mask` (n,)."""
+def find_true_runs(mask: NDArray[np.bool_], least: int = 1) -> list[tuple[int, int]]:
+    """Return first index and end (one past the last) of each run of True in `mask` (n,).
+
+    Runs of fewer than `least` samples are left out.
+    """
     if not mask.size:
         return []
-    inner = np.flatnonzero(mask[1:] != mask[:-1]) + 1
-    edges = [*([0] if mask[0] else []), *inner.tolist(), *([mask.size] if mask[-1] else [])]
-    return list(zip(edges[::2], edges[1::2], strict=True))
+    starts = np.flatnonzero(mask[1:] & ~mask[:-1]) + 1
+    ends = np.flatnonzero(mask[:-1] & ~mask[1:]) + 1
+    starts = np.concatenate(([0], starts)) if mask[0] else starts
+    ends = np.concatenate((ends, [mask.size])) if mask[-1] else ends
+    if least > 1:
+        long = ends - starts >= least
+        starts, ends = starts[long], ends[long]
+    return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
 
 def estimate_resolution(values: FloatArray) -> float:

@@ -44,7 +44,7 @@ def remember_for_arrays(function: Callable[P, Result]) -> Callable[P, Result]:
 @remember_for_arrays
 def compute_median_step(time: FloatArray) -> float:
     """Return the median distance [s] of the stamps `time` (n,), n > 1."""
-    return float(np.median(np.diff(time)))
+    return float(np.median(np.diff(time), overwrite_input=True))
 
 
 @remember_for_arrays

@@ -20,7 +20,11 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import find_true_runs
-from drivetwin._util.time_steps import is_time_axis, remember_for_arrays
+from drivetwin._util.time_steps import (
+    compute_median_step,
+    is_time_axis,
+    remember_for_arrays,
+)
 from drivetwin.channels.knot_fit import (
     ROUND_OFF,
     Interpolant,
@@ -135,7 +139,8 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
         None where each sample may be measured.
     """
     usable = np.abs(values) < _LARGEST
-    time, values = time[usable], values[usable]
+    if not usable.all():
+        time, values = time[usable], values[usable]
     if time.size < FILLING.least or not is_time_axis(time):
         return None
     for part in _list_windows(time, values):
@@ -148,7 +153,7 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
 
 def _list_windows(time: FloatArray, values: FloatArray) -> Iterator[slice]:
     """List evenly sampled stretches, the liveliest of a long record first."""
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     even = np.abs(np.diff(time) - step) < 0.5 * step
     parts = []
     for first, end in find_true_runs(even):
@@ -300,7 +305,7 @@ def _extend_filling(
     """
     if isinstance(found, Filling):
         return find_uneven_knots(time, values) or found
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     kind = FillKind.LINEAR if found.interpolant is Interpolant.LINEAR else FillKind.CUBIC
     if found.on_grid:
         count = np.round((time - found.start) / found.period)
@@ -316,7 +321,7 @@ def find_uneven_knots(time: FloatArray, values: FloatArray) -> Filling | None:
     Between knots lie at least three samples on a straight line; lines meet at the knots. Kind
     UNKNOWN where many lines are shorter, of a record that is not rounded.
     """
-    step = float(np.median(np.diff(time)))
+    step = compute_median_step(time)
     nothing = np.empty(0)
     unknown = Filling(FillKind.UNKNOWN, np.nan, step, nothing, nothing)
     bends, lattice = np.abs(np.diff(values, 2)), estimate_lattice(values)

@@ -157,7 +157,7 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
     steps = np.abs(np.diff(values))
     least = max(
         _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
-        _SPIKE_CONTRAST * float(np.median(steps[steps > 0.0])) if steps.any() else np.inf,
+        _SPIKE_CONTRAST * _compute_median(steps[steps > 0.0]) if steps.any() else np.inf,
     )
     interval = compute_median_step(time)
     for width in range(1, _SPIKE_WIDTH + 1):
@@ -193,6 +193,11 @@ def _find_spike_starts(
     return np.asarray(before[found] + 1)
 
 
+def _compute_median(values: FloatArray) -> float:
+    """Compute the median of an array that nobody else needs: it is partly sorted in place."""
+    return float(np.median(values, overwrite_input=True))
+
+
 def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches, longer than spikes, that a calm torque jumps to and back from in one sample each.
 
@@ -205,7 +210,7 @@ def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
         return None
     least = max(
         _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
-        _SPIKE_CONTRAST * float(np.median(size[size > 0.0])),
+        _SPIKE_CONTRAST * _compute_median(size[size > 0.0]),
     )
     mask = np.zeros(values.size, np.bool_)
     for first, last in pairwise(np.flatnonzero(size > least)):
@@ -230,10 +235,11 @@ def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dama
     """
     steps = np.diff(values)
     same, moving = steps == 0.0, np.abs(steps)
-    usual = float(np.median(moving[~same])) if (~same).any() else np.inf
-    long = [(start, end) for start, end in find_true_runs(same) if end - start >= _STUCK_SAMPLES]
+    changes = moving[~same]
+    usual = _compute_median(changes) if changes.size else np.inf
+    long = find_true_runs(same, _STUCK_SAMPLES)
     outside = steps.size - sum(end - start for start, end in long)
-    fine = outside >= _ENOUGH and np.count_nonzero(~same) > _MOVING * outside
+    fine = outside >= _ENOUGH and changes.size > _MOVING * outside
     mask = np.zeros(values.size, np.bool_)
     for start, end in long:
         if values[start] == 0.0:
@@ -273,7 +279,7 @@ def find_stale(values: FloatArray) -> Damage | None:
 
 def _estimate_white_noise(values: FloatArray) -> float:
     """Standard deviation of the noise of `values` (n,) from its third difference."""
-    return float(np.median(np.abs(np.diff(values, 3)))) / _THIRD_DIFFERENCE
+    return _compute_median(np.abs(np.diff(values, 3))) / _THIRD_DIFFERENCE
 
 
 def _is_noisy(steps: FloatArray, usual: float) -> bool:
@@ -400,14 +406,12 @@ def _can_be_fill_pulse(values: FloatArray, run: tuple[int, int], possible: float
 
 def find_clipping(values: FloatArray) -> Damage | None:
     """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
-    same = find_true_runs(np.diff(values) == 0.0)
+    same = find_true_runs(np.diff(values) == 0.0, _CLIPPED_SAMPLES - 1)
     for limit in (float(values.max()), float(values.min())):
         at_limit = values == limit
-        rests = [run for run in find_true_runs(at_limit) if run[1] - run[0] >= _CLIPPED_SAMPLES]
-        elsewhere = sum(
-            end - start + 1 >= _CLIPPED_SAMPLES for start, end in same if values[start] != limit
-        )
-        if limit != 0.0 and len(rests) >= _CLIPPED_RUNS and elsewhere == 0:
+        rests = find_true_runs(at_limit, _CLIPPED_SAMPLES)
+        elsewhere = any(values[start] != limit for start, _ in same)
+        if limit != 0.0 and len(rests) >= _CLIPPED_RUNS and not elsewhere:
             mask = np.zeros(values.size, np.bool_)
             for start, end in rests:
                 mask[start:end] = True

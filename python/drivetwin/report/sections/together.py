@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin._util.display_units import format_significant, get_display_unit
+from drivetwin._util.display_units import Display, format_significant, get_display_unit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.multi_log import CONSISTENCY, Consistency, LogShare, Several
@@ -208,7 +208,7 @@ def _build_judgement_table(found: Identification, held: Sequence[HeldOut]) -> Ta
         *make_cells("shift", "signal"),
         Cell("predicted", number=True, note="fit %, rmse"),
         Cell("fitted", number=True, note="fit %, rmse"),
-        Cell("usual", number=True, note="rmse"),
+        Cell("usual", number=True, note="rmse", secondary=True),
         Cell("allowed", number=True, note="rmse"),
         *make_cells("unit", "verdict"),
     )
@@ -218,32 +218,32 @@ def _build_judgement_table(found: Identification, held: Sequence[HeldOut]) -> Ta
         for signal, phases in fits.items():
             label, display = SIGNALS[signal]
             bound, outcome = one.bounds.get(signal), one.get_signal_outcome(signal)
-            sizes = (None, None) if bound is None else (bound.usual, bound.largest)
+            usual, allowed = (None, None) if bound is None else (bound.usual, bound.largest)
             rows.append(
                 (
                     *make_cells(one.name, label),
                     make_fit_cell(phases["all"], display),
                     make_fit_cell(found.fit.get(signal, {}).get("all"), display),
-                    *(
-                        Cell(
-                            "–" if size is None else format_significant(size * display.factor, 3),
-                            number=True,
-                        )
-                        for size in sizes
-                    ),
+                    _make_bound_cell(usual, display, secondary=True),
+                    _make_bound_cell(allowed, display),
                     Cell(display.label),
                     Cell(outcome.value, badge=True, tone=_TONES[outcome]),
                 )
             )
         if not fits:
-            dashes = [Cell("–", number=True)] * 4
+            dash, minor = Cell("–", number=True), Cell("–", number=True, secondary=True)
             verdict = Cell(one.outcome.value, badge=True, tone=_TONES[one.outcome])
-            rows.append((*make_cells(one.name, ""), *dashes, Cell(""), verdict))
+            rows.append((*make_cells(one.name, ""), dash, dash, minor, dash, Cell(""), verdict))
     return TableBlock(
         "Errors of the predictions, of the fitted shifts, and the limit set by noise.",
         head,
         rows,
     )
+
+
+def _make_bound_cell(size: float | None, display: Display, *, secondary: bool = False) -> Cell:
+    text = "–" if size is None else format_significant(size * display.factor, 3)
+    return Cell(text, number=True, secondary=secondary)
 
 
 def _iterate_log_rows(held: Sequence[HeldOut]) -> Iterator[tuple[Cell, ...]]:
