@@ -17,7 +17,7 @@ flags_demo := --no-default-features --features pyo3/extension-module
 # file stay together, and takes over from others at the end.
 pytest := $(bin)/pytest -q -n auto --dist worksteal
 # Suites that take long: a marker and a target each. `short` marks one short case of every suite.
-suites := statistical crosscompile faults exhaustive
+suites := statistical crosscompile faults exhaustive howto
 rust_sources := Cargo.toml $(wildcard Cargo.lock) $(shell find crates -name '*.rs' -o -name Cargo.toml)
 
 # The binding crate looks for an interpreter when cargo builds it outside maturin.
@@ -79,6 +79,7 @@ test-statistical: ## coverage of intervals over many noise realisations
 test-crosscompile: ## libraries and FMUs for other platforms
 test-faults: ## killed workers and coordinators, a full disk, a lost scheduler (fault_logs=1000 logs each)
 test-exhaustive: ## thousands of damaged files through each reader
+test-howto: ## commands of the how-to pages that identify
 fault_logs ?= 40
 test-faults: export FLEET_FAULT_LOGS := $(fault_logs)
 $(suites:%=test-%): test-%: $(venv)/.dev native

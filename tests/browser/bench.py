@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 GIVEN = ROOT.parent / "shared" / "logs" / "truck_a.csv"
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 """Programs of the browser."""
-PATIENCE = 120_000
+PATIENCE = 300_000
 """Time [ms] that a step may take on a busy machine."""
 STEPS = ("log", "channels", "card", "shifts", "identify", "model", "export")
 VIEWS = (*STEPS, "compare", "gearbox", "workspace")
