@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import json
+import time
 from contextlib import chdir, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -64,16 +65,22 @@ def write_bench_export(path: Path) -> dict[str, float]:
     return dict(run.truth.parameters)
 
 
+MOST_CPU = 60.0
+"""CPU time of the four commands [s]."""
+
+
 @pytest.fixture(scope="module")
 def first_hour(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, float]]:
     folder = tmp_path_factory.mktemp("first")
     truth = write_bench_export(folder / "messung.csv")
+    begun = time.process_time()
     run_command(folder, "card", "new", "-o", "wagen.toml", "--from", "messung.csv", *CARD)
     assert "nothing implausible" in run_command(
         folder, "card", "check", "wagen.toml", "messung.csv"
     )
     run_command(folder, "identify", "messung.csv", "--vehicle", "wagen.toml", "-o", "out")
     run_command(folder, "simulate", "out", "messung.csv", "--html", "vergleich.html")
+    assert time.process_time() - begun < MOST_CPU
     return folder, truth
 
 

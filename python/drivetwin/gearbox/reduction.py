@@ -124,7 +124,7 @@ class Reduction:
         """Return the dual-clutch driveline of this shift in the given drive (the card's, if None).
 
         With `keep_coupling`, M12 is carried by drum inertias of the two elements, as -I·a·b, I·a²,
-        I·b² of a member that runs with the slip; without, it is left out and the diagonal kept.
+        I·b² of a member that rotates at slip speed; without, it is left out and the diagonal kept.
         Raises ReductionError where an element states no capacity, or no drum can carry M12.
         """
         return build_dual_clutch(

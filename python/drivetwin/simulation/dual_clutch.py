@@ -74,7 +74,7 @@ class ShiftElement:
     """One clutch of the dual-clutch form: slip = ω_in/i_c - i_out·ω_out (eq. 15).
 
     `gain` = N·D·A·r [m^3]; capacity = μ·gain·max(0, P - P0) [N m]; static capacity `peak` times
-    μ(0). `drum_inertia` [kg m^2] runs with the slip (THEORY section 2).
+    μ(0). `drum_inertia` [kg m^2] rotates at slip speed (THEORY section 2).
     """
 
     name: str

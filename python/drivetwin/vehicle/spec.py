@@ -64,7 +64,7 @@ class ElementSpec:
 
     `gain` = N·D·A·r [m^3] (N friction surfaces, D de-rating, A area, r effective radius);
     capacity = μ·gain·(P - P0), static capacity `peak` times that at zero slip (THEORY section 1).
-    `P0` [Pa] ends the fill; `drum_inertia` [kg m^2] runs with the slip (THEORY section 2).
+    `P0` [Pa] ends the fill; `drum_inertia` [kg m^2] rotates at slip speed (THEORY section 2).
     `i_c`, `i_out` are the ratios of eq. 15 where the card states them, `geometry` is what the gain
     is computed from where the card states it, `actuator` its hydraulics where the card states them.
     """

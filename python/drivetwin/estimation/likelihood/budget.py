@@ -62,7 +62,7 @@ def charge(passes: float) -> None:
     meter.left -= passes
     if meter.left < 0.0:
         raise BudgetExceeded(
-            "the search was given up without a plausible minimum when it had done the work that it "
-            "may do: either its start was too far off, or the model hardly holds on this log",
+            "the optimiser did not converge within its iteration limit: its start was too far off, "
+            "or the model does not describe this log",
             REMEDY,
         )

@@ -112,8 +112,8 @@ def estimate_gear_inertia(
         return _refuse_gear(
             gear,
             span,
-            f"{format_with_unit(value, 'kg*m^2', half)} (95 %) says nothing: the vehicle's "
-            f"acceleration varies by "
+            f"{format_with_unit(value, 'kg*m^2', half)} (95 %) does not determine it: the "
+            f"vehicle's acceleration varies by "
             f"{format_with_unit(float(rate.std()), 'rad/s^2', digits=2)} only",
         )
     verdict = Verdict.IDENTIFIED if half < GEAR_INERTIA.identified * value else Verdict.WEAK

@@ -5,7 +5,7 @@ Delimiter `,` `;` `|`, tab or blanks; decimal point or comma; units in a row und
 names or in the names as `EngTrq [Nm]`; comment lines (# % //), the last of which may hold the
 names; lines of another form above the names and between the rows; byte order mark; quoted fields;
 time as a number, a duration or a clock, with the date beside it, in one column or, as numbers, in
-one before each signal or group of signals. An empty cell is no sample of its column, so each keeps
+one before each signal or group of signals. Empty cells are ignored, so that each column keeps
 its own time base.
 
 The rows are read in passes of the native scanner: one for their form and the stamps, others for the

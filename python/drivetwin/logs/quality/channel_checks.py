@@ -247,7 +247,7 @@ def _check_stuck(channel: Channel) -> Damage | None:
 
 
 def _check_outliers(channel: Channel) -> Damage | None:
-    """Numbers that stand for no value; what a pressure can be may be the pulse of a valve."""
+    """Invalid-value codes; a pressure within the plausible range may be the pulse of a valve."""
     if channel.quantity in AUXILIARY:
         return None
     possible = _PLAUSIBLE[Quantity.PRESSURE][1] if channel.quantity is Quantity.PRESSURE else 0.0

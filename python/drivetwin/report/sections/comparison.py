@@ -57,8 +57,8 @@ def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
             FigureBlock(
                 plot_agreement([one.name for one in candidates], judged),
                 "Each value against the mean of all (weighted by their uncertainty) with its total "
-                "95 % interval, in standard deviations of the parameter. Intervals that do not "
-                "overlap are a difference that needs a reason.",
+                "95 % interval, in standard deviations of the parameter. Where intervals do not "
+                "overlap, the difference needs an explanation.",
             )
         )
     return Section("agreement", "Do they agree?", _write_headline(judged, differing), blocks)
@@ -145,7 +145,7 @@ def build_friction_overlay_section(candidates: Sequence[Candidate]) -> Section:
                 {c.name: c.friction[element] for c in candidates if element in c.friction},
                 order,
             ),
-            f"Friction of {element}, each curve over the slip its log showed.",
+            f"Friction of {element}, each curve over the slip range of its log.",
         )
         for element in elements
     ]
@@ -169,7 +169,7 @@ def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial
             shifts.append(
                 FigureBlock(
                     plot_trial(trial, order),
-                    f"{trial.label}: measured, and simulated from the measured inputs by each.",
+                    f"{trial.label}: measured, and simulated by each model from measured inputs.",
                     build_trial_panels(trial, order),
                     trial.label,
                 )

@@ -33,7 +33,7 @@ _INSEPARABLE = (
     "η and a gain error of the engine torque: only their product acts.",
     "The common scale of all torques rests on the output-torque sensor's gain: an error of it "
     "scales J′, J_vehicle, T_v/i_f, k_o, c_o and μ alike.",
-    "J1·η + J2: the inertias before and behind the input gear have the effect of one number.",
+    "J1·η + J2: inertias before and behind the input gear; only this sum acts.",
 )
 _CLOSE = 0.9
 """Correlation from which a pair is named."""
@@ -137,8 +137,8 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
             Cell("what would narrow it"),
         )
         yield TableBlock(
-            "The least certain parameters. Where sensor tolerances and effects make the interval, "
-            "no experiment narrows it.",
+            "The least certain parameters. Experiments cannot narrow the part of an interval that "
+            "comes from sensor tolerances and effects.",
             head,
             rows,
         )

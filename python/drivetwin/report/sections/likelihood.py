@@ -139,8 +139,7 @@ def _build_sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
     change = compute_sensitivity(fit, found.evidence.signals, found.friction)
     text = (
         "Change of each result, in per cent of its value, by an error of one sensor: a gain error "
-        "of 1 %, an offset of 1 % of the sensor's largest reading, values 1 ms older than their "
-        "stamps. "
+        "of 1 %, an offset of 1 % of the sensor's largest reading, a delay of 1 ms. "
         "Engine torque T_e, pressures P, output torque T_o, speeds n of gearbox input, output and "
         "wheel; a dot is less than 0.05. Scale a column to the data sheet of your sensor; with the "
         "tolerances on the vehicle card all columns are part of the total intervals."
@@ -148,6 +147,6 @@ def _build_sensor_section(found: Identification, fit: LikelihoodFit) -> Section:
     return Section(
         "sensors",
         "Sensitivity to sensor errors",
-        "Noise averages out over a log; an error of a sensor's gain, offset or age does not.",
+        "Noise averages out over a log; errors of gain, offset and delay of a sensor do not.",
         [FigureBlock(plot_sensitivity(change), text)],
     )

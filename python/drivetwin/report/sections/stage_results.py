@@ -144,8 +144,8 @@ def _build_momentum_blocks(shifts: Iterable[_Stages[IntegralShift]]) -> list[Blo
         FigureBlock(
             plot_momentum(one.stages.momentum),
             f"{one.by}, momentum form: each point is a window weighted by a smooth kernel, so "
-            "no speed is differentiated. Right: how the misfit rises as the engine torque is taken "
-            "to be older or younger than it is." + _note_missing_delay(one.stages),
+            "no speed is differentiated. Right: misfit over the assumed delay of the engine "
+            "torque." + _note_missing_delay(one.stages),
         )
         for one in shifts
     ]
@@ -153,7 +153,7 @@ def _build_momentum_blocks(shifts: Iterable[_Stages[IntegralShift]]) -> list[Blo
 
 def _note_missing_delay(shift: IntegralShift) -> str:
     why = shift.refusals.get("te_delay")
-    return f" Here {why}; the least misfit is noise, and no age is assumed." if why else ""
+    return f" Here {why}; the minimum is not significant, and no delay is assumed." if why else ""
 
 
 def _build_load_blocks(

@@ -143,7 +143,7 @@ def build_friction_section(found: Identification) -> Section:
         "Friction over slip",
         f"{OF_SPEEDS if over_eta else OF_TORQUE} A log determines only the "
         "product of μ and N·D·A·r: an error of the geometry scales the whole curve. Points that "
-        "scatter at one slip are of the torque phase, where the element carries little.",
+        "scatter at one slip belong to the torque phase, in which the element transmits little.",
         blocks,
     )
 
@@ -178,7 +178,7 @@ def build_validation_section(validations: tuple[Validation, ...]) -> Section:
     return Section(
         "validation",
         "Simulation over measurement",
-        "Measured engine torque and pressures drive the identified model; nothing else is fed in "
+        "Measured engine torque and pressures drive the identified model. It has no other input "
         "after the start.",
         blocks,
     )

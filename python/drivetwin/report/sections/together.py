@@ -67,16 +67,16 @@ def build_joint_section(found: Identification, several: Several) -> Section:
         FigureBlock(
             plot_agreement([*names, _TOGETHER], compared),
             "Values of each log alone and of all together, relative to their common mean, "
-            "with total 95 % intervals in standard deviations of the parameter. Of logs alike in "
-            "what they excite the common interval is narrower by the root of their number; the "
-            "part that the sensors' tolerances make stays, for it is the same in all logs.",
+            "with total 95 % intervals in standard deviations of the parameter. Averaging n logs "
+            "with similar excitation narrows the part from noise by √n; the part from sensor tolerances "
+            "remains, because it is the same in all logs.",
         ),
     ]
     return Section(
         "logs",
         "The logs together",
-        f"{tested.text} The driveline is one for all logs; load and "
-        "age of the engine torque are each log's own. A design value counts once.",
+        f"{tested.text} Driveline parameters are shared; load and engine-torque delay are specific "
+        "to each log. A design value counts once.",
         blocks,
     )
 
@@ -151,7 +151,7 @@ def _build_shared_table(
         Cell("farthest off", number=True, note="a log against the others"),
     )
     return TableBlock(
-        "Shared parameters. Farthest off: the largest shift of the value by one log against the "
+        "Shared parameters. Farthest off: the largest deviation of one log from the "
         "others, in standard deviations of noise; doubtful beyond "
         f"{CONSISTENCY.far:g}.",
         head,
@@ -186,11 +186,11 @@ def build_holdout_section(found: Identification, held: Sequence[HeldOut]) -> Sec
         "held-out",
         "Predicted, not fitted",
         "These shifts took no part in the fit. The identified model is driven by their measured "
-        "engine torque and pressures; only the state at the start, and for a log that was not "
-        "fitted its load and the age of its engine torque, come from the gear held before the "
-        "shift (runs of fitted shifts start from the state that a few samples show). Allowed is "
-        "the error that a right model would leave in 97.5 % of all cases, with the noise of "
-        "inputs and sensors and the uncertainty of the parameters.",
+        "engine torque and pressures. The start state, and for a log that was not fitted its "
+        "load and engine-torque delay, come from the gear held before the shift; simulations of "
+        "fitted shifts start from a state that is estimated from a few samples. Allowed: the 97.5 "
+        "% limit of the error of a correct model, from the noise of inputs and sensors and the "
+        "uncertainty of the parameters.",
         blocks,
     )
 

@@ -115,7 +115,7 @@ def check_fields(callback: Callable[..., Any], values: Sequence[object]) -> list
         number = str(fault["loc"][0]).removeprefix("field") if fault["loc"] else ""
         name = names[int(number)].strip("_") if number else ""
         raise RefusedError(
-            f"the field {name or 'event'!r} has a value that it cannot have: {fault['msg'][:200]}",
+            f"the field {name or 'event'!r} has an invalid value: {fault['msg'][:200]}",
             _REMEDY,
         ) from None
     if len({len(one) for one in checked if isinstance(one, list)}) > 1:
@@ -151,7 +151,7 @@ def parse_positions(values: Sequence[float | str | None], ids: Sequence[str]) ->
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise RefusedError(f"the slider {id[:80]!r} is at no number", "type a number")
+            raise RefusedError(f"the slider {id[:80]!r} has no number", "type a number")
         found[id] = number
     return found
 
