@@ -68,8 +68,8 @@ def build_joint_section(found: Identification, several: Several) -> Section:
             plot_agreement([*names, _TOGETHER], compared),
             "Values of each log alone and of all together, relative to their common mean, "
             "with total 95 % intervals in standard deviations of the parameter. Averaging n logs "
-            "with similar excitation narrows the part from noise by √n; the part from sensor tolerances "
-            "remains, because it is the same in all logs.",
+            "with similar excitation narrows the part from noise by √n; the part from sensor "
+            "tolerances remains, because it is the same in all logs.",
         ),
     ]
     return Section(
