@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum, auto
@@ -183,6 +182,8 @@ class Entry:
 @cache
 def load_catalogue() -> dict[Code, Entry]:
     """Load the catalogue; raises ValueError for an unknown code or severity."""
+    import tomllib
+
     tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     return {
         Code(code): Entry(**table | {"severity": Severity(table.get("severity", "warning"))})

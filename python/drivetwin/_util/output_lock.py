@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -35,6 +34,8 @@ def _lock(path: Path) -> Iterator[None]:
     if fcntl is None:
         yield
         return
+    import hashlib
+
     name = hashlib.sha256(os.fsencode(path)).hexdigest()[:32]
     file = Path(tempfile.gettempdir(), f"drivetwin-{os.getuid()}-{name}.lock")
     handle = _acquire(file, path)
