@@ -10,12 +10,15 @@ use crate::number::{Number, Values};
 use crate::solver::HybridState;
 use std::sync::Arc;
 
-/// Nodes and weights of Gauss-Legendre quadrature with four points on [0, 1].
-pub(super) const GAUSS: [(f64, f64); 4] = [
-    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
-    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
-    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
-    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+/// Nodes and weights of Gauss-Legendre quadrature with six points on [0, 1]: over a Taylor step, in which a
+/// motion turns by less than 1 rad, powers are exact to round-off.
+pub(super) const GAUSS: [(f64, f64); 6] = [
+    (0.033_765_242_898_424_03, 0.085_662_246_189_585_14),
+    (0.169_395_306_766_867_76, 0.180_380_786_524_069_36),
+    (0.380_690_406_958_401_56, 0.233_956_967_286_345_52),
+    (0.619_309_593_041_598_5, 0.233_956_967_286_345_52),
+    (0.830_604_693_233_132_2, 0.180_380_786_524_069_36),
+    (0.966_234_757_101_575_9, 0.085_662_246_189_585_14),
 ];
 
 /// Kind of a power.

@@ -10,6 +10,7 @@ use crate::solver::hybrid::event::EventCause;
 use crate::solver::hybrid::event_search::earliest;
 use crate::solver::hybrid::stall::{Stall, StallDetector, underflows};
 use crate::solver::hybrid::state::HybridState;
+use crate::solver::hybrid::stiffness::{ExpandedStep, Stiffness};
 use crate::solver::inputs::Inputs;
 use crate::solver::interrupt::is_interrupted;
 use crate::solver::settings::{Settings, Step};
@@ -37,6 +38,7 @@ pub struct Integrator<'a, T: Real> {
     pub(crate) propagators: PropagatorCache<T>,
     pending: Option<EventCause>,
     progress: StallDetector,
+    stiffness: Stiffness<T>,
 }
 
 impl<'a, T: Real> Integrator<'a, T> {
@@ -69,6 +71,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             continued: false,
             pending: None,
             progress: StallDetector::from(from),
+            stiffness: Stiffness::new(),
         })
     }
 
@@ -109,14 +112,15 @@ impl<'a, T: Real> Integrator<'a, T> {
         self.expand_step().map(Some)
     }
 
-    /// One Taylor expansion: to the next input sample or event.
+    /// One expansion, a Taylor series or an implicit step: to the next input sample or event.
     fn expand_step(&mut self) -> Result<Step<T>, Status> {
         let end = self.inputs.span(self.segment).1;
         let state = &mut self.state;
         let remaining = (-state.t + end).re();
         let wish = remaining.min(self.settings.max_step);
-        let h = state.expand(1, wish, self.settings.accuracy(self.uses_fixed_step));
-        let lost = underflows(h, end) || (h < wish && !self.progress.shorten(state.time()));
+        let accuracy = self.settings.accuracy(self.uses_fixed_step);
+        let ExpandedStep { length: h, work } = self.stiffness.expand(state, wish, accuracy);
+        let lost = underflows(h, end) || (h < wish && !self.progress.shorten(state.time(), work));
         if lost && h < remaining {
             return Err(Status::StepTooSmall { time: state.time() });
         }
@@ -131,6 +135,9 @@ impl<'a, T: Real> Integrator<'a, T> {
             None => T::of(h),
         };
         self.pending = event.map(|(_, cause, _)| cause);
+        if event.is_some() {
+            self.stiffness.note_event();
+        }
         if let (Some((at, cause, true)), None) = (event, &self.grazing) {
             self.grazing = Some(((start + at).re(), state.element_name_of(cause)));
         }

@@ -80,6 +80,14 @@ pub(crate) const MAX_STICTION_EXPONENT_CHANGE: f64 = 2.0;
 /// Slip beyond which stiction is zero, in Stribeck speeds: `exp(-40)` is below round-off.
 pub(crate) const STICTION_RANGE: f64 = 40.0;
 
+// Collocation.
+
+/// Change of the states at the nodes by a Newton iteration that counts as converged, relative to their
+/// scales.
+pub(crate) const COLLOCATION_RTOL: f64 = 1e-12;
+/// Largest growth exponent, within an implicit step, of a slip that its own torque drives.
+pub(crate) const MAX_COLLOCATION_GROWTH: f64 = 0.5;
+
 // Exponential integrator.
 
 /// Truncation error of the series of the phi-functions, relative to the first term. Small, because

@@ -13,7 +13,7 @@ const PROGRESS_WINDOW: usize = 1000;
 const STEP_WINDOW: usize = 10_000;
 
 /// Steps of a run that the motion itself ends, neither an event nor a sample: some seconds of work.
-const MAX_STEPS: usize = 300_000;
+const MAX_STEPS: f64 = 300_000.0;
 /// Further such steps for every second of the run.
 const MAX_STEPS_PER_SECOND: f64 = 1000.0;
 
@@ -26,8 +26,8 @@ pub(crate) struct StallDetector {
     events: Window,
     /// Present window of steps.
     steps: Window,
-    /// Steps so far that the motion ended.
-    shortened: usize,
+    /// Work so far of steps that the motion ended, in Taylor steps.
+    shortened: f64,
     /// Start of the run, s.
     start: f64,
 }
@@ -68,17 +68,16 @@ impl StallDetector {
             stalled: 0,
             events: Window::from(time),
             steps: Window::from(time),
-            shortened: 0,
+            shortened: 0.0,
             start: time,
         }
     }
 
-    /// Count a step from `time` [s] on that the motion ended. Return false if the run has too many of them:
-    /// it is too stiff for steps.
-    pub fn shorten(&mut self, time: f64) -> bool {
-        self.shortened += 1;
-        let most = (time - self.start) * MAX_STEPS_PER_SECOND;
-        self.shortened < MAX_STEPS + most as usize
+    /// Count a step from `time` [s] on that the motion ended, of `work` Taylor steps. Return false if the run
+    /// has too many of them: it is too stiff for steps.
+    pub fn shorten(&mut self, time: f64, work: f64) -> bool {
+        self.shortened += work;
+        self.shortened < MAX_STEPS + (time - self.start) * MAX_STEPS_PER_SECOND
     }
 
     /// Return true if events at one instant do not end.

@@ -23,7 +23,7 @@ pub struct TaylorExpansion<T> {
     /// One coefficient of the whole basis.
     basis: Vec<T>,
     /// 1 over the scale of each state, without derivatives.
-    scales: Vec<T>,
+    pub(super) scales: Vec<T>,
     /// Coupling of the losses of gears by tables.
     losses: Option<LossCoupling<T>>,
 }
@@ -304,7 +304,7 @@ impl<T: Number> TaylorExpansion<T> {
     }
 
     /// Scales are the states now: speeds of 1 rad/s, twists of 1 mrad, lagging torques of 1 N·m at least.
-    fn set_scales(&mut self, network: &Network<T>) {
+    pub(super) fn set_scales(&mut self, network: &Network<T>) {
         let twists = network.speeds()..network.first_lag();
         for (i, (scale, state)) in self.scales.iter_mut().zip(&self.states).enumerate() {
             let floor = if twists.contains(&i) { 1e-3 } else { 1.0 };

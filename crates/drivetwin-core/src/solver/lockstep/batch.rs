@@ -16,6 +16,7 @@ use crate::solver::hybrid::event::{Event, EventCause};
 use crate::solver::hybrid::event_search::earliest_per_lane;
 use crate::solver::hybrid::stall::{StallDetector, underflows};
 use crate::solver::hybrid::state::HybridState;
+use crate::solver::hybrid::stiffness::ShortenedSteps;
 use crate::solver::inputs::Inputs;
 use crate::solver::interrupt::is_interrupted;
 use crate::solver::lane_mask::{lane_mask, lanes_in};
@@ -60,7 +61,13 @@ pub fn run_lockstep<'a>(
     let lane = |(run, &inputs): (usize, &&'a Inputs<f64>)| {
         let status =
             if runs >> run & 1 == 1 { LaneStatus::NeedsTaylorStep } else { LaneStatus::Diverged };
-        LaneRun { inputs, segment: 0, status, progress: StallDetector::from(start) }
+        LaneRun {
+            inputs,
+            segment: 0,
+            status,
+            progress: StallDetector::from(start),
+            shortened: ShortenedSteps::default(),
+        }
     };
     let lanes = inputs.iter().enumerate().map(lane).collect();
     let own_inputs = vec![[0.0; TERMS]; state.inputs_plus.len()];
@@ -257,6 +264,11 @@ impl LockstepBatch<'_> {
         for run in lanes_in(runs & !diverged_mask) {
             let whole = h.0[run] >= remaining.0[run];
             let event = events[run].map(|(_, cause)| cause);
+            let shortened = &mut self.lanes[run].shortened;
+            shortened.note(h.0[run], wish.0[run]);
+            if event.is_some() {
+                shortened.note_event();
+            }
             self.step(run, lengths.0[run], h.0[run], whole, event);
             at |= u32::from(self.lanes[run].status == LaneStatus::Finished) << run;
         }
@@ -287,7 +299,8 @@ impl LockstepBatch<'_> {
         let finite = self.state.x.iter().all(|x| x.0[run].is_finite());
         let advances = lane.progress.note(*t, length, event.is_some()).is_ok();
         let lost = underflows(h, end) && !whole;
-        if lost || !finite || !advances || lane.progress.is_stalled() {
+        let stuck = lane.progress.is_stalled() || lane.shortened.is_stiff();
+        if lost || !finite || !advances || stuck {
             lane.status = LaneStatus::Diverged;
         } else if let Some(cause) = event {
             lane.status = LaneStatus::Event(cause);

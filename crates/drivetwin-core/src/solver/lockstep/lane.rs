@@ -6,6 +6,7 @@ use crate::solver::exponential::samples::Samples;
 use crate::solver::hybrid::event::EventCause;
 use crate::solver::hybrid::stall::StallDetector;
 use crate::solver::hybrid::state::HybridState;
+use crate::solver::hybrid::stiffness::ShortenedSteps;
 use crate::solver::inputs::Inputs;
 use crate::solver::lane_mask::lanes_in;
 
@@ -70,6 +71,8 @@ pub(crate) struct LaneRun<'a> {
     /// Status there.
     pub status: LaneStatus,
     pub progress: StallDetector,
+    /// Taylor steps that its motion shortened.
+    pub shortened: ShortenedSteps,
 }
 
 /// Samples that have been passed but not handed on.
