@@ -183,3 +183,53 @@ def test_a_one_way_clutch_on_a_stiff_motion_releases_when_its_torque_ends(middle
     assert slip[150] < 0.0
     assert fast.events[0].kind == "break_away"
     assert fast.events[0].time == pytest.approx(0.1, abs=1e-6)
+
+
+def load(node: str, constant: float) -> Element:
+    law = {"constant": constant, "rolling": 0.0, "aero": 1e-4}
+    return {"type": "road_load", "name": f"load {node}", "node": node, **law}
+
+
+def test_a_light_member_with_a_quadratic_load_follows_its_torque() -> None:
+    """Its speed is within 1e-6 s of the one at which the load takes the torque."""
+    rising = Signal(GRID, 10.0 + 2.0 * GRID)
+    elements = [inertia("a", 1.6e-9), load("a", 5.0), torque("a")]
+    expected = np.sqrt((rising.values - 5.0) / 1e-4)
+    for audit in (False, True):
+        done = run(elements, rising, ("a",), audit=audit)
+        found = speeds(done, ("a",))[0]
+        assert found[1:] == pytest.approx(expected[1:], rel=1e-6)
+        if done.audit is not None:
+            assert abs(done.audit.error) < 1e-10 * done.audit.source
+
+
+def test_a_light_member_is_stepped_as_exactly_as_sampled() -> None:
+    done = run(light_member(1e-8), TORQUE, audit=True)
+    assert np.abs(speeds(done) - massless_limit()).max() < 1e-8
+    assert done.audit is not None
+    assert abs(done.audit.error) < 1e-9 * done.audit.shaft
+
+
+def test_an_implicit_step_does_not_damp_what_grows() -> None:
+    """Friction that falls by 0.5 N m s beside a stiff motion: a slip grows by e every 0.1 ms."""
+    grid = np.linspace(0.0, 1.2e-3, 101)
+    falling = {"friction": {"slip": [0.0, 10.0], "mu": [0.15, 0.1]}, "gain": 1.0, "p0": 0.0}
+    clutch = {"type": "clutch", "name": "C", "a": "a", "b": "ground", "pressure": "P", "peak": 1.0}
+    elements = [inertia("a", 5e-5), {**clutch, **falling, "drum_inertia": 0.0}, torque("a")]
+    elements += [inertia("b", 1e-9), load("b", 0.0), torque("b") | {"input": "T b"}]
+    inputs = {"T": Signal(grid, 12.5 + 0.0 * grid), "T b": Signal(grid, 10.0 + 0.0 * grid)}
+    inputs["P"] = Signal(grid, 100.0 + 0.0 * grid)
+    done = simulate(
+        elements, inputs, Start({"a": 5.0 + 1e-6, "b": 0.0}), grid, [("speed", "a")], audit=True
+    )
+    assert done.status == "completed"
+    grown = done.columns["speed", "a"] - 5.0
+    assert grown == pytest.approx(1e-6 * np.exp(1e4 * grid), rel=1e-3)
+
+
+def test_the_heat_of_a_fast_decay_is_the_energy_at_the_start() -> None:
+    elements = [inertia("a", 2e-7), shaft("a", "ground", 1.6e4, 5e-3), torque("a")]
+    nothing = Signal(GRID, 0.0 * GRID)
+    done = simulate(elements, {"T": nothing}, Start({"a": 10.0}), GRID, [], audit=True)
+    assert done.audit is not None
+    assert done.audit.shaft == pytest.approx(1e-5, rel=1e-10)
