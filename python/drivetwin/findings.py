@@ -116,6 +116,8 @@ class Code(StrEnum):
     SIMULATION_ENDED_EARLY = auto()
     SIMULATION_DIVERGES = auto()
     OUTSIDE_IDENTIFIED_RANGE = auto()
+    ACTUATOR_ASSUMED = auto()
+    ACTUATOR_FROM_TORQUE = auto()
     ACTUATOR_NOT_IDENTIFIED = auto()
     ACTUATOR_UNDETERMINED = auto()
     NOT_VALIDATED = auto()

@@ -10,7 +10,12 @@ from types import MappingProxyType
 from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
-from drivetwin.estimation.data.actuators import identify_actuators
+from drivetwin.estimation.data.actuators import (
+    FoundActuators,
+    LogShifts,
+    compute_missing_pressures,
+    identify_actuators,
+)
 from drivetwin.estimation.data.compare_logs import require_compatible
 from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
@@ -51,7 +56,8 @@ def identify(
     Returns
     -------
     Identification
-        `assumptions` and `settings["stated"]` record fixed values, priors and bounds.
+        The pressure of an element whose command alone is in the log follows from the command, by
+        the actuator of the card or the identified one. `assumptions` and `settings["stated"]` record fixed values, priors and bounds.
 
     Raises
     ------
@@ -73,8 +79,10 @@ def identify(
             "the paper's method takes no fixed values, priors and bounds",
             "use the integral or the likelihood method",
         )
+    actuators = identify_actuators([LogShifts(log, shifts.shifts)], card)
+    log = compute_missing_pressures(log, card, actuators.actuators)
     found = identify_prepared(_prepare_checked(log, apply_locks(card, locks), shifts), method)
-    found = attach_actuators(found, [log], card)
+    found = _attach_actuators(found, actuators)
     if not locks:
         return found
     return replace(
@@ -107,18 +115,22 @@ def identify_jointly(
     """
     require_compatible(logs)
     with scale_progress(0.0, 0.05, "preparing the logs"):
-        pairs = zip(logs, shifts, strict=True)
-        prepared = [_prepare_checked(log, card, found) for log, found in pairs]
+        pairs = list(zip(logs, shifts, strict=True))
+        actuators = identify_actuators([LogShifts(log, one.shifts) for log, one in pairs], card)
+        prepared = [
+            _prepare_checked(compute_missing_pressures(log, card, actuators.actuators), card, one)
+            for log, one in pairs
+        ]
     with scale_progress(0.05, 1.0):
-        return attach_actuators(identify_joint(prepared), logs, card)
+        return _attach_actuators(identify_joint(prepared), actuators)
 
 
-def attach_actuators(
-    found: Identification, logs: Sequence[ShiftLog], card: VehicleCard
-) -> Identification:
-    """Attach the actuators of the elements whose command and pressure the logs contain."""
-    actuators, findings = identify_actuators(logs, card)
-    return replace(found, actuators=actuators, findings=(*found.findings, *findings))
+def _attach_actuators(found: Identification, actuators: FoundActuators) -> Identification:
+    return replace(
+        found,
+        actuators=actuators.actuators,
+        findings=(*found.findings, *actuators.findings),
+    )
 
 
 def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLog:

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""Torque balance of a slipping clutch in a shift, for an actuator without measured pressure.
+
+The torque of the other clutch (index 1) is eliminated from both balances of the dual-clutch
+driveline (THEORY section 3), with i_out and α of both:
+
+    T_o + Jo' ω_out' = (i_1/α_1)·(η T_e - J' ω_e') + (i_2 - i_1 α_2/α_1)·T_2
+
+This holds whether the other clutch locks, slips or is open. η, J' and the age of T_e are unknown
+constants. It is integrated over time, so that no speed is differentiated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.actuator.from_torque import TorqueRecord
+from drivetwin.actuator.held_signal import HeldSignal
+from drivetwin.channels.shiftlog import Channel, ShiftLog
+from drivetwin.estimation.data.prepare_signal import prepare_signal
+from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.spec import compute_middle
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+_STEP = 1e-3
+"""Step [s] of the raster on which the clutch torque is computed."""
+_BLOCK = 5
+"""Samples of the raster of which means are compared."""
+_BEFORE = 0.6
+"""Time [s] before the torque phase from which the balance is used."""
+_GUARD = 0.005
+"""Time [s] kept from break-away and lock-up, beside three standard deviations."""
+_NEEDED = ("engine_torque", "output_torque", "output_speed")
+"""Roles that the balance needs, beside the speed of engine or input."""
+
+
+def build_torque_records(
+    log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift], element: str, command: HeldSignal
+) -> list[TorqueRecord]:
+    """Return the balance of a clutch in each shift in which it slips.
+
+    An on-coming clutch slips from before the shift until it locks, an off-going one from the start
+    of the inertia phase. Shifts with too few samples have no balance.
+    """
+    found = []
+    for shift in shifts:
+        end = shift.lockup_time - _GUARD - 3.0 * shift.sigma.get("lockup", 0.0)
+        if element == shift.oncoming:
+            start, other = shift.torque_phase[0] - _BEFORE, shift.offgoing
+        elif element == shift.offgoing:
+            guard = _GUARD + 3.0 * shift.sigma.get("inertia_start", 0.0)
+            start, other = shift.inertia_phase[0] + guard, shift.oncoming
+        else:
+            continue
+        clutches = _Clutch.from_card(card, element), _Clutch.from_card(card, other)
+        one = _build_record(log, card, (max(start, shift.before[0]), end), clutches, command)
+        found += [] if one is None else [one]
+    return found
+
+
+@dataclass(frozen=True)
+class _Clutch:
+    """Ratios of a clutch: i_c, i_out and α = 1/(i_in i_c)."""
+
+    i_c: float
+    i_out: float
+    alpha: float
+
+    @classmethod
+    def from_card(cls, card: VehicleCard, element: str) -> _Clutch:
+        i_c, i_out = card.get_clutch_ratios(element)
+        return cls(i_c, i_out, 1.0 / (card.i_in * i_c))
+
+
+def _build_record(
+    log: ShiftLog,
+    card: VehicleCard,
+    span: tuple[float, float],
+    clutches: tuple[_Clutch, _Clutch],
+    command: HeldSignal,
+) -> TorqueRecord | None:
+    role, factor = ("engine_speed", 1.0) if "engine_speed" in log else ("input_speed", card.i_in)
+    if any(one not in log for one in (*_NEEDED, role)):
+        return None
+    count = int((span[1] - span[0]) / _STEP) // _BLOCK * _BLOCK
+    time: FloatArray = span[0] + _STEP * np.arange(count, dtype=np.float64)
+    torque, output, out_speed, speed = (
+        log[one].updates.interpolate(time) for one in (*_NEEDED, role)
+    )
+    if count < 2 or not np.isfinite(torque + output + out_speed + speed).all():
+        return None
+    speed = factor * speed
+    own, other = clutches
+    J_out = 0.0 if card.J_out is None else card.J_out.value
+    driven = other.i_out / other.alpha
+    integral = cumulative_trapezoid(np.column_stack([output, torque]), time, axis=0, initial=0.0)
+    noise = {one: prepare_signal(log[one]).sigma for one in (*_NEEDED, role)}
+    drift = _grow_drift(log["output_torque"].updates, noise["output_torque"], time)
+    drift += driven**2 * _grow_drift(
+        log["engine_torque"].updates, noise["engine_torque"], time
+    )
+    averaged = max(_BLOCK * _STEP / log[role].updates.step, 1.0)
+    inertia = compute_middle(card.J_prime_range)
+    return TorqueRecord(
+        command=command,
+        time=time,
+        slip=speed / card.i_in / own.i_c - own.i_out * out_speed,
+        target=integral[:, 0] + J_out * out_speed,
+        regressors=driven * np.column_stack([integral[:, 1], torque, speed]),
+        lever=own.i_out - driven * own.alpha,
+        white=driven * inertia * factor * noise[role] / np.sqrt(averaged),
+        drift=drift,
+        block=_BLOCK,
+    )
+
+
+def _grow_drift(torque: Channel, sigma: float, time: FloatArray) -> FloatArray:
+    """Variance [(N·m·s)²] of the integral of a sampled torque since `time[0]`, at `time` (n,).
+
+    Each interval h adds that of the noise and that of a change ΔT at an unknown instant in it,
+    (σ h)² + (ΔT h)²/12.
+    """
+    step = np.diff(torque.time)
+    added = (sigma * step) ** 2 + (np.diff(torque.values) * step) ** 2 / 12.0
+    total = np.interp(time, torque.time, np.concatenate([[0.0], np.cumsum(added)]))
+    return np.asarray(total - total[0], dtype=np.float64)
