@@ -135,7 +135,7 @@ class MadeVehicle:
 def make_vehicle(seed: int, *, whole: bool = True) -> MadeVehicle:
     """Make the vehicle of `seed`, its log and the twin; without `whole` it has no effect."""
     drawn = draw_vehicle(seed)
-    scenario = _add_hydraulics(drawn.scenario, np.random.default_rng([seed, 41]))
+    scenario = add_hydraulics(drawn.scenario, np.random.default_rng([seed, 41]))
     effect = EFFECTS[seed % len(EFFECTS)]
     effects = {effect: draw_size(seed, effect, 1.0)} if whole else {}
     recorded = misread(run(scenario, seed, effects=effects), seed)
@@ -208,7 +208,7 @@ def _simulate(
     return made.simulate(shift, Signal(shift.time, torque), pressures, time)
 
 
-def _add_hydraulics(scenario: Scenario, random: np.random.Generator) -> Scenario:
+def add_hydraulics(scenario: Scenario, random: np.random.Generator) -> Scenario:
     """Put controlled actuators and their commands in the place of the drawn ones."""
     going, coming = (scenario.get_element(gear.element) for gear in scenario.gears)
     common = {

@@ -57,7 +57,8 @@ def identify(
     -------
     Identification
         The pressure of an element whose command alone is in the log follows from the command, by
-        the actuator of the card or the identified one. `assumptions` and `settings["stated"]` record fixed values, priors and bounds.
+        the actuator of the card or the identified one. `assumptions` and `settings["stated"]`
+        record fixed values, priors and bounds.
 
     Raises
     ------

@@ -29,7 +29,8 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.identify import LEAST_KISS, ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
-from drivetwin.actuator.search import Fit, Unknowns, estimate_covariance, search_actuator
+from drivetwin.actuator.posterior import sample_posterior
+from drivetwin.actuator.search import Fit, Unknowns, search_actuator
 from drivetwin.errors import IdentificationError
 
 
@@ -78,11 +79,11 @@ _RCOND = 1e-8
 class TorqueRecord:
     """Torque balance of a slipping clutch, integrated over time: a balance of momentum.
 
-    target = regressors·constants + lever·∫T dt + an initial value, with target (n,) and
-    regressors (n, k) in N·m·s, and `slip` (n,) [rad/s], at evenly spaced `time` (n,) [s]. Means
-    over blocks of `block` samples are compared. `lever` is the factor of T in the balance. The
-    noise of a mean is `white` [N·m·s] by the speeds; by the torques its variance is `drift` (n,)
-    [(N·m·s)²], which grows with time.
+    target = regressors·constants + lever·∫T dt/J + an initial value, with the speed target (n,)
+    [rad/s], regressors (n, k) [N·m·s] and `slip` (n,) [rad/s] at evenly spaced `time` (n,) [s]. The
+    inertia J is unknown. Means over blocks of `block` samples are compared. `lever` is the factor of
+    T in the balance. The noise of a mean is `white` [rad/s]; by the torques, its variance grows
+    with time: `drift` (n,) [(rad/s)²].
     """
 
     command: HeldSignal
@@ -144,7 +145,7 @@ def identify_from_torque(
             "record longer shifts, with speeds and torques at 100 Hz or more",
         )
     expected = max(P0.mean, LEAST_KISS)
-    fit = estimate_covariance(residuals, search_actuator(residuals, expected))
+    fit = sample_posterior(residuals, search_actuator(residuals, expected))
     residuals.require_fit(fit)
     found = IdentifiedActuator.from_fit(fit, P0.mean)
     return replace(found, source=ActuatorSource.TORQUE)
@@ -178,7 +179,7 @@ def _list_unknowns(P0: Prior) -> Unknowns:
 
 @dataclass(frozen=True, eq=False)
 class _Residuals:
-    """Residuals [N·m·s] of all records, without what the linear coefficients explain."""
+    """Residuals of all records over their noise, without what the linear coefficients explain."""
 
     records: tuple[TorqueRecord, ...]
     unknowns: Unknowns

@@ -184,7 +184,7 @@ def estimate_covariance(residuals: Residuals, values: FloatArray) -> Fit:
     variance = float(left @ left) / max(left.size - values.size - residuals.linear, 1)
     influential = np.linalg.norm(slopes, axis=0) > _DETERMINED * np.sqrt(variance)
     columns = slopes[:, influential]
-    information = columns.T @ columns / max(variance * _compute_inflation(left), 1e-300)
+    information = columns.T @ columns / max(variance * compute_inflation(left), 1e-300)
     information += np.diag((known.size / known.std)[influential] ** 2)
     covariance = np.zeros((values.size, values.size))
     covariance[np.ix_(influential, influential)] = np.linalg.pinv(information)
@@ -193,7 +193,7 @@ def estimate_covariance(residuals: Residuals, values: FloatArray) -> Fit:
     return Fit(values, covariance, float(np.sqrt(variance)), left.size)
 
 
-def _compute_inflation(left: FloatArray) -> float:
+def compute_inflation(left: FloatArray) -> float:
     """Factor on the variance of a mean by the autocorrelation of the residuals, at least 1.
 
     The sum of the autocorrelations ends at the first that is not above chance (2/√n).

@@ -20,7 +20,7 @@ from drivetwin.actuator.identify import (
     identify_actuator,
 )
 from drivetwin.actuator.model import QUANTITIES
-from drivetwin.channels.command_pressure import compute_pressure_channel, get_held_command
+from drivetwin.channels.command_pressure import add_missing_pressures, get_held_command
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError
@@ -109,10 +109,15 @@ def _copy_hydraulics(
 def _identify_one(
     logs: Sequence[LogShifts], card: VehicleCard, element: str
 ) -> IdentifiedActuator | None:
-    """Identify from measured pressures, else from torques; None without any."""
+    """Identify from measured pressures, else from torques.
+
+    None without any, and where the card states what pressures alone could improve.
+    """
     P0 = card.elements[element].P0
     if pressures := _collect_pressures(logs, element):
         return identify_actuator(pressures, P0.value)
+    if card.elements[element].actuator is not None:
+        return None
     if torques := _collect_torques(logs, card, element):
         return identify_from_torque(torques, Prior(P0.value, P0.std))
     return None
@@ -147,13 +152,8 @@ def compute_missing_pressures(
 ) -> ShiftLog:
     """Add the pressures that the log lacks, from its commands.
 
-    The actuator of an element is that of the card where it states one, else the identified one.
+    The actuator of an element is the identified one, else that of the card.
     """
-    added = {}
-    for name, element in card.elements.items():
-        role, command = make_pressure_role(name), make_command_role(name)
-        identified = actuators.get(name)
-        model = element.actuator or (identified.model if identified is not None else None)
-        if role not in log and command in log and model is not None:
-            added[role] = compute_pressure_channel(log[command], model, name)
-    return replace(log, channels={**log.channels, **added}) if added else log
+    stated = {n: one.actuator for n, one in card.elements.items() if one.actuator is not None}
+    identified = {name: one.model for name, one in actuators.items()}
+    return add_missing_pressures(log, {**stated, **identified})

@@ -7,7 +7,8 @@ driveline (THEORY section 3), with i_out and α of both:
     T_o + Jo' ω_out' = (i_1/α_1)·(η T_e - J' ω_e') + (i_2 - i_1 α_2/α_1)·T_2
 
 This holds whether the other clutch locks, slips or is open. η, J' and the age of T_e are unknown
-constants. It is integrated over time, so that no speed is differentiated.
+constants. It is integrated over time, so that no speed is differentiated, and solved for ω_e, whose
+noise is by far the largest: as a regressor it would bias J'.
 """
 
 from __future__ import annotations
@@ -101,20 +102,19 @@ def _build_record(
     integral = cumulative_trapezoid(np.column_stack([output, torque]), time, axis=0, initial=0.0)
     noise = {one: prepare_signal(log[one]).sigma for one in (*_NEEDED, role)}
     drift = _grow_drift(log["output_torque"].updates, noise["output_torque"], time)
-    drift += driven**2 * _grow_drift(
-        log["engine_torque"].updates, noise["engine_torque"], time
-    )
+    drift += driven**2 * _grow_drift(log["engine_torque"].updates, noise["engine_torque"], time)
     averaged = max(_BLOCK * _STEP / log[role].updates.step, 1.0)
-    inertia = compute_middle(card.J_prime_range)
     return TorqueRecord(
         command=command,
         time=time,
         slip=speed / card.i_in / own.i_c - own.i_out * out_speed,
-        target=integral[:, 0] + J_out * out_speed,
-        regressors=driven * np.column_stack([integral[:, 1], torque, speed]),
+        target=speed,
+        regressors=np.column_stack(
+            [integral[:, 0] + J_out * out_speed, driven * integral[:, 1], driven * torque]
+        ),
         lever=own.i_out - driven * own.alpha,
-        white=driven * inertia * factor * noise[role] / np.sqrt(averaged),
-        drift=drift,
+        white=factor * noise[role] / np.sqrt(averaged),
+        drift=drift / (driven * compute_middle(card.J_prime_range)) ** 2,
         block=_BLOCK,
     )
 
