@@ -70,7 +70,9 @@ class _Tally:
 
     def list_rows(self) -> Iterator[tuple[str, int, int, float]]:
         """Name, number of intervals, number of those that hold the truth, median half width."""
-        errors, widths = np.abs(np.array(self.errors)), np.array(self.widths)
+        shape = (-1, len(QUANTITIES))
+        errors = np.abs(np.reshape(self.errors, shape))
+        widths = np.reshape(self.widths, shape)
         for k, name in enumerate(QUANTITIES):
             known = np.isfinite(widths[:, k])
             held = int((errors[known, k] <= widths[known, k]).sum())
@@ -93,6 +95,8 @@ def main() -> int:
             assert isinstance(actuator, ControlledActuator)
             if gear.element in found:
                 tally.add(found[gear.element], actuator.model.values)
+        counts = [sum(held for _, _, held, _ in one.list_rows()) for one in tallies.values()]
+        sys.stderr.write(f"{seed + 1} logs, {sum(counts)} intervals hold, {cpu:.0f} s of CPU\n")
     total = held = 0
     for clutch, tally in tallies.items():
         sys.stdout.write(f"{clutch} clutch: identified in {len(tally.errors)} of {count} logs\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Optimisers that are compared: the product's, CMA-ES alone, and L-BFGS, from one start."""
+"""Optimisers that are compared, from one start: the product's, CMA-ES alone, L-BFGS, Optuna."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from importlib import import_module
 
 import numpy as np
 from scipy.optimize import minimize
@@ -115,6 +116,27 @@ def run_lbfgs(task: Task, fresh: Scenarios, limit: float) -> Entry:
             at = np.clip(start + 0.12 * random.standard_normal(start.size), 0.0, 1.0)
 
     return _run_within("L-BFGS", task, (plant, fresh), limit, search)
+
+
+def run_optuna(task: Task, fresh: Scenarios, limit: float) -> Entry | None:
+    """Run Optuna's tree-structured Parzen estimator; None where Optuna is not installed."""
+    try:
+        optuna = import_module("optuna")
+    except ModuleNotFoundError:
+        return None
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+
+    def search(evaluate: Evaluate, start: FloatArray) -> None:
+        names = [f"x{k}" for k in range(start.size)]
+        sampler = optuna.samplers.TPESampler(seed=task.seed, multivariate=True)
+        study = optuna.create_study(sampler=sampler)
+        study.enqueue_trial(dict(zip(names, start.tolist(), strict=True)))
+        while True:
+            trial = study.ask()
+            at = np.array([trial.suggest_float(name, 0.0, 1.0) for name in names])
+            study.tell(trial, evaluate([at])[0])
+
+    return _run_within("Optuna, TPE", task, (make_quick_plant(task), fresh), limit, search)
 
 
 def run_start(task: Task, fresh: Scenarios) -> Entry:

@@ -20,9 +20,9 @@ from drivetwin.actuator.search import Fit, Residuals, compute_inflation
 class SamplingSettings:
     """Length and step of the chain."""
 
-    samples: int = 6000
+    samples: int = 4000
     """Number of samples that count."""
-    burn_in: int = 2000
+    burn_in: int = 1000
     """Number of samples before them."""
     update: int = 200
     """Number of samples after which the proposals are adapted."""

@@ -113,7 +113,7 @@ def search_actuator(residuals: Residuals, expected_kiss: float) -> FloatArray:
     all starts of the other parameters, and finely with those that the first fit has found.
     """
     known = residuals.unknowns
-    others = np.where(np.isinf(known.std), 0.0, known.mean)[len(QUANTITIES) :]
+    others = known.mean[len(QUANTITIES) :]
     kisses, fills = np.array(SEARCH.kiss_shares) * expected_kiss, np.array(SEARCH.fill_times)
     first = [
         np.concatenate([[dead, lag, lag, 1.0, kiss, fill, 1e4], others])
