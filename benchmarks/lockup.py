@@ -93,16 +93,18 @@ def format_row(name: str, clutch: LockupClutch, fitted: SlipRecord, other: SlipR
 
 def format_clutch(found: IdentifiedLockup) -> str:
     """Identified values with 95 % intervals."""
-    actuator, clutch = found.actuator, found.clutch
-    std = dict(zip(QUANTITIES, Z95 * actuator.std, strict=True))
-    model, own = actuator.model, Z95 * found.std
+    model, clutch = found.actuator.model, found.clutch
+    std = dict(zip(QUANTITIES, Z95 * found.actuator.std, strict=True))
+    own = Z95 * found.std
+    lags = [2e3 * model.damping * one for one in (model.rising_lag, model.falling_lag)]
     return (
         f"dead time {1e3 * model.dead_time:.0f} ± {1e3 * std['dead_time']:.0f} ms, "
-        f"mean lag {2e3 * model.damping * model.rising_lag:.0f} ± {2e3 * std['rising_lag']:.0f} ms "
-        f"rising, {2e3 * model.damping * model.falling_lag:.0f} ± {2e3 * std['falling_lag']:.0f} ms "
-        f"falling, kiss {model.kiss_pressure / _MBAR:.0f} ± {std['kiss_pressure'] / _MBAR:.0f} "
-        f"mbar, kinetic {_MBAR * clutch.kinetic:.2f} ± {_MBAR * own[0]:.2f} N·m/mbar, static over "
-        f"kinetic {clutch.peak:.2f} ± {own[1]:.2f}, J {clutch.inertia:.2f} ± {own[2]:.2f} kg·m²\n"
+        f"mean lag {lags[0]:.0f} ± {2e3 * std['rising_lag']:.0f} ms rising, "
+        f"{lags[1]:.0f} ± {2e3 * std['falling_lag']:.0f} ms falling, "
+        f"kiss {model.kiss_pressure / _MBAR:.0f} ± {std['kiss_pressure'] / _MBAR:.0f} mbar, "
+        f"kinetic {_MBAR * clutch.kinetic:.2f} ± {_MBAR * own[0]:.2f} N·m/mbar, "
+        f"static over kinetic {clutch.peak:.2f} ± {own[1]:.2f}, "
+        f"J {clutch.inertia:.2f} ± {own[2]:.2f} kg·m²\n"
     )
 
 

@@ -21,7 +21,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.calibrate.optimizers import Entry, run_cma, run_lbfgs, run_optuna, run_product, run_start
+from benchmarks.calibrate.optimizers import (
+    Entry,
+    run_cma,
+    run_lbfgs,
+    run_optuna,
+    run_product,
+    run_start,
+)
 from benchmarks.calibrate.statement import (
     CERTIFICATE_SEED,
     CPU,

@@ -30,34 +30,14 @@ from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.identify import LEAST_KISS, ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.actuator.posterior import sample_posterior
-from drivetwin.actuator.search import Fit, Unknowns, search_actuator
+from drivetwin.actuator.search import Fit, Prior, Unknowns, search_actuator
 from drivetwin.errors import IdentificationError
 
 
 @dataclass(frozen=True)
-class Prior:
-    """Mean and standard deviation of a usual range."""
-
-    mean: float
-    std: float
-
-
-@dataclass(frozen=True)
 class TorqueFitSettings:
-    """Priors of usual valves and clutches, and limits of a fit."""
+    """Limits of a fit."""
 
-    dead_time: Prior = Prior(0.04, 0.03)
-    """Dead time [s]."""
-    lag: Prior = Prior(0.03, 0.02)
-    """Lag of each direction [s]."""
-    damping: Prior = Prior(1.0, 0.25)
-    """Damping ratio."""
-    hysteresis: Prior = Prior(1.5e4, 1e4)
-    """Hysteresis [Pa]."""
-    fill_time: Prior = Prior(0.15, 0.1)
-    """Fill time [s]."""
-    contact: Prior = Prior(5e3, 5e3)
-    """P0 minus the kiss pressure [Pa]."""
     P0_error: float = 1e4
     """Error of a design value of P0 [Pa]."""
     slip_scale: float = 15.0
@@ -69,6 +49,16 @@ class TorqueFitSettings:
 
 
 TORQUE_FIT = TorqueFitSettings()
+_USUAL = {
+    "dead_time": Prior(0.04, 0.03),
+    "rising_lag": Prior(0.03, 0.02),
+    "falling_lag": Prior(0.03, 0.02),
+    "damping": Prior(1.0, 0.25),
+    "fill_time": Prior(0.15, 0.1),
+    "hysteresis": Prior(1.5e4, 1e4),
+}
+_CONTACT = Prior(5e3, 5e3)
+"""Usual ranges of actuators, and of P0 minus the kiss pressure, SI."""
 _NOISE = 2.0
 """Root mean square residual over its expected noise that is never refused."""
 _RCOND = 1e-8
@@ -80,10 +70,10 @@ class TorqueRecord:
     """Torque balance of a slipping clutch, integrated over time: a balance of momentum.
 
     target = regressors·constants + lever·∫T dt/J + an initial value, with the speed target (n,)
-    [rad/s], regressors (n, k) [N·m·s] and `slip` (n,) [rad/s] at evenly spaced `time` (n,) [s]. The
-    inertia J is unknown. Means over blocks of `block` samples are compared. `lever` is the factor of
-    T in the balance. The noise of a mean is `white` [rad/s]; by the torques, its variance grows
-    with time: `drift` (n,) [(rad/s)²].
+    [rad/s], regressors (n, k) [N·m·s] and `slip` (n,) [rad/s] at evenly spaced `time` (n,) [s]. J
+    is unknown. Means over blocks of `block` samples are compared. `lever` is the factor of T in the
+    balance. The noise of a mean is `white` [rad/s]; by the torques, its variance grows with time:
+    `drift` (n,) [(rad/s)²].
     """
 
     command: HeldSignal
@@ -123,9 +113,7 @@ class TorqueRecord:
         return self.whiten(cumulative_trapezoid(rates, self.time, axis=0, initial=0.0))
 
 
-def identify_from_torque(
-    records: Sequence[TorqueRecord], P0: Prior
-) -> IdentifiedActuator:
+def identify_from_torque(records: Sequence[TorqueRecord], P0: Prior) -> IdentifiedActuator:
     """Identify the actuator of one clutch from the torque balance of its shifts.
 
     Parameters
@@ -153,23 +141,13 @@ def identify_from_torque(
 
 def _list_unknowns(P0: Prior) -> Unknowns:
     """Parameters of the actuator with their priors, and P0 minus the kiss pressure."""
-    usual, bounds = TORQUE_FIT, Unknowns.of_actuator()
-    kiss = Prior(
-        P0.mean - usual.contact.mean, hypot(P0.std, usual.P0_error, usual.contact.std)
-    )
-    priors = {
-        "dead_time": usual.dead_time,
-        "rising_lag": usual.lag,
-        "falling_lag": usual.lag,
-        "damping": usual.damping,
-        "kiss_pressure": kiss,
-        "fill_time": usual.fill_time,
-        "hysteresis": usual.hysteresis,
-    }
-    ordered = [*(priors[name] for name in QUANTITIES), usual.contact]
-    reach = 10.0 * usual.contact.std
+    bounds = Unknowns.of_actuator()
+    std = hypot(P0.std, TORQUE_FIT.P0_error, _CONTACT.std)
+    priors = {**_USUAL, "kiss_pressure": Prior(P0.mean - _CONTACT.mean, std)}
+    ordered = [*(priors[name] for name in QUANTITIES), _CONTACT]
+    reach = 10.0 * _CONTACT.std
     return Unknowns(
-        np.append(bounds.size, usual.contact.std),
+        np.append(bounds.size, _CONTACT.std),
         np.append(bounds.lower, -reach),
         np.append(bounds.upper, reach),
         np.array([one.mean for one in ordered]),

@@ -67,8 +67,8 @@ class IdentifiedActuator:
     """Model of an actuator with the covariance (7, 7) of its values, in the order of `QUANTITIES`.
 
     A parameter that the record does not determine has an infinite variance; one from a vehicle
-    card has none. `rms` [Pa] is the root mean square residual, that of a torque over the torque per
-    pressure; `samples` counts the used ones.
+    card has none. `rms` is the root mean square residual: of a pressure [Pa], of a torque balance
+    over its noise. `samples` counts the used ones.
     """
 
     model: ActuatorModel

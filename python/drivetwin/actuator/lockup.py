@@ -20,37 +20,31 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.from_torque import Prior
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.actuator.posterior import sample_posterior
-from drivetwin.actuator.search import Unknowns
+from drivetwin.actuator.search import Prior, Unknowns
 from drivetwin.errors import IdentificationError
 
 _STEP = 2e-3
 """Step [s] of the simulation."""
-_KISS = 0.7
-"""Usual kiss pressure over the least command."""
+_KISS, _KISS_STD = 0.7, 0.2
+"""Mean and standard deviation of the kiss pressure over the least command."""
 _REACH, _GENERATIONS = 3.0, 60
 """Range of the search over the priors' standard deviations, and its length."""
 
 
-@dataclass(frozen=True)
-class LockupPriors:
-    """Usual ranges of lock-up clutches, SI."""
-
-    dead_time: Prior = Prior(0.05, 0.04)
-    lag: Prior = Prior(0.06, 0.03)
-    damping: Prior = Prior(1.0, 0.1)
-    hysteresis: Prior = Prior(5e3, 5e3)
-    inertia: Prior = Prior(0.25, 0.1)
-    fluid: Prior = Prior(5.0, 5.0)
-    peak: Prior = Prior(1.2, 0.1)
-    """Static over kinetic friction."""
-
-
-PRIORS = LockupPriors()
+_USUAL = {
+    "dead_time": Prior(0.05, 0.04),
+    "rising_lag": Prior(0.06, 0.03),
+    "falling_lag": Prior(0.06, 0.03),
+    "damping": Prior(1.0, 0.1),
+    "fill_time": Prior(1e-3, 1e-3),  # the clutch is filled throughout
+    "hysteresis": Prior(5e3, 5e3),
+}
+_PEAK, _INERTIA, _FLUID = Prior(1.2, 0.1), Prior(0.25, 0.1), Prior(5.0, 5.0)
+"""Usual ranges of lock-up clutches, SI."""
 
 
 @dataclass(frozen=True)
@@ -163,11 +157,9 @@ def _list_unknowns(records: Sequence[SlipRecord]) -> Unknowns:
     bounds = Unknowns.of_actuator()
     least = min(float(one.command.values.min()) for one in records)
     ratio = max(float(np.abs(one.torque).max() / one.command.values.max()) for one in records)
-    usual = PRIORS
-    kiss, kinetic = Prior(_KISS * least, 0.2 * least), Prior(2.0 * ratio, 2.0 * ratio)
-    none = Prior(1e-3, 1e-3)  # the clutch is filled throughout
-    ordered = [usual.dead_time, usual.lag, usual.lag, usual.damping, kiss, none, usual.hysteresis]
-    ordered += [kinetic, usual.peak, usual.inertia, usual.fluid]
+    usual = {**_USUAL, "kiss_pressure": Prior(_KISS * least, _KISS_STD * least)}
+    ordered = [usual[name] for name in QUANTITIES]
+    ordered += [Prior(2.0 * ratio, 2.0 * ratio), _PEAK, _INERTIA, _FLUID]
     mean = np.array([one.mean for one in ordered])
     return Unknowns(
         np.append(bounds.size, [0.2 * ratio, 0.1, 0.05, 0.5]),

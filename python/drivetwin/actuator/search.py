@@ -48,6 +48,14 @@ _KISS, _FILL = (list(QUANTITIES).index(name) for name in ("kiss_pressure", "fill
 _ACTUATOR_SCALE = (0.01, 0.02, 0.02, 0.5, 5e4, 0.05, 2e4)
 
 
+@dataclass(frozen=True)
+class Prior:
+    """Mean and standard deviation of a usual range."""
+
+    mean: float
+    std: float
+
+
 @dataclass(frozen=True, eq=False)
 class Unknowns:
     """Usual size, bounds and prior (k,) of each unknown, SI, those of the actuator first.
@@ -117,7 +125,9 @@ def search_actuator(residuals: Residuals, expected_kiss: float) -> FloatArray:
     kisses, fills = np.array(SEARCH.kiss_shares) * expected_kiss, np.array(SEARCH.fill_times)
     first = [
         np.concatenate([[dead, lag, lag, 1.0, kiss, fill, 1e4], others])
-        for dead, lag, kiss, fill in product(SEARCH.dead_times, SEARCH.lags, kisses[::4], fills[::2])
+        for dead, lag, kiss, fill in product(
+            SEARCH.dead_times, SEARCH.lags, kisses[::4], fills[::2]
+        )
     ]
     fit = _fit_best(residuals, first)
     second = []

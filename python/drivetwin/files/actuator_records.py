@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, FiniteFloat, model_validator
 
-from drivetwin.actuator.identify import IdentifiedActuator
+from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.files.records import CovarianceRecord, Record
 
@@ -24,13 +24,17 @@ class ActuatorValueRecord(Record):
 class ActuatorRecord(Record):
     """Actuator of an element: parameters by name, covariance, root mean square residual.
 
-    `samples` is 0 for design values of the vehicle card, which have a `std` of 0.
+    `source` is what it is identified from beside the command. The residual of a pressure is
+    `rms_Pa`, that of a torque balance `rms_over_noise`. `samples` is 0 for design values of the
+    vehicle card, which have a `std` of 0, and for the assumed values of another element.
     """
 
     parameters: dict[str, ActuatorValueRecord]
     covariance: CovarianceRecord
     rms_Pa: FiniteFloat = Field(default=0.0, ge=0)
+    rms_over_noise: FiniteFloat = Field(default=0.0, ge=0)
     samples: int = Field(default=0, ge=0)
+    source: ActuatorSource = ActuatorSource.PRESSURE
 
     @model_validator(mode="before")
     @classmethod
@@ -52,8 +56,9 @@ class ActuatorRecord(Record):
                 "ids": [name for name, one in zip(names, known, strict=True) if one],
                 "matrix": source.covariance[np.ix_(known, known)].tolist(),
             },
-            "rms_Pa": source.rms,
+            "rms_over_noise" if source.source is ActuatorSource.TORQUE else "rms_Pa": source.rms,
             "samples": source.samples,
+            "source": source.source,
         }
 
     @model_validator(mode="after")
@@ -80,5 +85,6 @@ class ActuatorRecord(Record):
         )
         for k in set(range(len(names))) - set(index):
             covariance[k, k] = np.inf
+        rms = self.rms_over_noise if self.source is ActuatorSource.TORQUE else self.rms_Pa
         model = ActuatorModel(**{name: one.value for name, one in self.parameters.items()})
-        return IdentifiedActuator(model, covariance, self.rms_Pa, self.samples)
+        return IdentifiedActuator(model, covariance, rms, self.samples, self.source)

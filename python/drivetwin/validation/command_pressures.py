@@ -11,6 +11,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import MissingChannelError, MissingParameterError, Where
 from drivetwin.twin.twin import Twin
 
+
 def replace_pressures(twin: Twin, log: ShiftLog) -> tuple[ShiftLog, tuple[str, ...]]:
     """Return the log with the pressures that follow from its commands, and their elements.
 

@@ -8,14 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.actuator.identify import ActuatorSource
 from drivetwin.actuator.model import QUANTITIES
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.data.actuators import identify_actuators
+from drivetwin.estimation.data.actuators import (
+    FoundActuators,
+    LogShifts,
+    compute_missing_pressures,
+    identify_actuators,
+)
 from drivetwin.findings import Code
+from drivetwin.shifts.detect import detect_shifts
 from tests.report.sample import card
 
 BENCH = run(load_scenario(ScenarioName.HYDRAULICS), seed=3)
@@ -26,8 +33,13 @@ def log() -> ShiftLog:
     return ShiftLog({one.role: one for one in BENCH.channels}, "made.csv", "0" * 64)
 
 
+def _identify(log: ShiftLog) -> FoundActuators:
+    return identify_actuators([LogShifts(log, ())], card())
+
+
 def test_commands_and_pressures_give_the_true_actuator(log: ShiftLog) -> None:
-    found, findings = identify_actuators([log], card())
+    result = _identify(log)
+    found, findings = result.actuators, result.findings
     truth = BENCH.truth.actuators
     assert set(found) == set(truth) == {"B2", "B3"}
     for name in ("dead_time", "falling_lag", "damping"):
@@ -42,14 +54,16 @@ def test_commands_and_pressures_give_the_true_actuator(log: ShiftLog) -> None:
 
 def test_without_a_command_there_is_none(log: ShiftLog) -> None:
     channels = {role: one for role, one in log.channels.items() if "command" not in role}
-    assert identify_actuators([replace(log, channels=channels)], card()) == ({}, ())
+    result = _identify(replace(log, channels=channels))
+    assert (dict(result.actuators), result.findings) == ({}, ())
 
 
 def test_a_command_of_another_clutch_is_reported(log: ShiftLog) -> None:
     command, pressure = log[make_command_role("B3")], log[make_pressure_role("B3")]
     reversed_ = replace(pressure, values=pressure.values[::-1].copy())
     channels = {command.role: command, pressure.role: reversed_}
-    found, findings = identify_actuators([replace(log, channels=channels)], card())
+    result = _identify(replace(log, channels=channels))
+    found, findings = result.actuators, result.findings
     assert found == {}
     assert [one.code for one in findings] == [Code.ACTUATOR_NOT_IDENTIFIED]
     assert "pressure_command.B3" in findings[0].text
@@ -62,5 +76,23 @@ def test_values_that_are_missing_are_left_out(log: ShiftLog) -> None:
     holed = replace(log[role], values=gone)
     pressure = make_pressure_role("B3")
     channels = {role: holed, pressure: log[pressure]}
-    found, _ = identify_actuators([replace(log, channels=channels)], card())
+    found = _identify(replace(log, channels=channels)).actuators
     assert set(found) == {"B3"}
+
+
+def test_without_pressures_torques_determine_the_delay_of_the_oncoming_clutch() -> None:
+    kept = {one.role: one for one in BENCH.channels if not one.role.startswith("pressure.")}
+    log = ShiftLog(kept, "made.csv", "0" * 64)
+    known = card()
+    result = identify_actuators([LogShifts(log, detect_shifts(log, known).shifts)], known)
+    found, truth = result.actuators["B3"], BENCH.truth.actuators["B3"]
+    assert found.source is ActuatorSource.TORQUE
+    assert (np.abs(found.model.values - truth.values) < 3.5 * found.std).all()
+    assert found.std[list(QUANTITIES).index("dead_time")] < 0.02
+    assert Code.ACTUATOR_FROM_TORQUE in {one.code for one in result.findings}
+    assert set(result.actuators) == {"B2", "B3"}
+    pressures = compute_missing_pressures(log, known, result.actuators)
+    measured = next(one for one in BENCH.channels if one.role == "pressure.B3")
+    left = pressures["pressure.B3"].interpolate(measured.time) - measured.values
+    shift = (measured.time > 2.2) & (measured.time < 2.6)
+    assert np.sqrt(np.nanmean(left[shift] ** 2)) < 0.1 * np.ptp(measured.values[shift])

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.actuator.from_torque import Prior, TorqueRecord, identify_from_torque
+from drivetwin.actuator.from_torque import TorqueRecord, identify_from_torque
 from drivetwin.actuator.identify import (
     ActuatorSource,
     IdentifiedActuator,
@@ -20,6 +20,7 @@ from drivetwin.actuator.identify import (
     identify_actuator,
 )
 from drivetwin.actuator.model import QUANTITIES
+from drivetwin.actuator.search import Prior
 from drivetwin.channels.command_pressure import add_missing_pressures, get_held_command
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
@@ -67,7 +68,9 @@ def identify_actuators(logs: Sequence[LogShifts], card: VehicleCard) -> FoundAct
     for name, why in refused.items():
         if name not in assumed:
             findings.append(report(Code.ACTUATOR_NOT_IDENTIFIED, name, why=why))
-    findings += [report(Code.ACTUATOR_ASSUMED, name, other=other) for name, other in assumed.items()]
+    findings += [
+        report(Code.ACTUATOR_ASSUMED, name, other=other) for name, other in assumed.items()
+    ]
     like = {name: _copy_hydraulics(found[other], card, name) for name, other in assumed.items()}
     return FoundActuators({**found, **like}, tuple(findings))
 
@@ -88,7 +91,10 @@ def _assume_others(
     return {
         name: others[0]
         for name, element in card.elements.items()
-        if others and name not in found and element.actuator is None and _has_command_only(logs, name)
+        if others
+        and name not in found
+        and element.actuator is None
+        and _has_command_only(logs, name)
     }
 
 

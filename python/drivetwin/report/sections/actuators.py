@@ -6,7 +6,7 @@ from __future__ import annotations
 from math import isinf
 
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.actuator.identify import IdentifiedActuator
+from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorQuantity
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95
@@ -19,8 +19,9 @@ def build_actuator_section(found: Identification) -> Section:
     return Section(
         "actuators",
         "Actuators",
-        "Commanded to measured pressure: hysteresis of the valve, dead time, fill of the clutch "
-        "against its spring, second-order lag. The dead time includes that of the pressure sensor.",
+        "Commanded to clutch pressure: hysteresis of the valve, dead time, fill of the clutch "
+        "against its spring, second-order lag. The dead time includes that of a "
+        "pressure sensor.",
         blocks,
     )
 
@@ -31,8 +32,12 @@ def _build_table(name: str, one: IdentifiedActuator) -> TableBlock:
         _build_row(spec, value, std)
         for spec, value, std in zip(QUANTITIES.values(), values, stds, strict=True)
     ]
-    rms = format_with_unit(one.rms, "Pa", digits=3)
-    caption = f"Actuator of {name}: {one.samples} samples, residual {rms} rms"
+    if one.source is ActuatorSource.TORQUE:
+        caption = f"Actuator of {name}, from command and clutch torque: {one.samples} values, "
+        caption += f"residual {one.rms:.2g} times the noise; usual ranges are priors"
+    else:
+        rms = format_with_unit(one.rms, "Pa", digits=3)
+        caption = f"Actuator of {name}: {one.samples} samples, residual {rms} rms"
     return TableBlock(caption, (Cell("parameter"), Cell("value, 95 %", number=True)), rows)
 
 
