@@ -92,7 +92,8 @@ class TorqueRecord:
         size = np.abs(self.slip)
         scale = max(float(size.max()), 1.0)
         shapes = [np.ones_like(size), size / scale, np.exp(-size / TORQUE_FIT.slip_scale)]
-        return self.lever * np.sign(self.slip)[:, None] * np.column_stack(shapes)
+        signed = self.lever * np.sign(self.slip)[:, None] * np.column_stack(shapes)
+        return np.asarray(signed, dtype=np.float64)
 
     @cached_property
     def whitening(self) -> FloatArray:
@@ -110,7 +111,7 @@ class TorqueRecord:
     def integrate(self, over: FloatArray) -> FloatArray:
         """Integrals (m, b) of the basis functions times the pressure above P0 (n,) [Pa]."""
         rates = self.friction * over[:, None]
-        return self.whiten(cumulative_trapezoid(rates, self.time, axis=0, initial=0.0))
+        return self.whiten(cumulative_trapezoid(rates, self.time, axis=0, initial=0))
 
 
 def identify_from_torque(records: Sequence[TorqueRecord], P0: Prior) -> IdentifiedActuator:
@@ -167,7 +168,7 @@ class _Residuals:
     def linear(self) -> int:
         """Number of linear coefficients, with the initial values."""
         first = self.records[0]
-        return first.regressors.shape[1] + first.friction.shape[1] + len(self.records)
+        return int(first.regressors.shape[1] + first.friction.shape[1] + len(self.records))
 
     @cached_property
     def target(self) -> FloatArray:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import differential_evolution
+from scipy.optimize import Bounds, differential_evolution
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.held_signal import HeldSignal
@@ -88,7 +88,8 @@ class IdentifiedLockup:
 def simulate_slip(clutch: LockupClutch, record: SlipRecord) -> FloatArray:
     """Slip (n,) [rad/s] at the times of the record, from a locked clutch."""
     first, last = float(record.time[0]), float(record.time[-1])
-    time = first + _STEP * np.arange(int(np.ceil((last - first) / _STEP)) + 1)
+    count = int(np.ceil((last - first) / _STEP)) + 1
+    time: FloatArray = first + _STEP * np.arange(count, dtype=np.float64)
     pressure = clutch.actuator.compute_pressure(record.command, time)
     over = np.maximum(pressure - clutch.actuator.kiss_pressure, 0.0)
     kinetic = clutch.kinetic * over
@@ -139,7 +140,7 @@ def _search(residuals: _Residuals) -> FloatArray:
 
     low = np.maximum(known.mean - _REACH * known.std, known.lower)
     high = np.minimum(known.mean + _REACH * known.std, known.upper)
-    bounds = list(zip(low, high, strict=True))
+    bounds = Bounds(low, high)
     found = differential_evolution(
         evaluate, bounds, maxiter=_GENERATIONS, popsize=8, rng=1, polish=False
     )

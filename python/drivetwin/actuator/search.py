@@ -142,12 +142,19 @@ def _fit_best(residuals: Residuals, starts: Sequence[FloatArray]) -> tuple[Float
     """Fit from the best of the starts; return the values and their cost."""
     known = residuals.unknowns
     low, high = known.lower / known.size, known.upper / known.size
+
+    def compute(scaled: FloatArray) -> FloatArray:
+        return _weigh(residuals, scaled * known.size)
+
+    def slope(scaled: FloatArray) -> FloatArray:
+        return _linearise(residuals, scaled, with_priors=True)
+
     costs = [float(np.square(_weigh(residuals, one)).sum()) for one in starts]
     fits = [
         least_squares(
-            lambda scaled: _weigh(residuals, scaled * known.size),
+            compute,
             np.clip(starts[k] / known.size, low + 1e-6, high - 1e-6),
-            lambda scaled: _linearise(residuals, scaled, with_priors=True),
+            slope,
             bounds=(low, high),
             xtol=1e-7,
             ftol=1e-9,

@@ -80,6 +80,7 @@ def test_values_that_are_missing_are_left_out(log: ShiftLog) -> None:
     assert set(found) == {"B3"}
 
 
+@pytest.mark.statistical
 def test_without_pressures_torques_determine_the_delay_of_the_oncoming_clutch() -> None:
     kept = {one.role: one for one in BENCH.channels if not one.role.startswith("pressure.")}
     log = ShiftLog(kept, "made.csv", "0" * 64)

@@ -99,7 +99,7 @@ def _build_record(
     own, other = clutches
     J_out = 0.0 if card.J_out is None else card.J_out.value
     driven = other.i_out / other.alpha
-    integral = cumulative_trapezoid(np.column_stack([output, torque]), time, axis=0, initial=0.0)
+    integral = cumulative_trapezoid(np.column_stack([output, torque]), time, axis=0, initial=0)
     noise = {one: prepare_signal(log[one]).sigma for one in (*_NEEDED, role)}
     drift = _grow_drift(log["output_torque"].updates, noise["output_torque"], time)
     drift += driven**2 * _grow_drift(log["engine_torque"].updates, noise["engine_torque"], time)
