@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.progress import notify_progress
-from drivetwin.channels.command_pressure import add_missing_pressures
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
@@ -59,7 +58,6 @@ def simulate_shift(
     Raises MissingChannelError, MissingParameterError, and DamagedChannelError if an input has a gap
     in the shift or a compared channel does not cover it; a run that fails returns its status.
     """
-    log = _add_pressures(twin, log)
     model = model or twin.build_dual_clutch(shift)
     fills = {one.name: PriorValue(one.P0) for one in model.elements}
     seen = refer_to_turbine(log, twin.build_card(), shift)
@@ -75,14 +73,8 @@ def rerun_shift(before: Validation, twin: Twin, log: ShiftLog, model: DualClutch
 
     For what follows a slider: the search for the window takes longer than the simulation.
     """
-    log = _add_pressures(twin, log)
     window = (before.phases["before"][0], before.phases["after"][1])
     return _simulate_window(twin, log, before.shift, model, window)
-
-
-def _add_pressures(twin: Twin, log: ShiftLog) -> ShiftLog:
-    """Add the pressures that the log lacks, from its commands."""
-    return add_missing_pressures(log, {name: one.model for name, one in twin.actuators.items()})
 
 
 def _simulate_window(
