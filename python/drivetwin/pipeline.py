@@ -13,7 +13,6 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.data.actuators import (
     FoundActuators,
     LogShifts,
-    compute_missing_pressures,
     identify_actuators,
 )
 from drivetwin.estimation.data.compare_logs import require_compatible
@@ -56,9 +55,7 @@ def identify(
     Returns
     -------
     Identification
-        The pressure of an element whose command alone is in the log follows from the command, by
-        the actuator of the card or the identified one. `assumptions` and `settings["stated"]`
-        record fixed values, priors and bounds.
+        `assumptions` and `settings["stated"]` record fixed values, priors and bounds.
 
     Raises
     ------
@@ -81,7 +78,6 @@ def identify(
             "use the integral or the likelihood method",
         )
     actuators = identify_actuators([LogShifts(log, shifts.shifts)], card)
-    log = compute_missing_pressures(log, card, actuators.actuators)
     found = identify_prepared(_prepare_checked(log, apply_locks(card, locks), shifts), method)
     found = _attach_actuators(found, actuators)
     if not locks:
@@ -118,10 +114,7 @@ def identify_jointly(
     with scale_progress(0.0, 0.05, "preparing the logs"):
         pairs = list(zip(logs, shifts, strict=True))
         actuators = identify_actuators([LogShifts(log, one.shifts) for log, one in pairs], card)
-        prepared = [
-            _prepare_checked(compute_missing_pressures(log, card, actuators.actuators), card, one)
-            for log, one in pairs
-        ]
+        prepared = [_prepare_checked(log, card, one) for log, one in pairs]
     with scale_progress(0.05, 1.0):
         return _attach_actuators(identify_joint(prepared), actuators)
 

@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-
 import numpy as np
 
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.model import ActuatorModel
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.shiftlog import Channel, Quantity
 
 _STEP = 1e-3
 """Sampling step [s] of the calculated pressures; between samples they are linear."""
@@ -37,13 +34,3 @@ def compute_pressure_channel(command: Channel, model: ActuatorModel, element: st
         command.source_name,
         command.source_unit,
     )
-
-
-def add_missing_pressures(log: ShiftLog, models: Mapping[str, ActuatorModel]) -> ShiftLog:
-    """Add the pressures of the elements of `models` whose command alone is in the log."""
-    added = {
-        make_pressure_role(name): compute_pressure_channel(log[make_command_role(name)], one, name)
-        for name, one in models.items()
-        if make_pressure_role(name) not in log and make_command_role(name) in log
-    }
-    return replace(log, channels={**log.channels, **added}) if added else log

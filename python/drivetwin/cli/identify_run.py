@@ -60,7 +60,6 @@ def run_identification(log: Path, how: Request) -> Outcome:
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
     from drivetwin.estimation.analysis.experiment_design import rank_experiments
-    from drivetwin.estimation.data.actuators import compute_missing_pressures
     from drivetwin.pipeline import identify
     from drivetwin.plausibility.check import check_card
     from drivetwin.shifts.detect import detect_shifts, refuse_without_shifts
@@ -76,7 +75,6 @@ def run_identification(log: Path, how: Request) -> Outcome:
     with show_step(f"identifying by the {how.method} method"):
         found = identify(recording, card, shifts, how.method)
         twin = build_twin(found, card)
-        recording = compute_missing_pressures(recording, card, found.actuators)
     with show_step("simulating the shifts"):
         found = attach_validation(found, twin, recording)
         twin = build_twin(found, card)  # with the verdicts of the gate

@@ -10,6 +10,7 @@ import pytest
 
 from drivetwin.actuator.identify import ActuatorSource
 from drivetwin.actuator.model import QUANTITIES
+from drivetwin.channels.command_pressure import compute_pressure_channel
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
@@ -18,7 +19,6 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.actuators import (
     FoundActuators,
     LogShifts,
-    compute_missing_pressures,
     identify_actuators,
 )
 from drivetwin.findings import Code
@@ -92,8 +92,8 @@ def test_without_pressures_torques_determine_the_delay_of_the_oncoming_clutch() 
     assert found.std[list(QUANTITIES).index("dead_time")] < 0.02
     assert Code.ACTUATOR_FROM_TORQUE in {one.code for one in result.findings}
     assert set(result.actuators) == {"B2", "B3"}
-    pressures = compute_missing_pressures(log, known, result.actuators)
+    pressure = compute_pressure_channel(log[make_command_role("B3")], found.model, "B3")
     measured = next(one for one in BENCH.channels if one.role == "pressure.B3")
-    left = pressures["pressure.B3"].interpolate(measured.time) - measured.values
+    left = pressure.interpolate(measured.time) - measured.values
     shift = (measured.time > 2.2) & (measured.time < 2.6)
     assert np.sqrt(np.nanmean(left[shift] ** 2)) < 0.1 * np.ptp(measured.values[shift])

@@ -21,7 +21,7 @@ from drivetwin.actuator.identify import (
 )
 from drivetwin.actuator.model import QUANTITIES
 from drivetwin.actuator.search import Prior
-from drivetwin.channels.command_pressure import add_missing_pressures, get_held_command
+from drivetwin.channels.command_pressure import get_held_command
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError
@@ -151,15 +151,3 @@ def _collect_torques(
             held = get_held_command(one.log[role]).drop_repeated()
             found += build_torque_records(one.log, card, one.shifts, element, held)
     return found
-
-
-def compute_missing_pressures(
-    log: ShiftLog, card: VehicleCard, actuators: Mapping[str, IdentifiedActuator]
-) -> ShiftLog:
-    """Add the pressures that the log lacks, from its commands.
-
-    The actuator of an element is the identified one, else that of the card.
-    """
-    stated = {n: one.actuator for n, one in card.elements.items() if one.actuator is not None}
-    identified = {name: one.model for name, one in actuators.items()}
-    return add_missing_pressures(log, {**stated, **identified})
