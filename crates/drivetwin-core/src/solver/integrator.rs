@@ -120,7 +120,7 @@ impl<'a, T: Real> Integrator<'a, T> {
         let wish = remaining.min(self.settings.max_step);
         let accuracy = self.settings.accuracy(self.uses_fixed_step);
         let ExpandedStep { length: h, work } = self.stiffness.expand(state, wish, accuracy);
-        let lost = underflows(h, end) || (h < wish && !self.progress.shorten(state.time(), work));
+        let lost = underflows(h, end) || (h < wish && !self.progress.add_work(state.time(), work));
         if lost && h < remaining {
             return Err(Status::StepTooSmall { time: state.time() });
         }

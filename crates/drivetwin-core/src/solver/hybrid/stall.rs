@@ -12,10 +12,12 @@ const PROGRESS_WINDOW: usize = 1000;
 /// Steps over which a run must advance by at least [`MIN_ADVANCE_OF_STEPS`].
 const STEP_WINDOW: usize = 10_000;
 
-/// Steps of a run that the motion itself ends, neither an event nor a sample: some seconds of work.
-const MAX_STEPS: f64 = 300_000.0;
-/// Further such steps for every second of the run.
-const MAX_STEPS_PER_SECOND: f64 = 1000.0;
+/// Work of a run in Taylor steps that the motion itself ends, neither an event nor a sample: some seconds.
+const MAX_WORK: f64 = 300_000.0;
+/// Further work for every second of the run.
+const MAX_WORK_PER_SECOND: f64 = 1000.0;
+/// Work of an event in Taylor steps: a search for its instant and a change of mode, about 0.2 ms.
+const EVENT_WORK: f64 = 10.0;
 
 /// Counters of the advance of a run over its last steps.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +28,8 @@ pub(crate) struct StallDetector {
     events: Window,
     /// Present window of steps.
     steps: Window,
-    /// Work so far of steps that the motion ended, in Taylor steps.
-    shortened: f64,
+    /// Work so far of events and of steps that the motion ended, in Taylor steps.
+    work: f64,
     /// Start of the run, s.
     start: f64,
 }
@@ -68,16 +70,16 @@ impl StallDetector {
             stalled: 0,
             events: Window::from(time),
             steps: Window::from(time),
-            shortened: 0.0,
+            work: 0.0,
             start: time,
         }
     }
 
-    /// Count a step from `time` [s] on that the motion ended, of `work` Taylor steps. Return false if the run
-    /// has too many of them: it is too stiff for steps.
-    pub fn shorten(&mut self, time: f64, work: f64) -> bool {
-        self.shortened += work;
-        self.shortened < MAX_STEPS + (time - self.start) * MAX_STEPS_PER_SECOND
+    /// Add the `work` of an event or of a step from `time` [s] on that the motion ended, in Taylor steps.
+    /// Return false if the run has too much of it.
+    pub fn add_work(&mut self, time: f64, work: f64) -> bool {
+        self.work += work;
+        self.work < MAX_WORK + (time - self.start) * MAX_WORK_PER_SECOND
     }
 
     /// Return true if events at one instant do not end.
@@ -96,6 +98,9 @@ impl StallDetector {
         }
         let advances = length > ADVANCE_RTOL * (1.0 + time.abs());
         self.stalled = if advances || !event { 0 } else { self.stalled + 1 };
+        if event && !self.add_work(time, EVENT_WORK) {
+            return Err(Stall::Zeno);
+        }
         self.events.count += usize::from(event);
         if event && self.events.count == PROGRESS_WINDOW {
             if time - self.events.start < MIN_ADVANCE_OF_EVENTS {
