@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.code_version import read_commit
 from benchmarks.large_logs import write_large_csv, write_large_mdf
 from benchmarks.whole_drives import DRIVES, write_drive
 
@@ -90,7 +91,7 @@ Written by `python -m benchmarks.pipeline --large --write`. CPU seconds of the w
 imports included, unless a row says otherwise; the shortest of {repeats} runs; one BLAS thread; the
 other program in the same run. Memory is the largest of a process.
 
-Measured on: {machine}; Python {python}; load average {load:.1f}.
+Measured on: {machine}; Python {python}; load average {load:.1f}; code of commit {commit}.
 
 | command | CPU s | GB | other program s | ratio | limit | |
 |---|---|---|---|---|---|---|
@@ -188,6 +189,7 @@ def main() -> int:
             machine=f"{os.cpu_count()} × {platform.machine()}, {platform.system()}",
             python=platform.python_version(),
             load=os.getloadavg()[0],
+            commit=read_commit(),
         )
         PAGE.write_text(head + "\n".join(one.format_row() for one in rows) + "\n", "utf-8")
     return 0 if all(one.is_met for one in rows) else 1

@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 from pathlib import Path
 
+from benchmarks.code_version import read_commit
 from benchmarks.estimation.mismatch import FAULTS, measure_shift
 from benchmarks.estimation.report import (
     format_faults,
@@ -76,21 +76,8 @@ def main() -> int:
 def _write(section: str) -> None:
     """Write a section into the page, with the commit of the code."""
     before = PAGE.read_text(encoding="utf-8")
-    write_text(PAGE, update_page(before, f"{section}\nCode of commit {_read_commit()}.\n"))
+    write_text(PAGE, update_page(before, f"{section}\nCode of commit {read_commit()}.\n"))
     print(f"{section.partition(chr(10))[0]}: written", flush=True)
-
-
-def _read_commit() -> str:
-    """Return the running commit, and whether its code was changed."""
-    changed = _run_git("status", "--porcelain", "--", "python", "crates", "benchmarks")
-    return _run_git("rev-parse", "--short=10", "HEAD") + (", changed" if changed else "")
-
-
-def _run_git(*words: str) -> str:
-    found = subprocess.run(
-        ["git", *words], cwd=PAGE.parents[1], check=True, capture_output=True, text=True
-    )
-    return found.stdout.strip()
 
 
 if __name__ == "__main__":
