@@ -38,19 +38,23 @@ def _deviates(band: Band, truth: FloatArray) -> float:
 
 
 @pytest.mark.parametrize(
-    ("by", "rmse"), [(Observer.SMOOTHER, 20.0), (Observer.SIMULATION, 200.0)], ids=str
+    ("by", "rmse", "width"),
+    [(Observer.SMOOTHER, 20.0, 20.0), (Observer.SIMULATION, 200.0, 250.0)],
+    ids=str,
 )
-def test_bands_hold_the_truth(bench: Bench, by: Observer, rmse: float) -> None:
+def test_bands_hold_the_truth(bench: Bench, by: Observer, rmse: float, width: float) -> None:
     """T_o reaches 5 kN·m. Errors of a log go together, since they share the twin's: they are about
     one draw, of which all samples may lie beyond a standard deviation but not far beyond two. The
-    simulation begins in the swing of a throttle step, which engine torque alone does not show.
+    simulation begins in the swing of a throttle step, which engine torque alone does not show. Its
+    width is that of friction, whose effects have their likeliest sizes: noise of the log that
+    identifies moves these, so that 5 % of the torque count as narrow.
     """
     one = estimate_torques(bench.twin, _without(bench.log, "output_torque"), bench.shift, by)
     for name, truth in bench.truth(one).items():
         band = one.bands[name]
         assert _deviates(band, truth) < 2.0, name
         assert np.sqrt(np.mean((band.value - truth) ** 2)) < rmse, name
-        assert band.std.mean() < rmse, name
+        assert band.std.mean() < width, name
 
 
 def test_a_measured_output_torque_changes_nothing(bench: Bench) -> None:
