@@ -158,7 +158,7 @@ def _list_unknowns(P0: Prior) -> Unknowns:
 
 @dataclass(frozen=True, eq=False)
 class _Residuals:
-    """Residuals of all records over their noise, without what the linear coefficients explain."""
+    """Residuals of all records over their noise, the linear coefficients eliminated."""
 
     records: tuple[TorqueRecord, ...]
     unknowns: Unknowns

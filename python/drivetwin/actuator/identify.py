@@ -85,7 +85,7 @@ class IdentifiedActuator:
 
     @classmethod
     def from_fit(cls, fit: Fit, kiss: float) -> IdentifiedActuator:
-        """Return the actuator of a fit; assume what the records do not determine.
+        """Return the actuator of a fit; undetermined parameters are assumed.
 
         A lag is that of the other direction; the clutch is filled at once, at `kiss` [Pa].
         """

@@ -130,7 +130,7 @@ def _build_content(opened: Opened) -> list[Component]:
 
 
 def _build_time_unit(opened: Opened) -> Component:
-    """Build the field of the unit of time, with what the steps between samples make likely."""
+    """Build the field of the unit of time, filled with the unit that the sampling steps suggest."""
     likely = "; ".join(f"{one.unit}: {one.reason}" for one in opened.time_units)
     hint = likely or "Leave it empty to use the unit that the file states."
     unit = opened.survey.options.time.unit or ""

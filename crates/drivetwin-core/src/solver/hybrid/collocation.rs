@@ -353,7 +353,7 @@ impl<T: Real> HybridState<'_, T> {
     }
 }
 
-/// What the states at the nodes leave of the equations over `h` [s].
+/// Residual of the equations over `h` [s] with the states at the nodes.
 fn residual<T: Real>(h: f64, offsets: &Matrix<T>, instants: &[Instant<T>]) -> Matrix<T> {
     let n = offsets.cols;
     let mut residual = Matrix::zeros(STAGES * n, 1);
