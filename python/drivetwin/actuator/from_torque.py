@@ -142,7 +142,7 @@ def identify_from_torque(records: Sequence[TorqueRecord], P0: Prior) -> Identifi
 
 def _list_unknowns(P0: Prior) -> Unknowns:
     """Parameters of the actuator with their priors, and P0 minus the kiss pressure."""
-    bounds = Unknowns.of_actuator()
+    bounds = Unknowns.build_for_actuator()
     std = hypot(P0.std, TORQUE_FIT.P0_error, _CONTACT.std)
     priors = {**_USUAL, "kiss_pressure": Prior(P0.mean - _CONTACT.mean, std)}
     ordered = [*(priors[name] for name in QUANTITIES), _CONTACT]

@@ -171,7 +171,7 @@ class _Residuals:
     """Residuals [Pa] of all records."""
 
     records: tuple[PressureRecord, ...]
-    unknowns: Unknowns = field(default_factory=Unknowns.of_actuator)
+    unknowns: Unknowns = field(default_factory=Unknowns.build_for_actuator)
     linear: int = 0
     noise: float = 0.0
 

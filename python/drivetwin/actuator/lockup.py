@@ -155,7 +155,7 @@ def build_clutch(values: FloatArray) -> LockupClutch:
 
 def _list_unknowns(records: Sequence[SlipRecord]) -> Unknowns:
     """Unknowns with usual ranges; the kinetic torque per pressure from that of the record."""
-    bounds = Unknowns.of_actuator()
+    bounds = Unknowns.build_for_actuator()
     least = min(float(one.command.values.min()) for one in records)
     ratio = max(float(np.abs(one.torque).max() / one.command.values.max()) for one in records)
     usual = {**_USUAL, "kiss_pressure": Prior(_KISS * least, _KISS_STD * least)}

@@ -70,7 +70,7 @@ class Unknowns:
     std: FloatArray
 
     @classmethod
-    def of_actuator(cls) -> Unknowns:
+    def build_for_actuator(cls) -> Unknowns:
         """Return the parameters of the actuator without priors."""
         specs = QUANTITIES.values()
         return cls(

@@ -14,7 +14,6 @@ noise is by far the largest: as a regressor it would bias J'.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -23,7 +22,9 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.from_torque import TorqueRecord
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.channels.shiftlog import Channel, ShiftLog
+from drivetwin.estimation.data.prepare import build_driveline
 from drivetwin.estimation.data.prepare_signal import prepare_signal
+from drivetwin.estimation.data.shift_data import ShiftElementKinematics
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import compute_middle
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -58,31 +59,18 @@ def build_torque_records(
             start, other = shift.inertia_phase[0] + guard, shift.oncoming
         else:
             continue
-        clutches = _Clutch.from_card(card, element), _Clutch.from_card(card, other)
+        known = build_driveline(card, shift).couplings
+        clutches = known[element], known[other]
         one = _build_record(log, card, (max(start, shift.before[0]), end), clutches, command)
         found += [] if one is None else [one]
     return found
-
-
-@dataclass(frozen=True)
-class _Clutch:
-    """Ratios of a clutch: i_c, i_out and α = 1/(i_in i_c)."""
-
-    i_c: float
-    i_out: float
-    alpha: float
-
-    @classmethod
-    def from_card(cls, card: VehicleCard, element: str) -> _Clutch:
-        i_c, i_out = card.get_clutch_ratios(element)
-        return cls(i_c, i_out, 1.0 / (card.i_in * i_c))
 
 
 def _build_record(
     log: ShiftLog,
     card: VehicleCard,
     span: tuple[float, float],
-    clutches: tuple[_Clutch, _Clutch],
+    clutches: tuple[ShiftElementKinematics, ShiftElementKinematics],
     command: HeldSignal,
 ) -> TorqueRecord | None:
     role, factor = ("engine_speed", 1.0) if "engine_speed" in log else ("input_speed", card.i_in)
@@ -98,7 +86,7 @@ def _build_record(
     speed = factor * speed
     own, other = clutches
     J_out = 0.0 if card.J_out is None else card.J_out.value
-    driven = other.i_out / other.alpha
+    driven = other.ratio
     integral = cumulative_trapezoid(np.column_stack([output, torque]), time, axis=0, initial=0)
     noise = {one: prepare_signal(log[one]).sigma for one in (*_NEEDED, role)}
     drift = _grow_drift(log["output_torque"].updates, noise["output_torque"], time)
@@ -107,12 +95,12 @@ def _build_record(
     return TorqueRecord(
         command=command,
         time=time,
-        slip=speed / card.i_in / own.i_c - own.i_out * out_speed,
+        slip=own.a * speed - own.b * out_speed,
         target=speed,
         regressors=np.column_stack(
             [integral[:, 0] + J_out * out_speed, driven * integral[:, 1], driven * torque]
         ),
-        lever=own.i_out - driven * own.alpha,
+        lever=own.b - driven * own.a,
         white=factor * noise[role] / np.sqrt(averaged),
         drift=drift / (driven * compute_middle(card.J_prime_range)) ** 2,
         block=_BLOCK,
