@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Slip of a lock-up clutch against closed forms."""
+"""Slip of a lock-up clutch against closed forms, and against a network of the core."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.lockup import LockupClutch, SlipRecord, identify_lockup, simulate_slip
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import IdentificationError
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import Start, build_element, simulate
 
 CLUTCH = LockupClutch(
     ActuatorModel(0.05, 0.005, 0.005, kiss_pressure=7e4), 3e-3, 1.25, inertia=0.25, fluid=2.0
@@ -49,3 +51,34 @@ def test_a_clutch_that_is_closed_again_stops_slipping() -> None:
 def test_a_record_without_slip_is_refused() -> None:
     with pytest.raises(IdentificationError, match="does not slip"):
         identify_lockup([make_record(1.2e5, 1.2e5)])
+
+
+def test_break_away_and_grip_are_those_of_a_clutch_in_the_core() -> None:
+    """The clutch breaks away, slips, and is closed again; the core finds the events exactly."""
+    command = HeldSignal(np.array([0.0, 0.2, 0.5]), np.array([1.2e5, 8.0e4, 2.0e5]))
+    record = replace(make_record(0.0, 0.0), command=command)
+    fine = np.linspace(0.0, 1.0, 501)
+    pressure = CLUTCH.actuator.compute_pressure(command, fine)
+    top = 1e3
+    elements = [
+        build_element("torque", "engine", node="engine", input="engine"),
+        build_element("inertia", "J", node="engine", inertia=CLUTCH.inertia),
+        build_element(
+            "bearing", "fluid", a="engine", b="ground",
+            speed=[0.0, top], torque=[0.0, CLUTCH.fluid * top], peak=1.0,
+        ),
+        build_element(
+            "clutch", "lock-up", a="engine", b="ground", friction={"slip": [0.0], "mu": [0.1]},
+            gain=10.0 * CLUTCH.kinetic, p0=CLUTCH.actuator.kiss_pressure, peak=CLUTCH.peak,
+            pressure="lock-up", drum_inertia=0.0,
+        ),
+    ]  # fmt: skip
+    inputs = {"engine": Signal(TIME, record.torque), "lock-up": Signal(fine, pressure)}
+    start = Start({"engine": 0.0}, locked=("lock-up",))
+    exact = simulate(elements, inputs, start, TIME, [("slip", "lock-up")])
+    slip = exact.columns["slip", "lock-up"]
+    assert exact.status == "completed"
+    own = [one.kind for one in exact.events if one.element == "lock-up"]
+    assert own == ["break_away", "lock"]
+    one_step = 2e-3 * np.abs(np.diff(slip)).max() / 0.02  # of the fastest motion: first order
+    assert np.abs(simulate_slip(CLUTCH, record) - slip).max() < one_step
