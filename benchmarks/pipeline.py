@@ -104,6 +104,7 @@ def run_process(command: Sequence[str]) -> tuple[float, float, str]:
     Raises CalledProcessError where it fails.
     """
     alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT / "python")}
+    alone.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed package is compiled
     with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(command, stdout=output, env=alone)
         _, status, usage = os.wait4(process.pid, 0)
@@ -151,11 +152,16 @@ def measure_paper_log(folder: Path) -> Iterator[Measurement]:
 
 
 def measure_drives(folder: Path) -> Iterator[Measurement]:
-    """Measure `shifts` on whole drives and on a truck's log."""
+    """Measure `shifts` on whole drives and, where it is at hand, on a truck's log."""
     for drive in DRIVES:
         log, card = write_drive(drive, folder)
         taken = measure_command("shifts", str(log), "--vehicle", str(card))
         yield Measurement(f"`shifts`, {drive.name}", *taken, drive.limit)
+    truck = SHARED / "j1939" / "trucksentry_normal.log"
+    if truck.is_file():
+        card = ROOT / "examples" / "vehicles" / "j1939_class6.toml"
+        taken = measure_command("shifts", str(truck), "--vehicle", str(card))
+        yield Measurement("`shifts`, 30 s of a truck's J1939 bus", *taken, 2.0)
 
 
 def measure_large_files(folder: Path) -> Iterator[Measurement]:

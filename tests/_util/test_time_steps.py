@@ -43,12 +43,13 @@ STEPS = np.arange(100.0)
 @pytest.mark.parametrize(
     "time",
     [0.0 * STEPS, -STEPS, 1e300 * STEPS, 1e9 * STEPS, STEPS[:1], STEPS[:0],
-     np.append(STEPS, np.nan), np.append(STEPS, np.inf), np.array([-1e308, 0.0, 1e308])],
+     np.append(STEPS, np.nan), np.append(STEPS, np.inf), np.array([-1e308, 0.0, 1e308]),
+     1e-6 * STEPS, np.array([0.0, 1e308, 1.0]), np.append(0.0 * STEPS, 1.0)],
 )  # fmt: skip
 def test_stamps_that_are_no_record(time: FloatArray) -> None:
     assert not is_time_axis(time)
 
 
-@pytest.mark.parametrize("time", [STEPS, 1e-6 * STEPS, 1.7e9 + STEPS, 1e7 * STEPS])
+@pytest.mark.parametrize("time", [STEPS, 5e-5 * STEPS, 1.7e9 + STEPS, 1e7 * STEPS])
 def test_stamps_of_records(time: FloatArray) -> None:
     assert is_time_axis(time)

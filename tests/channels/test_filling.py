@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
 
@@ -79,6 +79,7 @@ def test_finds_linear_knots_anywhere(factor: float, phase: float) -> None:
     step=st.sampled_from([0.0, 0.03, 0.3, 3.0]),
     rate=st.sampled_from([1, 10]),
 )
+@example(seed=111, step=3.0, rate=1)
 def test_leaves_measured_samples_alone(seed: int, step: float, rate: int) -> None:
     """A channel that was sampled at each row, rounded or not."""
     time = np.arange(0.0, 5.0, rate * STEP)

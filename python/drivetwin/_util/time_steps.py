@@ -15,6 +15,10 @@ from drivetwin._util.arrays import FloatArray
 LONGEST_SPAN = 1e10
 """Longest time [s] that a record may span: 300 years, more than any clock of a logger shows."""
 
+SHORTEST_STEP = 2.5e-5
+"""Shortest plausible median time [s] between stamps. Stamps of 50 Hz in s that are read as ms
+(2e-5 s) are below."""
+
 P = ParamSpec("P")
 Result = TypeVar("Result")
 
@@ -49,11 +53,13 @@ def compute_median_step(time: FloatArray) -> float:
 
 @remember_for_arrays
 def is_time_axis(time: FloatArray) -> bool:
-    """Return whether the stamps `time` (n,) [s] span a time that a record can have.
+    """Return whether the stamps `time` (n,) [s] have order, span and step of a record.
 
-    Others are refused by the checks of channels. What looks at a record before these checks asks
-    here, because a span of zero or of 1e300 s makes its numbers meaningless.
+    Others are refused by the checks of channels. Code that looks at a record before these checks
+    asks here, because a span of 1e300 s or a step of 1e-300 s makes its numbers meaningless.
     """
     if time.size < 2 or not np.isfinite(time).all():
         return False
-    return 0.0 < float(time[-1]) - float(time[0]) < LONGEST_SPAN
+    if np.any(time[1:] < time[:-1]) or float(time[-1]) - float(time[0]) >= LONGEST_SPAN:
+        return False
+    return compute_median_step(time) >= SHORTEST_STEP

@@ -116,6 +116,8 @@ _BENDS_OF_A_KNOT = 2
 _ROUNDED_BENDS = 2.5
 """Steps of rounding above which a second difference is no rounded straight line: it has up to two
 [count]."""
+_NOISE_LAGS = (1, 2, 3)
+"""Lags of the differences that show the noise of the knots [count]."""
 _MANY_LINES = 0.05
 """Straight parts per sample from which a record counts as filled up: one in twenty rows."""
 _DEVIATION = 0.4
@@ -273,9 +275,19 @@ def _is_reproduced(fit: KnotFit, values: FloatArray) -> bool:
         return True
     step = estimate_lattice(values)
     explained = fit.misfit**2 < FILLING.rounding * step**2 / 12.0
-    third = np.diff(fit.values, 3)
-    noise = 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0)
-    return bool(explained and noise > FILLING.noise * step)
+    return bool(explained and _estimate_knot_noise(fit.values) > FILLING.noise * step)
+
+
+def _estimate_knot_noise(values: FloatArray) -> float:
+    """Estimate the standard deviation of white noise of knots `values` (n,) by third differences.
+
+    The least over several lags: the stairs of a rounded ramp look like noise except at the lag
+    after which they repeat.
+    """
+    return min(
+        1.4826 * float(np.median(np.abs(_difference(values, 3, lag)))) / np.sqrt(20.0)
+        for lag in _NOISE_LAGS
+    )
 
 
 def estimate_lattice(values: FloatArray) -> float:

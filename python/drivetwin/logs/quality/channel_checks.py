@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
+from drivetwin._util.time_steps import SHORTEST_STEP
 from drivetwin.channels.roles import AUXILIARY
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
@@ -41,8 +42,8 @@ MAX_WRAPS = 3
 MAX_REPEATED = 1e-3
 """Share of samples that may repeat the stamp before them; they are left out."""
 
-SHORTEST_STEP, LONGEST_STEP = 2.5e-5, 0.9
-"""Plausible sample intervals [s]; stamps of 50 Hz in s that are read as ms (2e-5 s) are outside."""
+LONGEST_STEP = 0.9
+"""Longest plausible sample interval [s]."""
 
 MAX_SPARSE = 100.0
 """Time from first to last sample in units of samples times interval; more is mostly gap."""
