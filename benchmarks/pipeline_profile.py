@@ -20,8 +20,11 @@ from types import FrameType
 INTERVAL = 4e-3
 """CPU time [s] between two samples; the timers of common kernels are no finer."""
 
-MOST_ROWS = 18
+MOST_ROWS = 12
 """Parts and functions that are listed."""
+
+PROFILE_MARK = "--- profile ---\n"
+"""Line between the output of the command and its profile."""
 
 _IMPORTING = "_find_and_load"
 """Function of the import system that is on the stack while a module is loaded."""
@@ -74,7 +77,7 @@ def main() -> int:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         children = resource.getrusage(resource.RUSAGE_CHILDREN)
-        print(profile.format_shares())
+        print(f"{PROFILE_MARK}{profile.format_shares()}")
         print(f"{children.ru_utime + children.ru_stime:.2f} s of CPU time in child processes")
 
 
