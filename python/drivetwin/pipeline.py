@@ -20,7 +20,6 @@ from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
-from drivetwin.estimation.multi_log.fit import identify_joint
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.check import check_card
@@ -110,6 +109,8 @@ def identify_jointly(
     IdentificationError if one log alone, or all together, cannot be fitted, and what `identify`
     raises.
     """
+    from drivetwin.estimation.multi_log.fit import identify_joint  # loads the likelihood
+
     require_compatible(logs)
     with scale_progress(0.0, 0.05, "preparing the logs"):
         pairs = list(zip(logs, shifts, strict=True))

@@ -18,7 +18,3 @@ def test_each_stage_is_recorded_in_plain_values(method: Method) -> None:
     assert json.loads(json.dumps(to_plain_values(found), allow_nan=False)).keys() == found.keys()
     assert found["verdict"]["prior_share"] == 0.8
     assert ("record" in found) == (method is Method.LIKELIHOOD)
-
-
-def test_the_papers_method_has_no_stages() -> None:
-    assert collect_settings(Method.PAPER) == {}

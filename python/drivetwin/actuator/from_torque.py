@@ -23,9 +23,9 @@ from functools import cached_property
 from math import hypot
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.signal_processing import integrate_trapezoids
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.identify import LEAST_KISS, ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
@@ -111,7 +111,7 @@ class TorqueRecord:
     def integrate(self, over: FloatArray) -> FloatArray:
         """Integrals (m, b) of the basis functions times the pressure above P0 (n,) [Pa]."""
         rates = self.friction * over[:, None]
-        return self.whiten(cumulative_trapezoid(rates, self.time, axis=0, initial=0))
+        return self.whiten(integrate_trapezoids(rates, self.time))
 
 
 def identify_from_torque(records: Sequence[TorqueRecord], P0: Prior) -> IdentifiedActuator:

@@ -284,10 +284,8 @@ def _estimate_knot_noise(values: FloatArray) -> float:
     The least over several lags: the stairs of a rounded ramp look like noise except at the lag
     after which they repeat.
     """
-    return min(
-        1.4826 * float(np.median(np.abs(_difference(values, 3, lag)))) / np.sqrt(20.0)
-        for lag in _NOISE_LAGS
-    )
+    sizes = (np.median(np.abs(_difference(values, 3, lag))) for lag in _NOISE_LAGS)
+    return float(1.4826 * min(sizes) / np.sqrt(20.0))
 
 
 def estimate_lattice(values: FloatArray) -> float:

@@ -59,7 +59,7 @@ def run_identification(log: Path, how: Request) -> Outcome:
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
-    from drivetwin.estimation.analysis.experiment_design import rank_experiments
+    from drivetwin.estimation.result.method import Method
     from drivetwin.pipeline import identify
     from drivetwin.plausibility.check import check_card
     from drivetwin.shifts.detect import detect_shifts, refuse_without_shifts
@@ -78,8 +78,11 @@ def run_identification(log: Path, how: Request) -> Outcome:
     with show_step("simulating the shifts"):
         found = attach_validation(found, twin, recording)
         twin = build_twin(found, card)  # with the verdicts of the gate
-    with show_step("comparing experiments"):
-        found = rank_experiments(found)
+    if found.method is Method.LIKELIHOOD:
+        from drivetwin.estimation.analysis.experiment_design import rank_experiments
+
+        with show_step("comparing experiments"):
+            found = rank_experiments(found)
     return Outcome(recording, card, found, twin)
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
+from drivetwin._util.signal_processing import integrate_trapezoids
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, Trajectory
 
 _LEAST_SLIP = 1e-6
@@ -67,4 +67,4 @@ class NominalRun:
 def compute_friction_work(run: Trajectory, element: str) -> FloatArray:
     """Friction work of an element from the start on (n,) [J]."""
     power: FloatArray = np.abs(run.clutch_torque[element] * run.slip[element])
-    return cumulative_trapezoid(power, run.time, initial=0)
+    return integrate_trapezoids(power, run.time)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Identification of a driveline from the prepared shifts of one log, by one of three methods."""
+"""Identification of a driveline from the prepared shifts of one log, by one of three methods.
+
+The likelihood is imported where it runs: its modules take longer to load than the paper's method
+takes.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,6 @@ from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import DesignData, PreparedLog, ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.pipeline import estimate_likelihood, estimate_without_linear
 from drivetwin.estimation.linear.multi_shift import add_tolerances, estimate_integral
 from drivetwin.estimation.paper.pipeline import (
     PaperShift,
@@ -26,7 +29,6 @@ from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.estimation.result.verdict import apply_errors
-from drivetwin.estimation.settings import collect_settings
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.shifts.coverage import AFTER, BEFORE
@@ -140,6 +142,8 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
     if likely:
         try:
             with scale_progress(0.2, 0.9, "likelihood"):
+                from drivetwin.estimation.likelihood.pipeline import estimate_likelihood
+
                 linear = found, integral
                 found, fit = estimate_likelihood(log.signals, log.drivelines, linear, log.design)
             evidence = replace(evidence, likelihood=fit)
@@ -167,6 +171,8 @@ def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) ->
     That is so for gears engaged too briefly, and by the dissipative law for a drive whose torque
     flows back throughout. Raises the linear method's `refusal` if it does not converge either.
     """
+    from drivetwin.estimation.likelihood.pipeline import estimate_without_linear
+
     try:
         with scale_progress(0.2, 0.95, "likelihood"):
             found, fit = estimate_without_linear(log.signals, log.drivelines, log.design)
@@ -189,6 +195,8 @@ def _estimate_torqueless_log(log: PreparedLog, method: Method) -> tuple[Estimate
             "map an output-shaft torque sensor as `output_torque`, or use the likelihood method",
             Where(file=log.source),
         )
+    from drivetwin.estimation.likelihood.pipeline import estimate_without_linear
+
     found, best = estimate_without_linear(log.signals, log.drivelines, log.design)
     return found, StageResults(likelihood=best)
 
@@ -222,7 +230,14 @@ def _compute_validity(
 
 
 def _collect_settings(design: DesignData, method: Method) -> dict[str, Any]:
-    ranges = {"J_prime_range": design.J_prime_range, "J_vehicle_range": design.J_vehicle_range}
+    ranges: dict[str, Any] = {
+        "J_prime_range": design.J_prime_range,
+        "J_vehicle_range": design.J_vehicle_range,
+    }
+    if method is Method.PAPER:  # has no settings beside its tables
+        return ranges
+    from drivetwin.estimation.settings import collect_settings
+
     return collect_settings(method) | ranges
 
 

@@ -43,12 +43,10 @@ _LIKELIHOOD = (
 
 
 def collect_settings(method: Method) -> dict[str, Any]:
-    """Collect the settings of a method by stage; the paper's method has none beside its tables.
+    """Collect the settings of the integral or the likelihood method by stage.
 
     The settings of a stage are the constants of its module whose class is named `...Settings`.
     """
-    if method is Method.PAPER:
-        return {}
     return {
         name.lower(): asdict(value)
         for stage in (_LINEAR if method is Method.INTEGRAL else _LINEAR + _LIKELIHOOD)

@@ -16,9 +16,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.signal_processing import integrate_trapezoids
 from drivetwin.actuator.from_torque import TorqueRecord
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.channels.shiftlog import Channel, ShiftLog
@@ -87,7 +87,7 @@ def _build_record(
     own, other = clutches
     J_out = 0.0 if card.J_out is None else card.J_out.value
     driven = other.ratio
-    integral = cumulative_trapezoid(np.column_stack([output, torque]), time, axis=0, initial=0)
+    integral = integrate_trapezoids(np.column_stack([output, torque]), time)
     noise = {one: prepare_signal(log[one]).sigma for one in (*_NEEDED, role)}
     drift = _grow_drift(log["output_torque"].updates, noise["output_torque"], time)
     drift += driven**2 * _grow_drift(log["engine_torque"].updates, noise["engine_torque"], time)
