@@ -155,6 +155,21 @@ def test_shafts_without_dampers_in_series_are_one_shaft() -> None:
     assert np.abs(speeds(one)[1] - middle).max() < 1e-9
 
 
+@pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.parametrize("audit", [False, True])
+def test_an_even_rotation_stays_even_over_light_and_massless_members(
+    damped: bool, audit: bool
+) -> None:
+    """Round-off in the twists of the massless member would accelerate the light ones evenly."""
+    shafts = [shaft("a", "m", 81.5, 0.0), shaft("m", "n" if damped else "b", 202.7, 0.0)]
+    shafts += [shaft("n", "b", 150.3, 1e-3)] if damped else []
+    elements = [inertia("a", 2.48e-7), inertia("b", 4.79e-7), torque("a"), *shafts]
+    speed, none = 49.10272569674039, Signal(GRID, np.zeros(GRID.size))
+    start, outputs = Start({"a": speed, "b": speed}), [("speed", "a"), ("speed", "b")]
+    done = simulate(elements, {"T": none}, start, GRID, outputs, audit=audit)  # type: ignore[arg-type]
+    assert np.abs(speeds(done, ("a", "b")) - speed).max() < 1e-11 * speed
+
+
 def test_the_energy_of_massless_members_is_accounted_for() -> None:
     done = run([*light_member(None), torque("m") | {"name": "T2"}], TORQUE, audit=True)
     assert done.audit is not None

@@ -424,7 +424,12 @@ impl<T: Number> Network<T> {
         for (i, spring) in self.mechanism.springs.iter().enumerate() {
             if let SpringLaw::Linear { stiffness, damping } = spring.law {
                 for &(node, direction) in &spring.row {
-                    f[(node, self.speeds() + i)] -= direction * stiffness;
+                    self.add_twist(
+                        self.balanced_twists(),
+                        i,
+                        -direction * stiffness,
+                        f.row_mut(node),
+                    );
                     for (j, &rate) in self.twist_rates.row(i).iter().enumerate() {
                         f[(node, j)] -= direction * damping * rate;
                     }

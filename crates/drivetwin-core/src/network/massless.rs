@@ -52,6 +52,29 @@ impl<T: Number> Network<T> {
         Ok(())
     }
 
+    /// Twists in balance on members without mass and dampers, see [`Followers::twists`].
+    pub fn balanced_twists(&self) -> Option<&Matrix<T>> {
+        self.followers.as_ref()?.twists.as_ref()
+    }
+
+    /// Add `factor` times the twist of a spring to a row over the basis, `balanced` where it is on a member
+    /// without mass: round-off of the twists would else pull at one side of the member more than at the other.
+    pub(super) fn add_twist(
+        &self,
+        balanced: Option<&Matrix<T>>,
+        spring: usize,
+        factor: T,
+        row: &mut [T],
+    ) {
+        let twists = &mut row[self.speeds()..self.first_lag()];
+        let Some(balanced) = balanced.map(|all| all.row(spring)) else {
+            twists[spring] += factor;
+            return;
+        };
+        twists.iter_mut().zip(balanced).for_each(|(sum, &twist)| *sum += factor * twist);
+        row[self.one()] += factor * balanced[balanced.len() - 1];
+    }
+
     /// Return true if an independent speed has no mass and only linear compliances, lossless gears and given
     /// torques act on it.
     fn follows(&self, j: usize) -> bool {
@@ -86,9 +109,10 @@ impl<T: Number> Balance<'_, T> {
         let count = self.massless.len();
         let (mut a, mut right) =
             (Matrix::zeros(count, count), Matrix::zeros(count, self.network.first_channel()));
-        let mut undamped = Vec::new();
+        let undamped: Vec<usize> = (0..count).filter(|&i| !self.is_damped(i)).collect();
+        let twists = if undamped.is_empty() { None } else { Some(self.settled(&undamped, own)?) };
         for i in 0..count {
-            let damped = self.laws(i).any(|(_, _, [_, damping])| !is_nothing(damping));
+            let damped = !undamped.contains(&i);
             for (spring, rate, [stiffness, damping]) in self.laws(i) {
                 let weight = rate * if damped { damping } else { stiffness };
                 for (to, &j) in self.massless.iter().enumerate() {
@@ -98,17 +122,19 @@ impl<T: Number> Balance<'_, T> {
                     right[(i, to)] -= weight * self.rates[(spring, j)];
                 }
                 if damped {
-                    right[(i, self.network.speeds() + spring)] -= rate * stiffness;
+                    let sum = right.row_mut(i);
+                    self.network.add_twist(twists.as_ref(), spring, -rate * stiffness, sum);
                 }
-            }
-            if !damped {
-                undamped.push(i);
             }
             self.add_torques(i, own, damped, right.row_mut(i))?;
         }
         let speeds = own.times(&solve(a, right).ok()?);
-        let twists = if undamped.is_empty() { None } else { Some(self.settled(&undamped, own)?) };
         Some(Followers { speeds, twists })
+    }
+
+    /// Return true if a damper is on a member.
+    fn is_damped(&self, i: usize) -> bool {
+        self.laws(i).any(|(_, _, [_, damping])| !is_nothing(damping))
     }
 
     /// Springs on a member: index, rate of twist by its speed, stiffness and damping.

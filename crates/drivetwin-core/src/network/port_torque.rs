@@ -53,7 +53,7 @@ impl<T: Number> Network<T> {
         match self.mechanism.springs[i].law {
             SpringLaw::Linear { stiffness, damping } => {
                 row.iter_mut().zip(self.twist_rates.row(i)).for_each(|(r, &c)| *r = c * damping);
-                row[self.speeds() + i] += stiffness;
+                self.add_twist(self.balanced_twists(), i, stiffness, &mut row);
             }
             SpringLaw::Regions { .. } => {
                 let before = self.mechanism.springs[..i].iter().filter(|s| s.law.has_regions());

@@ -200,10 +200,7 @@ pub(super) fn state_of<T: Number>(
 
 /// Bring the twists on members without mass and dampers into balance.
 fn settle<T: Number>(network: &Network<T>, x: &mut [T]) {
-    let Some(map) = network.followers.as_ref().and_then(|followers| followers.twists.as_ref())
-    else {
-        return;
-    };
+    let Some(map) = network.balanced_twists() else { return };
     let mut twists = x[network.speeds()..network.first_lag()].to_vec();
     twists.push(T::of(1.0));
     for (i, twist) in x[network.speeds()..network.first_lag()].iter_mut().enumerate() {
