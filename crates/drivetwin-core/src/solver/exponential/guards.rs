@@ -262,31 +262,45 @@ impl<L: KernelFloat, const N: usize> Propagator<L, N> {
         after: &[[L::Values; W]; 2],
         fallen: &mut [L::Values; W],
     ) {
-        let [mut margin, mut value] = *before;
-        for k in 0..W {
-            let (margin_after, value_after) = (after[0][k], after[1][k]);
-            let corners = || {
-                let corners = (margin + value).smaller(margin_after - value_after);
-                corners.smaller(margin).smaller(margin_after)
-            };
-            let left = match self.guards[place].bound {
-                Bound::Within { .. } => {
-                    let rise = (value_after - value).magnitude();
-                    let size = value.magnitude().larger(value_after.magnitude());
-                    let chord_deviation = self.chord_deviation[0]
-                        .values()
-                        .fma::<F>(rise, self.chord_deviation[1].values() * size);
-                    margin.smaller(margin_after) - chord_deviation
-                }
-                Bound::Above(_) => corners(),
-                Bound::Rising { .. } => {
-                    corners() - (margin_after - margin).magnitude().times(1.0 / 3.0)
-                }
-            };
-            fallen[k] = fallen[k].either_negative(left);
-            (margin, value) = (margin_after, value_after);
+        // One loop for each kind of bound: a choice within the loop is not hoisted out of it.
+        match self.guards[place].bound {
+            Bound::Within { .. } => {
+                let [rise, size] = self.chord_deviation.map(|share| share.values());
+                lower::<L, W>(before, after, fallen, |[margin, value], to| {
+                    let largest = value.magnitude().larger(to[1].magnitude());
+                    let rise_of_value = (to[1] - value).magnitude();
+                    margin.smaller(to[0]) - rise.fma::<F>(rise_of_value, size * largest)
+                });
+            }
+            Bound::Above(_) => lower::<L, W>(before, after, fallen, lowest_corner::<L>),
+            Bound::Rising { .. } => lower::<L, W>(before, after, fallen, |from, to| {
+                lowest_corner::<L>(from, to) - (to[0] - from[0]).magnitude().times(1.0 / 3.0)
+            }),
         }
     }
+}
+
+/// Make negative where `left` is, of margins and values before and after each sample.
+#[inline(always)]
+fn lower<L: KernelFloat, const W: usize>(
+    before: &[L::Values; 2],
+    after: &[[L::Values; W]; 2],
+    fallen: &mut [L::Values; W],
+    left: impl Fn([L::Values; 2], [L::Values; 2]) -> L::Values,
+) {
+    let mut from = *before;
+    for k in 0..W {
+        let to = [after[0][k], after[1][k]];
+        fallen[k] = fallen[k].either_negative(left(from, to));
+        from = to;
+    }
+}
+
+/// Smallest Bernstein coefficient of a cubic, by its values and thirds of its rates at both ends.
+#[inline(always)]
+fn lowest_corner<L: KernelFloat>(from: [L::Values; 2], to: [L::Values; 2]) -> L::Values {
+    let inner = (from[0] + from[1]).smaller(to[0] - to[1]);
+    inner.smaller(from[0]).smaller(to[0])
 }
 
 /// The samples after those from `from` on.
