@@ -29,7 +29,7 @@ from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Purpose, Scenarios
 from drivetwin.calibration.search import Evaluate, search_minima
 
-_DIFFERENCE = 2e-3
+_DIFFERENCE = 2e-5
 """Step of the differences of L-BFGS, in shares of the ranges."""
 _POWER = 8
 """Power of the soft maximum over time and draws by L-BFGS, which needs a smooth objective."""

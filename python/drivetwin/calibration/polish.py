@@ -25,20 +25,28 @@ from drivetwin.calibration.search import Candidate
 Run = Callable[[Sequence[FloatArray]], list[Outcome]]
 """Outcomes of candidates, coordinates (q,), over the scenarios."""
 
-_DIFFERENCE = 2e-3
-"""Step of the differences, in shares of the ranges."""
+_DIFFERENCE = 2e-5
+"""Step of the differences, in shares of the ranges.
+
+The simulation is exact and piecewise smooth. A longer step passes changes in the order of events,
+where the slope has no meaning; a shorter one comes near the tolerance of the solver.
+"""
 _PEAKS = 8
 """Local maxima of |jerk| per scenario that enter a linear program."""
 _BESIDE = 3
 """Samples beside a maximum that enter too, since it moves."""
 _STEEPEST = 5e4
-"""Slope of jerk [m/s^3 per range] beyond which a difference straddles a second lock-up."""
-_FIRST_RADIUS, _LEAST_RADIUS, _LARGEST_RADIUS = 0.03, 1e-3, 0.25
+"""Slope of jerk [m/s^3 per range] beyond which a difference straddles an event."""
+_FIRST_RADIUS, _LEAST_RADIUS, _LARGEST_RADIUS = 0.03, 2e-4, 0.25
 """Trust region in shares of the ranges."""
-_STEPS = (1.0, 0.5, 0.25)
-"""Shares of a step that are tried."""
+_RADII = (1.0, 0.3, 0.1)
+"""Shares of the trust region in which the linear program is solved and its step tried."""
+_GROWTH, _KEPT, _SHRINK = 2.0, 1.5, 0.05
+"""Factors on the radius: after the largest step, on the radius of a smaller one, after none."""
 _STALL = 2e-3
-"""Relative gain below which a step counts as none."""
+"""Relative gain below which an iteration counts as none."""
+_STALLS = 4
+"""Iterations without gain after which the polish ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,45 +58,72 @@ class _Linear:
     owner: NDArray[np.intp]
 
 
+@dataclass(frozen=True, eq=False)
+class _Program:
+    """Linear program at coordinates `at` (q,): cost, matrix and bounds of its rows."""
+
+    at: FloatArray
+    cost: FloatArray
+    matrix: FloatArray
+    bound: FloatArray
+
+    def solve(self, radius: float) -> FloatArray:
+        """Return the best coordinates (q,) within a radius; `at` where there is no solution."""
+        at = self.at
+        box = list(zip(np.maximum(-radius, -at), np.minimum(radius, 1.0 - at), strict=True))
+        slack = [(0.0, None)] * (self.cost.size - at.size - 1)
+        solved = linprog(
+            self.cost,
+            A_ub=self.matrix,
+            b_ub=self.bound,
+            bounds=[*box, (None, None), *slack],
+            method="highs",
+        )
+        step = solved.x[: at.size] if solved.x is not None else np.zeros(at.size)
+        return np.asarray(np.clip(at + step, 0.0, 1.0))
+
+
 def polish(run: Run, start: FloatArray, objective: Objective, iterations: int) -> Candidate:
-    """Improve coordinates (q,) from `start` by at most `iterations` linear programs."""
+    """Improve coordinates (q,) from `start` by at most `iterations` linear programs.
+
+    Each is solved in trust regions of several radii, so that one linearisation serves them all.
+    """
     at, outcome = start, run([start])[0]
     best, radius, stalls = objective.evaluate(outcome), _FIRST_RADIUS, 0
+    program = None
     for iteration in range(iterations):
         notify_progress(iteration / iterations)
-        step = _solve_program(run, at, outcome, (objective, radius))
-        tried = [np.clip(at + share * step, 0.0, 1.0) for share in _STEPS]
+        program = program or _build_program(run, at, outcome, objective)
+        tried = [program.solve(share * radius) for share in _RADII]
         outcomes = run(tried)
         values = [objective.evaluate(one) for one in outcomes]
         chosen = int(np.argmin(values))
         gain = best - values[chosen]
         if gain > 0.0:
-            at, outcome, best = tried[chosen], outcomes[chosen], values[chosen]
-        radius = min(1.7 * radius, _LARGEST_RADIUS) if gain > 0.0 and chosen == 0 else 0.4 * radius
+            at, outcome, best, program = tried[chosen], outcomes[chosen], values[chosen], None
+        radius = _change_radius(radius, chosen if gain > 0.0 else None)
         stalls = stalls + 1 if gain < _STALL * best else 0
-        if stalls == 3 or radius < _LEAST_RADIUS:
+        if stalls == _STALLS or radius < _LEAST_RADIUS:
             break
     notify_progress(1.0)
     return Candidate(at, best)
 
 
-def _solve_program(
-    run: Run, at: FloatArray, outcome: Outcome, region: tuple[Objective, float]
-) -> FloatArray:
-    """Step (q,) that the linear program takes; zero where it has no solution."""
-    objective, radius = region
+def _change_radius(radius: float, chosen: int | None) -> float:
+    """Return the radius after the step of place `chosen` in the radii; None without a gain."""
+    if chosen is None:
+        return _SHRINK * radius
+    return min((_KEPT if chosen else _GROWTH) * _RADII[chosen] * radius, _LARGEST_RADIUS)
+
+
+def _build_program(run: Run, at: FloatArray, outcome: Outcome, objective: Objective) -> _Program:
+    """Linearise jerk and limits at coordinates (q,)."""
     signs = np.where(at < 0.5, 1.0, -1.0)
     moved = run([at + _DIFFERENCE * step for step in np.diag(signs)])
     width = _DIFFERENCE * signs
     jerk = _linearise_jerk(outcome, moved, width)
     limits = [_linearise_limit(one, outcome, moved, width) for one in objective.limits]
-    cost, matrix, bound = _assemble(objective, jerk, limits, outcome.jerk.shape[0])
-    slack = [(0.0, None)] * (cost.size - at.size - 1)
-    box = list(zip(np.maximum(-radius, -at), np.minimum(radius, 1.0 - at), strict=True))
-    solved = linprog(
-        cost, A_ub=matrix, b_ub=bound, bounds=[*box, (None, None), *slack], method="highs"
-    )
-    return np.asarray(solved.x[: at.size]) if solved.x is not None else np.zeros(at.size)
+    return _Program(at, *_assemble(objective, jerk, limits, outcome.jerk.shape[0]))
 
 
 def _linearise_jerk(outcome: Outcome, moved: list[Outcome], width: FloatArray) -> _Linear:
