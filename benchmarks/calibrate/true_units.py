@@ -48,8 +48,9 @@ class TrueUnits:
         """Return the metrics of profiles over all units."""
         assert isinstance(control, Profiles)
         shift, names = self.shift, (self.shift.offgoing.name, self.shift.oncoming.name)
-        pressures = dict(zip(names, (control.offgoing, control.oncoming), strict=True))
-        acting = self.made.build_acting(control.engine_torque, pressures)
+        true = follow_profiles(self.made, shift, control)
+        pressures = dict(zip(names, (true.offgoing, true.oncoming), strict=True))
+        acting = self.made.build_acting(true.engine_torque, pressures)
         start = shift.build_start()
         runs, locks = [], []
         for unit in self.units:
@@ -78,6 +79,28 @@ def draw_true_units(
     return TrueUnits(made, replace(shift, model=model), units)
 
 
+def follow_profiles(made: MadeVehicle, shift: Maneuver, wanted: Profiles) -> Profiles:
+    """Return true torque and pressures of a bench whose sensors read the wanted ones.
+
+    The bench follows the profiles by the sensors of the log, with their errors of gain and offset.
+    """
+    errors = draw_errors(made.seed, made.scenario)
+
+    def invert(role: str, read: Signal) -> Signal:
+        gain, offset = errors[role]
+        return replace(read, values=(read.values - offset) / (1.0 + gain))
+
+    def release(name: str, read: Signal) -> Signal:
+        true = invert(f"pressure.{name}", read)
+        return replace(true, values=np.maximum(true.values, 0.0))
+
+    return Profiles(
+        invert("engine_torque", wanted.engine_torque),
+        release(shift.offgoing.name, wanted.offgoing),
+        release(shift.oncoming.name, wanted.oncoming),
+    )
+
+
 def record_shift(made: MadeVehicle, shift: Maneuver, control: Profiles, seed: int) -> ShiftLog:
     """Record a shift of the true vehicle with profiles, by the sensors of its first log."""
     scenario = made.scenario
@@ -87,10 +110,11 @@ def record_shift(made: MadeVehicle, shift: Maneuver, control: Profiles, seed: in
     speed = shift.point.engine_speed - _BEFORE * rate
     early = replace(true, point=replace(true.point, engine_speed=speed))
     duration = _BEFORE + shift.horizon + _AFTER
+    followed = follow_profiles(made, shift, control)
     inputs = {
-        "engine_torque": _move(control.engine_torque, duration),
-        f"pressure.{shift.offgoing.name}": _move(control.offgoing, duration),
-        f"pressure.{shift.oncoming.name}": _move(control.oncoming, duration),
+        "engine_torque": _move(followed.engine_torque, duration),
+        f"pressure.{shift.offgoing.name}": _move(followed.offgoing, duration),
+        f"pressure.{shift.oncoming.name}": _move(followed.oncoming, duration),
     }
     pressures = {one.name: inputs[f"pressure.{one.name}"] for one in true.model.elements}
     seen = list_sampling_instants(sensors, duration)

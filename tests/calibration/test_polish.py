@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Polish on a problem with a closed form: jerk linear in the coordinates."""
+"""Polish on a problem with a closed form, jerk linear in the coordinates, and on a shift."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from drivetwin.calibration.controller_policy import build_controller_policy
+from drivetwin.calibration.knot_policy import build_knot_policy
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
 from drivetwin.simulation.dual_clutch import FloatArray
+from tests.calibration.cases import SYSTEM, build_profiles, make_draws, make_plant, make_upshift
 
 DRAWS = np.linspace(-1.0, 1.0, 20)
 
@@ -51,3 +55,17 @@ def test_never_returns_worse_than_the_start() -> None:
     objective = Objective((), 0.9, 1.0)
     start = np.array([0.61, 0.0])
     assert polish(_run, start, objective, 3).value <= objective.evaluate(_run_one(start))
+
+
+def test_follows_a_shift_whose_events_change_their_order() -> None:
+    shift = make_upshift()
+    hand = build_controller_policy(shift, SYSTEM)
+    policy = build_knot_policy(shift, build_profiles(Space(hand), Space(hand).start), SYSTEM)
+    space, plant, draws = Space(policy), make_plant(shift), make_draws(shift, 16)
+
+    def run(candidates: Sequence[FloatArray]) -> list[Outcome]:
+        return plant.evaluate_all([space.build_control(one) for one in candidates], draws)
+
+    objective = Objective((Limit(Metric.SHIFT_TIME, 0.75),), 0.9, 2000.0)
+    start = objective.evaluate(run([space.start])[0])
+    assert polish(run, space.start, objective, 12).value < 0.22 * start

@@ -23,8 +23,10 @@ from drivetwin.estimation.result.validation import Validation
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.logged_shift import LoggedShift
 
-_ROUNDS = 4
-"""Gauss-Newton steps."""
+_ROUNDS = 12
+"""Largest number of Gauss-Newton steps."""
+_SETTLED = 0.05
+"""Step in standard deviations of the result below which the correction ends."""
 _DIFFERENCE = 0.1
 """Step of the differences, in standard deviations of the prior."""
 _CORRELATION = 0.02
@@ -64,6 +66,8 @@ def correct_twin(twin: Twin, logged: Sequence[LoggedShift], spread: Spread) -> C
     for number in range(_ROUNDS):
         notify_progress(number / _ROUNDS)
         step, covariance = shown.solve(z, deviations)
+        if float(np.max(np.abs(step) / np.sqrt(np.diag(covariance)))) < _SETTLED:
+            break
         found = shown.search(z, step, deviations)
         if found is None:
             break
