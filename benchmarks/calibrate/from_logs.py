@@ -6,11 +6,12 @@
 Each made vehicle departs from the model by one effect; its log has noise and errors of the sensors.
 The log is identified and a shift calibrated on the twin. Then five times: the true vehicle makes
 the shift, its log corrects the twin, and the shift is calibrated again from the last result. The
-objective is that of the calibration (tail mean of peak jerk, with the penalty of the shift time),
-over units made around the true vehicle. Its optimum is the least of all these results and of a
-polish on the true units from the best of them. The bench follows torque and pressures by the
-sensors of the log. Wanted: after five iterations within 5 % above the optimum in at least 50 of 60
-vehicles.
+bench follows torque and pressures by the sensors of the log. The objective is that of the
+calibration (tail mean of peak jerk, with the penalty of the shift time), over units made around the
+true vehicle. Its optimum is the least of all these results and of a polish on the true units from
+the best of them. Units that slip again after their lock-up are counted beside it: one of 120 is
+below what the draws of a calibration can see. Wanted: after five iterations within 5 % above the
+optimum in at least 50 of 60 vehicles.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from benchmarks.estimation.vehicles import SHIFT
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, find_best, make_quick_plant
 from drivetwin.calibration.learn import correct_twin
-from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Objective, compute_tail_mean
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
@@ -55,17 +56,26 @@ _LIGHT = CalibrationSettings(
     tail_iterations=0,
     check_draws=400,
     repairs=2,
+    penalty=50.0,
     threads=1,
 )
-"""Settings with one objective in all stages, and fewer draws than the defaults for CPU time."""
+"""Settings with one objective in all stages, and fewer draws than the defaults for CPU time.
+
+The penalty is so large that the limit holds by it and seldom by a repair: results and optimum are
+compared by that objective.
+"""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Objective [m/s^3] on true units: first calibration and after each log, and the optimum."""
+    """Objective [m/s^3] on true units: first calibration and after each log, and the optimum.
+
+    `relocked` counts the true units that slip again after lock-up with the last calibration.
+    """
 
     learned: tuple[float, ...]
     optimum: float
+    relocked: int
 
     @property
     def excess(self) -> float:
@@ -109,17 +119,22 @@ def _compare(made: MadeVehicle, task: Task, values: Sequence[FloatArray]) -> Tri
     )
     objective = _build_objective(task, polished)
 
-    def assess(one: FloatArray) -> float:
-        return objective.evaluate(fresh.evaluate(task.policy.build_control(one)))
-
-    reached = [assess(one) for one in values]
+    outcomes = [fresh.evaluate(task.policy.build_control(one)) for one in values]
+    reached = [_assess(objective, one) for one in outcomes]
     best = polish(
         lambda tried: polished.evaluate_all([space.build_control(one) for one in tried]),
         space.to_coordinates(values[int(np.argmin(reached))]),
         objective,
         _ITERATIONS,
     )
-    return Trial(tuple(reached), min(*reached, assess(space.to_values(best.coordinates))))
+    optimum = _assess(objective, fresh.evaluate(space.build_control(best.coordinates)))
+    relocked = int(outcomes[-1].relocked.sum())
+    return Trial(tuple(reached), min(*reached, optimum), relocked)
+
+
+def _assess(objective: Objective, outcome: Outcome) -> float:
+    """Return the objective without the penalty on second slips."""
+    return objective.evaluate(outcome) - objective.weight * float(outcome.relocked.mean())
 
 
 def _build_objective(task: Task, units: TrueUnits) -> Objective:
@@ -151,7 +166,8 @@ def try_vehicle(seed: int, effort: float) -> Trial:
     learned = " ".join(f"{one:.1f}" for one in trial.learned)
     sys.stdout.write(
         f"vehicle {seed} ({effects}): {learned}, optimum {trial.optimum:.1f} m/s3, "
-        f"{100.0 * trial.excess:.1f} % above; {time.process_time() - begin:.0f} s of CPU\n"
+        f"{100.0 * trial.excess:.1f} % above, {trial.relocked} of {_FRESH} slip again; "
+        f"{time.process_time() - begin:.0f} s of CPU\n"
     )
     sys.stdout.flush()
     return trial
