@@ -59,6 +59,9 @@ class CorrectionSettings:
     is what steps miss of a linear iteration."""
     shortest_step: float = 0.1
     """Share of the first step below which the second is not tried."""
+    largest_power: float = 10.0
+    """Largest residual power where columns are formed anew, over that of the fit and at least that
+    of noise: beyond it the columns are not those of the log's motion, and steps diverge."""
 
 
 CORRECTION = CorrectionSettings()
@@ -253,9 +256,9 @@ def _expand_again(
 ) -> _Expansion | None:
     """Form the columns anew at the end of the first step of `moves` (p,).
 
-    Where no run completes there, the step is halved.
+    Where no run completes there, or the residual is beyond `largest_power`, the step is halved.
     """
-    share = 1.0
+    share, largest = 1.0, CORRECTION.largest_power * max(fit.chi2, 1.0) * fit.problem.size
     with limit_evaluations(np.inf):
         while share > CORRECTION.shortest_step:
             values = fit.problem.retract(fit.point, share * moves)
@@ -263,7 +266,7 @@ def _expand_again(
             acting = _Amounts(amounts.columns, share * amounts.values)
             point = fit.point.replace_values(values)
             found = _expand_with_inputs(fit.problem, point, priors, acting)
-            if found is not None:
+            if found is not None and found.normal.cost <= largest:
                 return found
             share *= 0.5
     return None
