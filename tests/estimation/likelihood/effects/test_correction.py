@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Extrapolation of the steps of a correction."""
+"""Extrapolation and length of the steps of a correction."""
 
 from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from drivetwin.estimation.likelihood.effects.columns import EffectColumns
+from drivetwin.estimation.likelihood.effects import correction
+from drivetwin.estimation.likelihood.effects.columns import EffectColumns, EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import _Amounts, _Answer, _extrapolate
+from drivetwin.estimation.optimize.objective import ParameterVector
 
 
 @pytest.mark.parametrize("slow", [1, 2, 3])
@@ -27,3 +32,24 @@ def test_slow_linear_steps_end_where_they_lead(slow: int) -> None:
         moves, amounts = _extrapolate(answers[-4:])
     assert moves == pytest.approx(end, abs=1e-6)
     assert amounts.values == pytest.approx(end[:2], abs=1e-6)
+
+
+@pytest.mark.parametrize(("moved", "share"), [(2.0, 1.0), (8.0, 0.5), (40.0, None)])
+def test_a_step_beyond_the_motion_of_the_log_is_halved(
+    monkeypatch: pytest.MonkeyPatch, moved: float, share: float | None
+) -> None:
+    """The residual power is the square of the move; ten times that of the fit is the bound."""
+    point = ParameterVector(("x",), np.zeros(1))
+
+    def expand(_: Any, at: ParameterVector, *__: Any) -> Any:
+        return SimpleNamespace(at=at, normal=SimpleNamespace(cost=100 * float(at.values[0]) ** 2))
+
+    monkeypatch.setattr(correction, "_expand_with_inputs", expand)
+    problem = SimpleNamespace(
+        size=100, lower=np.full(1, -99.0), upper=np.full(1, 99.0), retract=lambda _, moves: moves
+    )
+    fit: Any = SimpleNamespace(problem=problem, point=point, chi2=2.0)
+    columns = EffectColumns((), (), (), np.empty(0), ())
+    amounts, priors = _Amounts(columns, np.empty(0)), cast(EffectPriors, None)
+    found: Any = correction._expand_again(fit, np.array([moved]), priors, amounts)
+    assert (found and found.at.values[0] / moved) == share
