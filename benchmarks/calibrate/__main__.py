@@ -6,8 +6,9 @@
 Optuna takes part where it is installed; it is no dependency of the project.
 
 Prints one row per optimiser, over 4,000 fresh draws that none of them has seen, and whether the
-stated bounds hold: 95 % of the lock-ups by 1.15 s, mean friction energy at most 46 kJ, at most 60 s
-of CPU time with all starts. Peak jerk with knots: 95 % at most 50 m/s^3 and 99 % at most 60. With
+stated bounds hold: 95 % of the lock-ups by 1.15 s, mean friction energy at most 46 kJ, peak jerk
+below 20 Hz and vibration dose no larger than of the hand tuning, at most 60 s of CPU time with all
+starts. Peak jerk with knots: 95 % at most 50 m/s^3 and 99 % at most 60. With
 the closed slip loop behind actuators: 95 % at most 32 and 99.5 % at most 45, and no unit locks
 twice. Without --policy both run.
 """
@@ -88,13 +89,18 @@ def format_row(one: Entry) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def list_failures(one: Entry, problem: Problem) -> list[str]:
-    """Return the stated bounds that a calibration misses."""
-    found = one.found.certificate
+def list_failures(one: Entry, start: Entry, problem: Problem) -> list[str]:
+    """Return the stated bounds that a calibration misses; some are values of the hand tuning."""
+    found, tuned = one.found.certificate, start.found.certificate
     values = one.found.outcome.values[Metric.PEAK_JERK]
     checks = {
         f"peak jerk, {100.0 * share:g} %": float(np.quantile(values, share)) <= bound
         for share, bound in problem.jerk.items()
+    }
+    checks |= {
+        f"{metric} of the hand tuning": found.quantiles[metric].share_95
+        <= tuned.quantiles[metric].share_95
+        for metric in (Metric.SMOOTH_JERK, Metric.VIBRATION_DOSE)
     }
     checks |= {
         "lock-up, 95 %": found.quantiles[Metric.SHIFT_TIME].share_95 <= LOCK_BY - REQUEST,
@@ -117,7 +123,8 @@ def solve(problem: Problem, given: argparse.Namespace) -> list[str]:
     task = problem.make(settings, given.seed)
     fresh = draw_scenarios(task.maneuver, task.draw, FRESH, CERTIFICATE_SEED, Purpose.CERTIFICATE)
     sys.stdout.write(f"| {' | '.join(_HEAD)} |\n|{'---|' * len(_HEAD)}\n")
-    sys.stdout.write(format_row(run_start(task, fresh)) + "\n")
+    start = run_start(task, fresh)
+    sys.stdout.write(format_row(start) + "\n")
     product = run_product(task, fresh, CPU)
     sys.stdout.write(format_row(product) + "\n")
     sys.stdout.flush()
@@ -126,7 +133,7 @@ def solve(problem: Problem, given: argparse.Namespace) -> list[str]:
         absent = "| Optuna | not installed: pip install optuna |"
         sys.stdout.write((absent if one is None else format_row(one)) + "\n")
         sys.stdout.flush()
-    missed = list_failures(product, problem)
+    missed = list_failures(product, start, problem)
     sys.stdout.write(f"missed: {', '.join(missed)}\n" if missed else "all bounds hold\n")
     return missed
 
