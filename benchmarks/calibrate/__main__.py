@@ -63,7 +63,7 @@ class Problem:
 
 
 _PROBLEMS = {
-    PolicyKind.KNOTS: Problem(make_task, 3600, {0.95: 50.0, 0.99: 60.0}, locks_once=False),
+    PolicyKind.KNOTS: Problem(make_task, 8000, {0.95: 50.0, 0.99: 60.0}, locks_once=False),
     PolicyKind.SLIP: Problem(make_slip_task, 1440, {0.95: 32.0, 0.995: 45.0}, locks_once=True),
 }
 
