@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin.calibration.calibrate import draw_for
 from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import (
@@ -28,6 +29,7 @@ from tests.calibration.cases import (
     make_draw,
     make_draws,
     make_plant,
+    make_slip_task,
     make_upshift,
 )
 
@@ -84,3 +86,14 @@ def test_impossible_draws_are_not_run() -> None:
 def test_a_spread_is_finite_and_not_negative(value: float) -> None:
     with pytest.raises(InputError, match="spread of gain"):
         Spread(gain=value)
+
+
+def test_selected_and_joined_scenarios_keep_their_units() -> None:
+    drawn = draw_for(make_slip_task(), 6, Purpose.TAIL)
+    odd = np.arange(6) % 2 == 1
+    both = drawn.select(odd).join(drawn.select(~odd))
+    order = [1, 3, 5, 0, 2, 4]
+    assert both.count == 6
+    assert [drawn.units[k] for k in order] == list(both.units)
+    for name, values in drawn.sets.items():
+        assert np.array_equal(both.sets[name], values[order])

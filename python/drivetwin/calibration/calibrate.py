@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import scale_progress
@@ -22,6 +23,7 @@ from drivetwin.calibration.polish import Run, polish
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import Draw, Purpose, Scenarios, draw_scenarios
 from drivetwin.calibration.search import Candidate, search_minima
+from drivetwin.calibration.second_slips import Exchange
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 
@@ -174,36 +176,51 @@ def _polish(
         with scale_progress(0.5 * number / len(found), 0.5 * (number + 1) / len(found)):
             polished.append(polish(run, one.coordinates, objective, settings.polish_iterations))
     best = min(polished, key=lambda one: one.value)
+    tail = draw_for(task, settings.tail_draws, Purpose.TAIL)
     with scale_progress(0.5, 1.0):
-        return _polish_tail(task, plant, objective, best.coordinates, settings.tail_iterations)
+        improve = _make_tail_polish(task, plant, tail, settings.tail_iterations)
+        return improve(best.coordinates, objective)
 
 
-def _polish_tail(
-    task: Task, plant: Plant, objective: Objective, start: FloatArray, iterations: int
-) -> FloatArray:
-    run = _make_run(task, plant, draw_for(task, task.settings.tail_draws, Purpose.TAIL))
-    tail = objective.set_share(task.settings.tail_share)
-    return np.asarray(polish(run, start, tail, iterations).coordinates)
+def _make_tail_polish(
+    task: Task, plant: Plant, draws: Scenarios, iterations: int
+) -> Callable[[FloatArray, Objective], FloatArray]:
+    """Return the function that polishes coordinates (q,) on draws for the tail of an objective."""
+    run = _make_run(task, plant, draws)
+
+    def improve(start: FloatArray, objective: Objective) -> FloatArray:
+        tail = objective.set_share(task.settings.tail_share)
+        return polish(run, start, tail, iterations).coordinates
+
+    return improve
 
 
 def _keep_limits(task: Task, plant: Plant, objective: Objective, found: FloatArray) -> FloatArray:
     """Return coordinates (q,) whose limits hold on the draws of the check, or the nearest to it.
 
-    They are polished from those found, and where this fails from the start.
+    Second slips on these draws are removed first, as far as this is possible. The coordinates
+    are polished from those found, and where this fails from the start.
     """
     settings, space = task.settings, Space(task.policy)
     draws = draw_for(task, settings.check_draws, Purpose.CHECK)
+    tail = draw_for(task, settings.tail_draws, Purpose.TAIL)
+
+    def assess(at: FloatArray) -> Outcome:
+        return plant.evaluate(space.build_control(at), draws)
+
+    def exchange(at: FloatArray, joined: NDArray[np.bool_]) -> FloatArray:
+        run = _make_run(task, plant, tail.join(draws.select(joined)))
+        return polish(run, at, objective, settings.repair_iterations).coordinates
 
     def measure(at: FloatArray) -> list[float]:
-        outcome = plant.evaluate(space.build_control(at), draws)
-        certificate = certify(outcome, task.limits, settings.confidence)
+        certificate = certify(assess(at), task.limits, settings.confidence)
         return [one.excess for one in certificate.limits]
 
-    def improve(at: FloatArray, under: Objective) -> FloatArray:
-        return _polish_tail(task, plant, under, at, settings.repair_iterations)
-
+    held = Exchange(assess, exchange, settings.repairs).hold_lockup(found, objective)
+    wider = tail.join(draws.select(held.joined))
+    improve = _make_tail_polish(task, plant, wider, settings.repair_iterations)
     repair = Repair(measure, improve, settings.repairs, settings.repair_weight)
-    kept = repair.keep_limits(found, objective)
+    kept = repair.keep_limits(held.coordinates, objective)
     if kept.excess > TOLERANCE:
         kept = min(kept, repair.keep_limits(space.start, objective), key=lambda one: one.excess)
     return kept.coordinates

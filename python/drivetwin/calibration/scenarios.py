@@ -13,6 +13,7 @@ from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
@@ -60,10 +61,16 @@ class Scenarios:
     count: int
     units: Sequence[ControlledUnit] = ()
 
-    def select(self, part: slice) -> Scenarios:
+    def select(self, part: slice | NDArray[np.bool_]) -> Scenarios:
         """Return a part of the scenarios."""
+        places = np.arange(self.count)[part]
         sets = {name: values[part] for name, values in self.sets.items()}
-        return Scenarios(sets, len(range(self.count)[part]), self.units[part])
+        return Scenarios(sets, places.size, [self.units[k] for k in places if self.units])
+
+    def join(self, more: Scenarios) -> Scenarios:
+        """Return these scenarios and `more` of the same driveline."""
+        sets = {name: np.concatenate([one, more.sets[name]]) for name, one in self.sets.items()}
+        return Scenarios(sets, self.count + more.count, [*self.units, *more.units])
 
 
 @dataclass(frozen=True)

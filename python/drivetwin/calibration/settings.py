@@ -31,7 +31,8 @@ class CalibrationSettings:
     check_draws: int = 2000
     """Scenarios on which limits are derived from the start, and checked after the polish."""
     repairs: int = 3
-    """Largest number of polishes under tighter limits, where a limit is exceeded on these draws."""
+    """Largest number of polishes under tighter limits, where a limit is exceeded on these draws,
+    and of polishes with those of these draws that slip again."""
     repair_iterations: int = 3
     """Largest number of linear programs of one of these polishes."""
     repair_weight: float = 3.0
