@@ -21,7 +21,6 @@ from drivetwin.report.figure import Entry, encode_entries
 from drivetwin.report.sections.actuators import build_actuator_section
 from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.report.sections.identifiability import build_limits_section
-from drivetwin.report.sections.likelihood import build_likelihood_sections
 from drivetwin.report.sections.parameters import build_findings_section, build_result_section
 from drivetwin.report.sections.provenance import build_provenance_section
 from drivetwin.report.sections.stage_results import build_stage_sections
@@ -64,12 +63,21 @@ def build_report_sections(found: Identification, log: ShiftLog) -> list[Section]
         *(one for one in stages if not one.collapsed),
         build_friction_section(found),
         build_actuator_section(found),
-        *build_likelihood_sections(found),
+        *_build_likelihood_sections(found),
         build_limits_section(found),
         build_provenance_section(found),
         *(one for one in stages if one.collapsed),
     ]
     return [section for section in sections if section.blocks]
+
+
+def _build_likelihood_sections(found: Identification) -> list[Section]:
+    """Build the sections of a likelihood fit, whose modules take long to load; none without one."""
+    if found.evidence.likelihood is None:
+        return []
+    from drivetwin.report.sections.likelihood import build_likelihood_sections
+
+    return build_likelihood_sections(found)
 
 
 def render_page(
