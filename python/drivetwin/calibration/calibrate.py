@@ -209,7 +209,8 @@ def _keep_limits(task: Task, plant: Plant, objective: Objective, found: FloatArr
         return plant.evaluate(space.build_control(at), draws)
 
     def exchange(at: FloatArray, joined: NDArray[np.bool_]) -> FloatArray:
-        run = _make_run(task, plant, tail.join(draws.select(joined)))
+        few = tail.select(slice(settings.polish_draws))
+        run = _make_run(task, plant, few.join(draws.select(joined)))
         return polish(run, at, objective, settings.repair_iterations).coordinates
 
     def measure(at: FloatArray) -> list[float]:
