@@ -33,6 +33,7 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 
 ROOT = Path(__file__).parents[2]
 LOGS = ROOT.parent / "shared" / "logs"
+LIKELIHOOD = "drivetwin.estimation.likelihood.pipeline"
 
 
 @cache
@@ -80,7 +81,7 @@ def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
     def gives_up(*_: object) -> None:
         raise IdentificationError("the search crawls", "drive on")
 
-    monkeypatch.setattr("drivetwin.estimation.likelihood.pipeline.estimate_likelihood", gives_up)
+    monkeypatch.setattr(f"{LIKELIHOOD}.estimate_likelihood", gives_up)
     found = identify(*recording("paper_like"), Method.LIKELIHOOD)
     assert found.method is Method.INTEGRAL
     assert found.evidence.gave_up == "the search crawls"
@@ -126,7 +127,7 @@ def test_where_neither_method_finds_anything_the_linear_one_says_what_to_record(
     def gives_up(*_: object) -> None:
         raise IdentificationError("the search crawls", "drive on")
 
-    monkeypatch.setattr("drivetwin.estimation.likelihood.pipeline.estimate_without_linear", gives_up)
+    monkeypatch.setattr(f"{LIKELIHOOD}.estimate_without_linear", gives_up)
     with pytest.raises(IdentificationError, match=r"no 0\.4 s of held gear") as caught:
         identify(*_held_briefly(0.2, 0.2), Method.LIKELIHOOD)
     assert "record at least a second" in caught.value.remedy
