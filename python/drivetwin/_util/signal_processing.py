@@ -39,9 +39,7 @@ def compute_moving_mean(values: FloatArray, width: int) -> FloatArray:
 def integrate_trapezoids(values: FloatArray, time: FloatArray) -> FloatArray:
     """Return the integral of `values` (n, ...) over `time` (n,) from the first sample on."""
     areas = (np.diff(time) * (values[1:] + values[:-1]).T / 2.0).T
-    return np.concatenate(
-        [np.zeros_like(areas, shape=(1, *values.shape[1:])), areas.cumsum(axis=0)]
-    )
+    return np.concatenate([np.zeros((1, *values.shape[1:])), areas.cumsum(axis=0)])
 
 
 def find_true_runs(mask: NDArray[np.bool_], least: int = 1) -> list[tuple[int, int]]:
