@@ -83,8 +83,8 @@ def run_long_batch_sensitivities() -> None:
 
 
 def run_long_sensitivities() -> None:
-    """Differentiate one run over 200,000 samples of its inputs, by all parameters of two passes."""
-    one, stretched = scenario(), np.linspace(0.0, 200.0, 200_001)
+    """Differentiate one run over a million samples of its inputs, by all parameters of two passes."""
+    one, stretched = scenario(), np.linspace(0.0, 1000.0, 1_000_001)
     torque, pressures = (
         Signal(stretched, np.resize(one.engine_torque.values, stretched.size)),
         {
@@ -94,7 +94,7 @@ def run_long_sensitivities() -> None:
     )
     by = [f"{name}.{field}" for name in ("B2", "B3") for field in ("P0", "mu_c", "mu_s", "gain")]
     by += ["eta", "J1", "J_out", "i_f", "J_v", "k_o", "c_o", "load.constant", "start.twist"]
-    simulate_sensitivities(MODEL, torque, pressures, one.start, np.array([0.0, 200.0]), by)
+    simulate_sensitivities(MODEL, torque, pressures, one.start, np.array([0.0, 1000.0]), by)
 
 
 CALLS: dict[str, Callable[[], object]] = {
