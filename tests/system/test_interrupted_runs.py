@@ -83,7 +83,7 @@ def run_long_batch_sensitivities() -> None:
 
 
 def run_long_sensitivities() -> None:
-    """Differentiate one run over a million samples of its inputs, by all parameters of two passes."""
+    """Differentiate a run over a million samples of its inputs, by all parameters of two passes."""
     one, stretched = scenario(), np.linspace(0.0, 1000.0, 1_000_001)
     torque, pressures = (
         Signal(stretched, np.resize(one.engine_torque.values, stretched.size)),
