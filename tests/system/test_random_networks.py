@@ -183,7 +183,8 @@ def _project(
     stated = np.array([network.speeds[node] for node in nodes])
     held = [rows[name] for name in network.locked]
     free = null_space(np.array(held)) if held else np.eye(len(nodes))
-    stops = [rows[name] @ free for name in network.one_way_clutches if name not in network.locked]
+    clutches = [rows[name] @ free for name in network.one_way_clutches]
+    stops = [row for row in clutches if np.abs(row).max(initial=0.0) > 1e-9]  # others are locked
     if free.shape[1] == 0:
         return np.zeros(len(nodes))
 
@@ -195,7 +196,8 @@ def _project(
 
     limits = [LinearConstraint(row[None, :], -np.inf, 0.0) for row in stops]
     start = np.asarray(free.T @ stated, dtype=np.float64)
-    found = minimize(lost, start, jac=slope, method="SLSQP", constraints=limits, tol=1e-14)
+    found = minimize(lost, start, jac=slope, method="SLSQP", constraints=limits, tol=1e-12)
+    assert found.success, found.message
     return np.asarray(free @ found.x, dtype=np.float64)
 
 
