@@ -45,21 +45,23 @@ from drivetwin.validation.logged_shift import LoggedShift
 
 ITERATIONS = 5
 _SHARE, _EXCESS = 50 / 60, 0.05
-_POLISHED, _FRESH = 32, 120
+_POLISHED, _FRESH = 32, 240
 """True units of the polish of the optimum, and of the comparison."""
 _ITERATIONS = 12
 """Linear programs of each polish of the optimum."""
 _LIGHT = CalibrationSettings(
     polish_draws=128,
-    tail_draws=128,
+    tail_draws=512,
     tail_share=CalibrationSettings.search_share,
-    tail_iterations=0,
     check_draws=400,
     repairs=2,
     penalty=50.0,
     threads=1,
 )
-"""Settings with one objective in all stages, and fewer draws than the defaults for CPU time.
+"""Settings with one objective in all stages.
+
+The last polish has 512 draws: on 128 a policy of 17 free parameters is fitted to the draws, so that
+its tail mean on others is 5 to 20 % higher, on the true units too.
 
 The penalty is so large that the limit holds by it and seldom by a repair: results and optimum are
 compared by that objective.

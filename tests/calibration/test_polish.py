@@ -7,13 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.knot_policy import build_knot_policy
 from drivetwin.calibration.metrics import Metric, Outcome
-from drivetwin.calibration.objective import Limit, Objective
+from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
 from drivetwin.calibration.policy import Space
-from drivetwin.calibration.polish import polish
+from drivetwin.calibration.polish import Linear, assemble_program, polish
 from drivetwin.simulation.dual_clutch import FloatArray
 from tests.calibration.cases import SYSTEM, build_profiles, make_draws, make_plant, make_upshift
 
@@ -69,3 +70,35 @@ def test_follows_a_shift_whose_events_change_their_order() -> None:
     objective = Objective((Limit(Metric.SHIFT_TIME, 0.75),), 0.9, 2000.0)
     start = objective.evaluate(run([space.start])[0])
     assert polish(run, space.start, objective, 12).value < 0.22 * start
+
+
+def test_program_with_few_rows_has_the_minimum_of_all_rows() -> None:
+    random = np.random.default_rng(3)
+    for scenarios, rows, q in ((6, 90, 3), (40, 400, 5)):
+        owner = np.sort(
+            np.concatenate([np.arange(scenarios), random.integers(0, scenarios, rows - scenarios)])
+        )
+        jerk = Linear(random.uniform(5.0, 50.0, rows), random.normal(0.0, 90.0, (rows, q)), owner)
+        limit = Linear(
+            random.normal(0.0, 0.1, scenarios),
+            random.normal(0.0, 2.0, (scenarios, q)),
+            np.arange(scenarios),
+        )
+        objective = Objective((Limit(Metric.SHIFT_TIME, 1.0),), 0.9, 500.0)
+        at = random.uniform(0.0, 1.0, q)
+        program = assemble_program(at, objective, jerk, [limit], scenarios)
+        for radius in (0.25, 0.03, 0.003):
+            box = list(zip(np.maximum(-radius, -at), np.minimum(radius, 1.0 - at), strict=True))
+            slack = [(0.0, None)] * (program.cost.size - q - 1)
+            whole = linprog(
+                program.cost,
+                program.matrix.toarray(),
+                program.bound,
+                bounds=[*box, (None, None), *slack],
+            )
+            found = program.solve(radius) - at
+            sizes = jerk.value + jerk.slope @ found
+            peaks = np.array([sizes[owner == one].max() for one in range(scenarios)])
+            excess = np.maximum(limit.value + limit.slope @ found, 0.0).mean()
+            value = compute_tail_mean(peaks, 0.9) + 500.0 * excess
+            assert value == pytest.approx(whole.fun, rel=1e-5)

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
+from scipy.sparse import csr_array, hstack
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import notify_progress
@@ -43,6 +45,8 @@ _RADII = (1.0, 0.3, 0.1)
 """Shares of the trust region in which the linear program is solved and its step tried."""
 _GROWTH, _KEPT, _SHRINK = 2.0, 1.5, 0.05
 """Factors on the radius: after the largest step, on the radius of a smaller one, after none."""
+_VIOLATED = 1e-6
+"""Excess of a row over its bound, relative to the least cost, below which the row holds."""
 _STALL = 2e-3
 """Relative gain below which an iteration counts as none."""
 _STALLS = 4
@@ -50,7 +54,7 @@ _STALLS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class _Linear:
+class Linear:
     """Rows of a linear program: `value` (r,) and `slope` (r, q) of what scenario `owner` has."""
 
     value: FloatArray
@@ -59,28 +63,53 @@ class _Linear:
 
 
 @dataclass(frozen=True, eq=False)
-class _Program:
-    """Linear program at coordinates `at` (q,): cost, matrix and bounds of its rows."""
+class Program:
+    """Linear program at coordinates `at` (q,): cost, matrix and bounds of its rows.
+
+    The first rows are those of jerk, each of a scenario in `owner` (r,); few of them bind.
+    """
 
     at: FloatArray
     cost: FloatArray
-    matrix: FloatArray
+    matrix: Any  # A csr_array; the types of `linprog` lack the sparse arrays that it takes.
     bound: FloatArray
+    owner: NDArray[np.intp]
 
     def solve(self, radius: float) -> FloatArray:
-        """Return the best coordinates (q,) within a radius; `at` where there is no solution."""
-        at = self.at
-        box = list(zip(np.maximum(-radius, -at), np.minimum(radius, 1.0 - at), strict=True))
-        slack = [(0.0, None)] * (self.cost.size - at.size - 1)
-        solved = linprog(
-            self.cost,
-            A_ub=self.matrix,
-            b_ub=self.bound,
-            bounds=[*box, (None, None), *slack],
-            method="highs",
-        )
-        step = solved.x[: at.size] if solved.x is not None else np.zeros(at.size)
-        return np.asarray(np.clip(at + step, 0.0, 1.0))
+        """Return the best coordinates (q,) within a radius; `at` where there is no solution.
+
+        Rows of jerk join where a solution violates them, the most violated one of each scenario,
+        so that the last solution is that of all rows. Source: J. E. Kelley, The cutting-plane
+        method for solving convex programs, J. SIAM 8 (1960).
+        """
+        at, rows = self.at, self.owner.size
+        box = zip(np.maximum(-radius, -at), np.minimum(radius, 1.0 - at), strict=True)
+        bounds = [*box, (None, None), *[(0.0, None)] * (self.cost.size - at.size - 1)]
+        kept = np.arange(self.bound.size) >= rows
+        kept[_choose_largest(-self.bound[:rows], self.owner)] = True
+        while True:
+            solved = linprog(
+                self.cost,
+                A_ub=self.matrix[kept],
+                b_ub=self.bound[kept],
+                bounds=bounds,
+                method="highs",
+            )
+            if solved.x is None:
+                return at
+            excess = np.where(kept, 0.0, self.matrix @ solved.x - self.bound)[:rows]
+            worst = _choose_largest(excess, self.owner)
+            joining = worst[excess[worst] > _VIOLATED * abs(float(self.cost @ solved.x))]
+            if joining.size == 0:
+                return np.asarray(np.clip(at + solved.x[: at.size], 0.0, 1.0))
+            kept[joining] = True
+
+
+def _choose_largest(values: FloatArray, owner: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the place of the largest of `values` (r,) of each owner (r,)."""
+    order = np.lexsort((values, owner))
+    last = np.searchsorted(owner[order], np.unique(owner), side="right") - 1
+    return np.asarray(order[last])
 
 
 def polish(run: Run, start: FloatArray, objective: Objective, iterations: int) -> Candidate:
@@ -116,17 +145,17 @@ def _change_radius(radius: float, chosen: int | None) -> float:
     return min((_KEPT if chosen else _GROWTH) * _RADII[chosen] * radius, _LARGEST_RADIUS)
 
 
-def _build_program(run: Run, at: FloatArray, outcome: Outcome, objective: Objective) -> _Program:
+def _build_program(run: Run, at: FloatArray, outcome: Outcome, objective: Objective) -> Program:
     """Linearise jerk and limits at coordinates (q,)."""
     signs = np.where(at < 0.5, 1.0, -1.0)
     moved = run([at + _DIFFERENCE * step for step in np.diag(signs)])
     width = _DIFFERENCE * signs
     jerk = _linearise_jerk(outcome, moved, width)
     limits = [_linearise_limit(one, outcome, moved, width) for one in objective.limits]
-    return _Program(at, *_assemble(objective, jerk, limits, outcome.jerk.shape[0]))
+    return assemble_program(at, objective, jerk, limits, outcome.jerk.shape[0])
 
 
-def _linearise_jerk(outcome: Outcome, moved: list[Outcome], width: FloatArray) -> _Linear:
+def _linearise_jerk(outcome: Outcome, moved: list[Outcome], width: FloatArray) -> Linear:
     size = np.abs(outcome.jerk)
     rows, columns = [], []
     for owner, values in enumerate(size):
@@ -143,12 +172,12 @@ def _linearise_jerk(outcome: Outcome, moved: list[Outcome], width: FloatArray) -
     slope = np.stack([sign * (one.jerk[r, c] - base) / h
                       for one, h in zip(moved, width, strict=True)], axis=1)  # fmt: skip
     kept = np.abs(slope).max(axis=1) < _STEEPEST
-    return _Linear(np.abs(base)[kept], slope[kept], r[kept])
+    return Linear(np.abs(base)[kept], slope[kept], r[kept])
 
 
 def _linearise_limit(
     limit: Limit, outcome: Outcome, moved: list[Outcome], width: FloatArray
-) -> _Linear:
+) -> Linear:
     """Relative distance from a limit, of each scenario or of their mean."""
 
     def measure(one: Outcome) -> FloatArray:
@@ -159,28 +188,27 @@ def _linearise_limit(
     base = measure(outcome)
     slope = np.stack([(measure(one) - base) / h for one, h in zip(moved, width, strict=True)],
                      axis=1)  # fmt: skip
-    return _Linear(base, slope, np.arange(base.size))
+    return Linear(base, slope, np.arange(base.size))
 
 
-def _assemble(
-    objective: Objective, jerk: _Linear, limits: list[_Linear], scenarios: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Cost, matrix and bounds over step (q,), threshold, excess over it (runs,), and the limits'.
+def assemble_program(
+    at: FloatArray, objective: Objective, jerk: Linear, limits: list[Linear], scenarios: int
+) -> Program:
+    """Assemble the program over step (q,), threshold, excess over it (runs,), and the limits'.
 
     The tail mean is the threshold plus the mean excess over it divided by 1 - share.
     """
-    q, rows = jerk.slope.shape[1], jerk.value.size
     counts = [one.value.size for one in limits]
     tail = 1.0 / ((1.0 - objective.share) * scenarios)
     excess = [np.full(count, objective.weight / count) for count in counts]
-    cost = np.concatenate([np.zeros(q), [1.0], np.full(scenarios, tail), *excess])
-    matrix = np.zeros((rows + sum(counts), cost.size))
-    matrix[:rows, :q] = jerk.slope
-    matrix[:rows, q] = -1.0
-    matrix[np.arange(rows), q + 1 + jerk.owner] = -1.0
-    row, column = rows, q + 1 + scenarios
-    for one, count in zip(limits, counts, strict=True):
-        matrix[row : row + count, :q] = one.slope
-        matrix[row + np.arange(count), column + np.arange(count)] = -1.0
-        row, column = row + count, column + count
-    return cost, matrix, np.concatenate([-jerk.value, *(-one.value for one in limits)])
+    cost = np.concatenate([np.zeros(at.size), [1.0], np.full(scenarios, tail), *excess])
+    value = np.concatenate([jerk.value, *(one.value for one in limits)])
+    slope = np.concatenate([jerk.slope, *(one.slope for one in limits)])
+    threshold = np.where(np.arange(value.size) < jerk.value.size, -1.0, 0.0)
+    own = np.concatenate([jerk.owner, scenarios + np.arange(sum(counts))])
+    slack = csr_array(
+        (np.full(value.size, -1.0), (np.arange(value.size), own)),
+        shape=(value.size, scenarios + sum(counts)),
+    )
+    matrix = hstack([csr_array(slope), csr_array(threshold[:, None]), slack], format="csr")
+    return Program(at, cost, matrix, -value, jerk.owner)
