@@ -93,6 +93,10 @@ _SPECS = (
         1.0, "log",
     ),
     ParameterSpec(
+        "p_delay", "pressure delay", "τ_p", "s",
+        "delay of the acting clutch pressures behind the logged ones", -1.0, 1.0,
+    ),
+    ParameterSpec(
         "mode_frequency", "input-shaft frequency", "f_s", "Hz",
         "frequency of the engine's share of J1 on the input shaft, with the gearbox held", 0.0, 1e3,
     ),

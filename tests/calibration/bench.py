@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.policy import Space
@@ -28,14 +30,24 @@ SENSORS = (
 )
 
 
-def write_bench_log(path: Path, model: DualClutch, seed: int = 1) -> None:
-    """Write the log of a power-on upshift of `model` with the starting values of the policy."""
+def write_bench_log(path: Path, model: DualClutch, late: float = 0.0, seed: int = 1) -> None:
+    """Write the log of a power-on upshift of `model` with the starting values of the policy.
+
+    Pressures act `late` [s] behind the logged ones.
+    """
     shift = Maneuver(model, OperatingPoint(1400.0, 175.0), 0.5, request=1.5, horizon=4.0)
     space = Space(build_controller_policy(shift, SYSTEM))
     given = build_profiles(space, space.start)
     seen = list_sampling_instants(SENSORS, shift.horizon)
     pressures = {"B2": given.offgoing, "B3": given.oncoming}
-    run = simulate(model, given.engine_torque, pressures, shift.build_start(), seen)
+    acting = given.delay_pressures(late).sample(1e-3 * np.arange(round(1e3 * shift.horizon) + 1))
+    run = simulate(
+        model,
+        given.engine_torque,
+        {"B2": acting.offgoing, "B3": acting.oncoming},
+        shift.build_start(),
+        seen,
+    )
     inputs = {
         "engine_torque": given.engine_torque,
         **{f"pressure.{name}": one for name, one in pressures.items()},

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ import pytest
 from drivetwin.calibration.learn import Correction, correct_twin
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.vehicle_unknowns import METHOD, build_unknowns
+from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import require_shifts
+from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.nominal_shift import build_nominal_shift
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.twin import PRESSURE_DELAY, Twin
 from drivetwin.validation.logged_shift import LoggedShift
 from tests.calibration.bench import write_bench_log
 from tests.calibration.twins import STD, make_twin
@@ -92,10 +95,44 @@ def test_without_a_deviation_the_twin_stays(found: Correction, logged: LoggedShi
 
 def test_the_spread_widens_the_prior(twin: Twin) -> None:
     shift = build_nominal_shift(twin, ("2", "3"))
-    stds = [
-        np.linalg.norm(build_unknowns(twin, shift, spread).root, axis=1)
+    narrow, wide = (
+        build_unknowns(twin, shift, spread)
         for spread in (Spread(gain=0.0, engine_torque=0.0), Spread())
-    ]
-    names = (*build_unknowns(twin, shift, Spread()).ids, "B2", "B3")
+    )
+    stds = [np.linalg.norm(one.root, axis=1) for one in (narrow, wide)]
+    laws = [f"{one.element}.{key}" for one in wide.friction for key in LAW]
+    names = (*wide.ids, *laws)
     wider = {name for name, a, b in zip(names, *stds, strict=True) if b > 1.01 * a}
-    assert wider == {"eta", "B2", "B3"}
+    assert wider == {"eta", *(name for name in laws if not name.endswith("ln_v_s"))}
+
+
+def test_pressures_that_act_late_are_found(twin: Twin, tmp_path: Path) -> None:
+    late, shift = 4e-3, build_nominal_shift(twin, ("2", "3"))
+    path = tmp_path / "bench.csv"
+    write_bench_log(path, twin.build_dual_clutch(shift), late)
+    log = read_log(path, twin.build_card())
+    logged = LoggedShift(log, require_shifts(log, twin.build_card()).shifts[0])
+    delay = correct_twin(twin, [logged], Spread()).twin.parameters[PRESSURE_DELAY]
+    assert delay.value is not None
+    assert delay.std_total is not None
+    assert delay.std_total < 1e-3
+    assert abs(delay.value - late) < 3.0 * delay.std_total
+
+
+def test_a_clutch_without_a_curve_gets_a_law_of_its_own(twin: Twin, tmp_path: Path) -> None:
+    shift = build_nominal_shift(twin, ("2", "3"))
+    model = twin.build_dual_clutch(shift)
+    old, new = model.elements
+    law = old.friction
+    assert isinstance(law, Stribeck)
+    other = replace(law, mu_c=0.95 * law.mu_c, mu_s=0.85 * law.mu_s)
+    path = tmp_path / "bench.csv"
+    write_bench_log(path, replace(model, elements=(replace(old, friction=other), new)))
+    log = read_log(path, twin.build_card())
+    logged = LoggedShift(log, require_shifts(log, twin.build_card()).shifts[0])
+    borrowed = replace(twin, friction={"B3": twin.friction["B3"]})
+    found = correct_twin(borrowed, [logged], Spread())
+    curve = found.twin.friction["B2"]
+    assert curve.stribeck is not None
+    assert curve.stribeck.mu_s == pytest.approx(other.mu_s, rel=0.02)
+    assert found.after["output_torque"] < 1.3 * 15.0

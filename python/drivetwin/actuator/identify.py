@@ -77,6 +77,12 @@ class IdentifiedActuator:
     samples: int = 0
     source: ActuatorSource = ActuatorSource.PRESSURE
 
+    def delay(self, time: float) -> IdentifiedActuator:
+        """Return the actuator with a dead time longer by `time` [s], within its bounds."""
+        spec = QUANTITIES["dead_time"]
+        late = min(max(self.model.dead_time + time, spec.lower), spec.upper)
+        return replace(self, model=replace(self.model, dead_time=late))
+
     @classmethod
     def from_design(cls, model: ActuatorModel) -> IdentifiedActuator:
         """Return a model from a vehicle card, which counts as exact."""

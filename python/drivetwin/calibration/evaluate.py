@@ -71,7 +71,7 @@ class Plant:
             return self._run_closed_loops([control], scenarios, outputs)[0]
         self.count.runs += scenarios.count
         shift = self.maneuver
-        sampled = control.sample(shift.time)
+        sampled = control.delay_pressures(shift.pressure_delay).sample(shift.time)
         pressures = {
             shift.offgoing.name: sampled.offgoing,
             shift.oncoming.name: sampled.oncoming,

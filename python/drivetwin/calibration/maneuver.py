@@ -26,7 +26,8 @@ class Maneuver:
     """A shift of `model` from its first shift element to its second at an operating point.
 
     `wheel_radius` [m] converts the wheel's motion to the vehicle's. The gear is requested at
-    `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s].
+    `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s]. Pressures act
+    later than they are given by `pressure_delay` [s].
     """
 
     model: DualClutch
@@ -35,6 +36,7 @@ class Maneuver:
     request: float = 0.1
     horizon: float = 1.6
     step: float = 1e-3
+    pressure_delay: float = 0.0
 
     @cached_property
     def time(self) -> FloatArray:

@@ -30,6 +30,11 @@ class Profiles:
             "pressure.oncoming": self.oncoming,
         }
 
+    def delay_pressures(self, delay: float) -> Profiles:
+        """Return the profiles with pressures that act later by `delay` [s]."""
+        late = [replace(one, delay=one.delay + delay) for one in (self.offgoing, self.oncoming)]
+        return Profiles(self.engine_torque, *late)
+
     def sample(self, time: FloatArray) -> Profiles:
         """Return the profiles with corners at `time` (n,) [s] alone.
 
@@ -38,7 +43,7 @@ class Profiles:
         """
         return Profiles(
             *(
-                Signal(time, np.interp(time, one.time, one.values))
+                Signal(time, np.interp(time, one.arrival, one.values))
                 for one in (self.engine_torque, self.offgoing, self.oncoming)
             )
         )

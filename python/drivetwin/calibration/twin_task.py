@@ -25,7 +25,7 @@ from drivetwin.calibration.units import UnitDraws
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.twin.nominal_shift import build_nominal_shift
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.twin import PRESSURE_DELAY, Twin
 
 DEFAULT_LIMITS = {
     Metric.SHIFT_TIME: Statistic.SHARE_95,
@@ -79,7 +79,8 @@ def build_task(twin: Twin, request: Request) -> Task:
     shift = build_nominal_shift(twin, request.gears)
     model = twin.build_dual_clutch(shift)
     point = _choose_point(twin, request)
-    maneuver = Maneuver(model, point, request.wheel_radius)
+    delay = twin.get_value(PRESSURE_DELAY, 0.0)
+    maneuver = Maneuver(model, point, request.wheel_radius, pressure_delay=delay)
     check_torque_phase_first(maneuver)
     units = None
     if request.policy is PolicyKind.SLIP:
@@ -178,5 +179,6 @@ def _build_unit_draws(twin: Twin, maneuver: Maneuver, request: Request) -> UnitD
             "identify a log with the roles pressure_command.ELEMENT, state the actuator on the "
             "vehicle card, or take another --policy",
         )
-    old, new = (twin.actuators[name] for name in names)
+    delay = twin.get_value(PRESSURE_DELAY, 0.0)
+    old, new = (twin.actuators[name].delay(delay) for name in names)
     return UnitDraws(old, new, request.hardware.engine_lag, request.spread)

@@ -3,19 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.scenarios import TwinDraws, compute_friction_std
+from drivetwin.calibration.friction_unknowns import FrictionUnknowns, build_friction_unknowns
+from drivetwin.calibration.scenarios import TwinDraws
 from drivetwin.calibration.spread import Spread
-from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
+from drivetwin.estimation.likelihood.effects.pressure_delay import EFFECT as DELAY
+from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.dual_clutch import Stribeck
-from drivetwin.twin.twin import SIMULATED, Twin
+from drivetwin.twin.twin import PRESSURE_DELAY, SIMULATED, Twin
 
 METHOD = "logs of a calibration"
 """Name of the method in the estimates of a corrected twin."""
@@ -25,7 +27,7 @@ _LEAST = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class VehicleUnknowns:
-    """Values (n,) of one vehicle: parameters `ids` of the twin, then a scale of μ by element.
+    """Values (n,) of one vehicle: parameters `ids` of the twin, then those of the friction.
 
     `mean` and `root` (n, m) are those of the prior: values are mean + root·z with z of the standard
     normal distribution. The prior is the total covariance of the twin together with the spread of
@@ -35,7 +37,7 @@ class VehicleUnknowns:
     twin: Twin
     shift: Shift
     ids: tuple[str, ...]
-    elements: tuple[str, ...]
+    friction: tuple[FrictionUnknowns, ...]
     mean: FloatArray
     root: FloatArray
 
@@ -44,13 +46,14 @@ class VehicleUnknowns:
         return np.asarray(self.mean + self.root @ z)
 
     def is_possible(self, z: FloatArray) -> bool:
-        """Return whether all values are above zero; the load has any sign."""
+        """Return whether parameters and friction are above zero; load and delay have any sign."""
         values = self.to_values(z)
-        return all(
+        above = all(
             value > 0.0
-            for name, value in zip((*self.ids, *self.elements), values, strict=True)
-            if not name.startswith("Tv_over_if")
+            for name, value in zip(self.ids, values, strict=False)
+            if get_parameter_spec(name).lower >= 0.0
         )
+        return above and all(one.is_possible(values[part]) for one, part in self._pair_friction())
 
     def build_twin(self, z: FloatArray, covariance: FloatArray) -> Twin:
         """Build the twin with standardised values (m,) and their covariance (m, m).
@@ -67,14 +70,13 @@ class VehicleUnknowns:
             if get_parameter_spec(name).stem in SIMULATED
         }
         changed = {
-            name: _change(twin.parameters[name], float(value), float(std))
+            name: _change(twin.parameters.get(name), name, float(value), float(std))
             for name, value, std in zip(self.ids, values, stds, strict=False)
         }
         moved = self._move_inertias({**kept, **changed})
-        scales = zip(self.elements, values[count:], stds[count:], strict=True)
         curves = {
-            name: _scale_curve(_find_curve(twin, name, self.elements), float(scale), float(std))
-            for name, scale, std in scales
+            one.element: one.build_curve(values[part], total[part, part], METHOD)
+            for one, part in self._pair_friction()
         }
         return replace(
             twin,
@@ -83,6 +85,13 @@ class VehicleUnknowns:
             covariance_ids=self.ids,
             covariance=np.asarray(total[:count, :count]),
         )
+
+    def _pair_friction(self) -> Iterator[tuple[FrictionUnknowns, slice]]:
+        """Pair the friction of each element with the place of its values."""
+        first = len(self.ids)
+        for one in self.friction:
+            yield one, slice(first, first + one.mean.size)
+            first += one.mean.size
 
     def _move_inertias(self, changed: Mapping[str, Estimate]) -> dict[str, Estimate]:
         """Move J′ of the other gears: Je = J′ - Jo′/i_g² is the same in all."""
@@ -116,19 +125,23 @@ def build_unknowns(twin: Twin, shift: Shift, spread: Spread) -> VehicleUnknowns:
         name for name in (f"P0.{one}" for one in elements) if twin.get_value(name, 0.0) > 0.0
     )
     drawn = TwinDraws(twin, shift, spread).drawn_ids
-    ids = (*drawn, *(name for name in contacts if name not in drawn))
-    mean = np.array([*(twin.get_value(name, 0.0) for name in ids), 1.0, 1.0])
-    covariance = np.zeros((mean.size, mean.size))
-    covariance[: len(ids), : len(ids)] = _collect_covariance(twin, ids)
-    _add_spread(covariance, dict(zip(ids, mean, strict=False)), spread)
-    for place, name in enumerate(elements, len(ids)):
-        curve = _find_curve(twin, name, elements)
-        covariance[place, place] = compute_friction_std(curve) ** 2 + spread.gain**2
+    ids = (*drawn, *(name for name in (*contacts, PRESSURE_DELAY) if name not in drawn))
+    friction = tuple(
+        build_friction_unknowns(one, partner, twin.friction, spread.gain)
+        for one, partner in (elements, elements[::-1])
+    )
+    own = [twin.get_value(name, 0.0) for name in ids]
+    mean = np.concatenate([own, *(one.mean for one in friction)])
+    known = _collect_covariance(twin, ids)
+    if PRESSURE_DELAY not in twin.covariance_ids:
+        known[-1, -1] = DELAY.std**2
+    _add_spread(known, dict(zip(ids, own, strict=True)), spread)
+    covariance = block_diag(known, *(one.covariance for one in friction))
     scale = np.where(mean == 0.0, 1.0, np.abs(mean))
     variances, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
     kept = variances > _LEAST * variances[-1]
     root = scale[:, None] * axes[:, kept] * np.sqrt(variances[kept])
-    return VehicleUnknowns(twin, shift, ids, elements, mean, np.asarray(root))
+    return VehicleUnknowns(twin, shift, ids, friction, mean, np.asarray(root))
 
 
 def _collect_covariance(twin: Twin, ids: tuple[str, ...]) -> FloatArray:
@@ -157,28 +170,7 @@ def _add_spread(covariance: FloatArray, mean: Mapping[str, float], spread: Sprea
     covariance += spread.contact_pressure**2 * np.outer(common, common)
 
 
-def _find_curve(twin: Twin, name: str, elements: tuple[str, ...]) -> FrictionCurve | None:
-    """Find the friction curve of an element, else that of its partner."""
-    known = [twin.friction[one] for one in (name, *elements) if one in twin.friction]
-    return known[0] if known else None
-
-
-def _change(before: Estimate, value: float, std: float) -> Estimate:
+def _change(before: Estimate | None, name: str, value: float, std: float) -> Estimate:
+    if before is None:
+        return Estimate(name, value, std, Verdict.IDENTIFIED, METHOD)
     return replace(before, value=value, std_noise=std, std_systematic=None, method=METHOD)
-
-
-def _scale_curve(curve: FrictionCurve | None, scale: float, std: float) -> FrictionCurve:
-    """Scale a friction curve; its band is that of the scale."""
-    assert curve is not None  # A twin without a curve has no model, and is refused before.
-    mu, law = scale * curve.mu, curve.stribeck
-    half = Z95 * std * np.abs(curve.mu)
-    return replace(
-        curve,
-        mu=mu,
-        mu_lo=mu - half,
-        mu_hi=mu + half,
-        points_mu=scale * curve.points_mu,
-        stribeck=law and Stribeck(scale * law.mu_c, scale * law.mu_s, law.v_s, scale * law.mu_v),
-        stribeck_covariance=None,
-        method=METHOD,
-    )

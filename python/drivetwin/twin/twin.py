@@ -40,7 +40,9 @@ COMMON = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Parameters that every model of a twin needs, besides a J′."""
 OF_ELEMENT = ("P0", "drum")
 """Stems of the element parameters that replace the design value if identified."""
-SIMULATED = (*COMMON, "J_prime", *OF_ELEMENT, "te_delay")
+PRESSURE_DELAY = "p_delay"
+"""Id of the delay of the acting pressures behind the logged ones."""
+SIMULATED = (*COMMON, "J_prime", *OF_ELEMENT, "te_delay", PRESSURE_DELAY)
 """Stems of the parameters that a simulation depends on; the others follow from them."""
 
 

@@ -22,7 +22,7 @@ from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_part import simulate_plant
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.twin import PRESSURE_DELAY, Twin
 from drivetwin.validation.gate import assess_model
 from drivetwin.validation.identified_range import (
     check_range,
@@ -52,7 +52,8 @@ def simulate_shift(
 ) -> Validation:
     """Simulate one shift, from a calm moment in `before` to the end of `after`.
 
-    The engine torque is moved by the twin's `te_delay`; the start state comes from the first
+    The engine torque is moved by the twin's `te_delay`, the pressures by its `p_delay`; the start
+    state comes from the first
     measured moments, unless `start` gives it. `model` replaces the twin's own (e.g. the other loss
     law).
     Raises MissingChannelError, MissingParameterError, and DamagedChannelError if an input has a gap
@@ -89,7 +90,8 @@ def _simulate_window(
     log = refer_to_turbine(log, twin.build_card(), shift)
     engine_torque = _apply_delay(log["engine_torque"], -twin.get_value("te_delay", 0.0))
     pressures = {
-        name: _build_signal(each) for name, each in get_shift_pressures(log, shift).items()
+        name: _delay(each, twin.get_value(PRESSURE_DELAY, 0.0))
+        for name, each in get_shift_pressures(log, shift).items()
     }
     count = int((window[1] - window[0]) / _GRID + 1e-6)
     time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
@@ -212,8 +214,11 @@ def _select_window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
     return find_quiescent_time(log, (float(start), shift.before[1])), float(end)
 
 
-def _build_signal(channel: Channel) -> Signal:
-    return Signal(channel.time, channel.values)
+def _delay(channel: Channel, delay: float) -> Signal:
+    """Samples later by `delay` [s]; the first and the last one reach to the ends of the channel."""
+    time = channel.time + delay
+    time[0], time[-1] = min(time[0], channel.time[0]), max(time[-1], channel.time[-1])
+    return Signal(time, channel.values)
 
 
 def _apply_delay(channel: Channel, shift: float) -> Signal:
