@@ -40,7 +40,9 @@ def write_bench_log(path: Path, model: DualClutch, late: float = 0.0, seed: int 
     given = build_profiles(space, space.start)
     seen = list_sampling_instants(SENSORS, shift.horizon)
     pressures = {"B2": given.offgoing, "B3": given.oncoming}
-    acting = given.delay_pressures(late).sample(1e-3 * np.arange(round(1e3 * shift.horizon) + 1))
+    acting = given.delay_pressures(late).sample(
+        1e-3 * np.arange(round(1e3 * shift.horizon) + 1, dtype=np.float64)
+    )
     run = simulate(
         model,
         given.engine_torque,

@@ -14,7 +14,8 @@ from drivetwin.calibration.friction_unknowns import FrictionUnknowns, build_fric
 from drivetwin.calibration.scenarios import TwinDraws
 from drivetwin.calibration.spread import Spread
 from drivetwin.estimation.likelihood.effects.pressure_delay import EFFECT as DELAY
-from drivetwin.estimation.result.estimate import Estimate, Verdict
+from drivetwin.estimation.result.estimate import Estimate
+from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import PRESSURE_DELAY, SIMULATED, Twin
@@ -172,5 +173,5 @@ def _add_spread(covariance: FloatArray, mean: Mapping[str, float], spread: Sprea
 
 def _change(before: Estimate | None, name: str, value: float, std: float) -> Estimate:
     if before is None:
-        return Estimate(name, value, std, Verdict.IDENTIFIED, METHOD)
+        return assess(name, value, std, METHOD)
     return replace(before, value=value, std_noise=std, std_systematic=None, method=METHOD)

@@ -48,6 +48,7 @@ _EXPERIMENT = {
     "mu": "Record shifts whose inertia phase covers this slip.",
     "drum": "Enter narrower drum inertias in the vehicle card.",
     "te_delay": "Step the pedal in gear.",
+    "p_delay": "Record a shift with faster pressure ramps.",
     "mode_frequency": _EXCITE_ENGINE,
     "mode_share": _EXCITE_ENGINE,
     "mode_damping": _EXCITE_ENGINE,
@@ -92,7 +93,7 @@ def assess(
     """
     spec = get_parameter_spec(parameter_id)
     half = Z95 * float(np.hypot(std_noise, std_systematic or 0.0))
-    if spec.stem == "te_delay":
+    if spec.unit == "s":
         width, limit, end = half, VERDICT.delay_identified, 4.0 * VERDICT.delay_identified
     else:
         width, limit, end = half / max(abs(value), 1e-300), spec.weak_above, 1.0
