@@ -9,11 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.scenarios import compute_friction_std
+from drivetwin.calibration.friction_law import (
+    build_from_law,
+    compute_friction_std,
+    compute_law_covariance,
+    to_law,
+    to_values,
+)
 from drivetwin.estimation.likelihood.priors import OFFGOING_STD
 from drivetwin.estimation.linear.friction_points import LAW_PRIOR, LOG_V
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
-from drivetwin.simulation.dual_clutch import Stribeck
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +43,11 @@ class FrictionUnknowns:
         if curve.stribeck is None:
             scale, slopes = values[0] * np.ones_like(curve.mu), curve.mu[None]
         else:
-            law = _to_law(values)
+            law = to_law(values)
             scale = law.evaluate(curve.slip) / curve.stribeck.evaluate(curve.slip)
             slopes = law.compute_slopes(curve.slip)
-            to_law = np.linalg.inv(_build_from_law(law))
-            law_covariance = to_law @ covariance @ to_law.T
+            back = np.linalg.inv(build_from_law(law))
+            law_covariance = back @ covariance @ back.T
         half = Z95 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, covariance, slopes))
         mu = scale * curve.mu
         place = np.interp(curve.points_slip, curve.slip, scale)
@@ -68,14 +73,13 @@ def build_friction_unknowns(
     """
     own = curves.get(element)
     curve = curves[partner] if own is None else own
-    law, known = curve.stribeck, None if own is None else own.stribeck_covariance
-    mean = np.ones(1) if law is None else _to_values(law)
+    law, known = curve.stribeck, None if own is None else compute_law_covariance(own)
+    mean = np.ones(1) if law is None else to_values(law)
     scaled = np.ones(1) if law is None else mean * np.array([1.0, 1.0, 1.0, 0.0])
     if own is None:
         covariance = _build_other_clutch(curve)
-    elif law is not None and known is not None:
-        from_law = _build_from_law(law)
-        covariance = from_law @ known @ from_law.T
+    elif known is not None:
+        covariance = known
     else:
         covariance = compute_friction_std(curve) ** 2 * np.outer(scaled, scaled)
     return FrictionUnknowns(element, curve, mean, covariance + gain**2 * np.outer(scaled, scaled))
@@ -87,24 +91,3 @@ def _build_other_clutch(curve: FrictionCurve) -> FloatArray:
         return np.array([[(OFFGOING_STD["mu_c"] / float(np.median(curve.mu))) ** 2]])
     stds = (OFFGOING_STD["mu_c"], OFFGOING_STD["mu_drop"], 0.0, LAW_PRIOR[LOG_V][1])
     return np.diag(np.square(stds))
-
-
-def _to_values(law: Stribeck) -> FloatArray:
-    return np.array([law.mu_c, law.mu_s - law.mu_c, law.mu_v, np.log(law.v_s)])
-
-
-def _to_law(values: FloatArray) -> Stribeck:
-    mu_c, drop, mu_v, ln_v_s = (float(one) for one in values)
-    return Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v)
-
-
-def _build_from_law(law: Stribeck) -> FloatArray:
-    """Derivatives (4, 4) of the values by the fields of a law."""
-    return np.array(
-        [
-            [1.0, 0.0, 0.0, 0.0],
-            [-1.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 1.0],
-            [0.0, 0.0, 1.0 / law.v_s, 0.0],
-        ]
-    )

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.friction_law import compute_scale_std, draw_law
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import DrawUnit
 from drivetwin.errors import InputError
-from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import (
@@ -173,8 +174,9 @@ def scale_units(model: DualClutch, spread: Spread, random: np.random.Generator) 
 class TwinDraws:
     """Draws of a twin: parameters by covariance, friction by its band, and made units.
 
-    The covariance is the total one, with sensor tolerances and effects. The friction curve of each
-    element is scaled as a whole, by the relative half width of its band in its middle.
+    The covariance is the total one, with sensor tolerances and effects. The friction law of each
+    element is drawn by its covariance. The curve is scaled as a whole by what its band in the
+    middle has beside it.
     """
 
     twin: Twin
@@ -187,8 +189,11 @@ class TwinDraws:
         if any(value <= 0.0 and name != "Tv_over_if" for name, value in overrides.items()):
             return None
         model = self.twin.build_dual_clutch(self.shift, overrides=overrides)
-        elements = tuple(self._scale_friction(one, random) for one in model.elements)
-        return scale_units(replace(model, elements=elements), self.spread, random)
+        elements = [self._draw_friction(one, random) for one in model.elements]
+        old, new = elements
+        if old is None or new is None:
+            return None
+        return scale_units(replace(model, elements=(old, new)), self.spread, random)
 
     def _draw_parameters(self, random: np.random.Generator) -> dict[str, float]:
         twin = self.twin
@@ -217,22 +222,30 @@ class TwinDraws:
             if one.removesuffix(OVER_ETA) in used and twin.parameters[one].value is not None
         ]
 
-    def _scale_friction(self, element: ShiftElement, random: np.random.Generator) -> ShiftElement:
-        return scale_friction(element, float(random.normal(1.0, self._friction_stds[element.name])))
+    def _draw_friction(
+        self, element: ShiftElement, random: np.random.Generator
+    ) -> ShiftElement | None:
+        """Draw the friction of an element; None where it is impossible."""
+        curve = self._curves.get(element.name)
+        scale = float(random.normal(1.0, self._scale_stds[element.name]))
+        if curve is None or curve.stribeck_covariance is None:
+            return scale_friction(element, scale)
+        law = draw_law(curve, random)
+        return None if law is None else scale_friction(replace(element, friction=law), scale)
 
     @cached_property
-    def _friction_stds(self) -> dict[str, float]:
+    def _curves(self) -> dict[str, FrictionCurve]:
+        """Curves of μ by element; one over η is scaled as in the model."""
+        eta = self.twin.get_value("eta", 1.0)
+        return {
+            name: curve.scale_by_eta(eta) if curve.over_eta else curve
+            for name, curve in self.twin.friction.items()
+        }
+
+    @cached_property
+    def _scale_stds(self) -> dict[str, float]:
         names = (self.shift.offgoing, self.shift.oncoming)
-        return {name: compute_friction_std(self.twin.friction.get(name)) for name in names}
-
-
-def compute_friction_std(curve: FrictionCurve | None) -> float:
-    """Relative standard deviation of μ in the middle of its curve; 0 without one."""
-    if curve is None:
-        return 0.0
-    half = 0.5 * (curve.mu_hi - curve.mu_lo) / np.abs(curve.mu)
-    half = half[np.isfinite(half)]
-    return float(np.median(half)) / Z95 if half.size else 0.0
+        return {name: compute_scale_std(self._curves.get(name)) for name in names}
 
 
 def scale_friction(element: ShiftElement, scale: float) -> ShiftElement:

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""Friction laws as values with a covariance: μ_c, μ_s - μ_c, μ_v and ln v_s."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.simulation.dual_clutch import Stribeck
+
+
+def to_values(law: Stribeck) -> FloatArray:
+    """Return the values (4,) of a law."""
+    return np.array([law.mu_c, law.mu_s - law.mu_c, law.mu_v, np.log(law.v_s)])
+
+
+def to_law(values: FloatArray) -> Stribeck:
+    """Return the law of values (4,)."""
+    mu_c, drop, mu_v, ln_v_s = (float(one) for one in values)
+    return Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v)
+
+
+def build_from_law(law: Stribeck) -> FloatArray:
+    """Build the derivatives (4, 4) of the values by the fields of a law."""
+    rows = np.zeros((4, 4))
+    rows[0, 0], rows[1, :2], rows[2, 3], rows[3, 2] = 1.0, (-1.0, 1.0), 1.0, 1.0 / law.v_s
+    return rows
+
+
+def compute_law_covariance(curve: FrictionCurve) -> FloatArray | None:
+    """Compute the covariance (4, 4) of the values of a curve; None where it has none."""
+    if curve.stribeck is None or curve.stribeck_covariance is None:
+        return None
+    rows = build_from_law(curve.stribeck)
+    return np.asarray(rows @ curve.stribeck_covariance @ rows.T)
+
+
+def compute_friction_std(curve: FrictionCurve | None) -> float:
+    """Relative standard deviation of μ in the middle of its curve; 0 without one."""
+    if curve is None:
+        return 0.0
+    half = 0.5 * (curve.mu_hi - curve.mu_lo) / np.abs(curve.mu)
+    half = half[np.isfinite(half)]
+    return float(np.median(half)) / Z95 if half.size else 0.0
+
+
+def compute_scale_std(curve: FrictionCurve | None) -> float:
+    """Relative standard deviation of μ that its band has beside the covariance of its law."""
+    whole = compute_friction_std(curve)
+    covariance = None if curve is None else compute_law_covariance(curve)
+    if curve is None or curve.stribeck is None or covariance is None:
+        return whole
+    slopes = curve.stribeck.compute_slopes(curve.slip)
+    variance = np.einsum("pn,pq,qn->n", slopes, covariance, slopes) / curve.mu**2
+    return float(np.sqrt(max(whole**2 - float(np.median(variance)), 0.0)))
+
+
+def draw_law(curve: FrictionCurve, random: np.random.Generator) -> Stribeck | None:
+    """Draw a law by its covariance; None where the curve has none, or μ is not above zero."""
+    covariance = compute_law_covariance(curve)
+    if curve.stribeck is None or covariance is None:
+        return curve.stribeck
+    values = random.multivariate_normal(to_values(curve.stribeck), covariance, method="eigh")
+    law = to_law(values)
+    return law if min(law.mu_c, law.mu_s) > 0.0 else None
