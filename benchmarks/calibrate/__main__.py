@@ -54,17 +54,21 @@ _HEAD = (
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem: its task, candidates of each finalist, and bounds of quantiles of peak jerk."""
+    """A problem: its task, candidates of a finalist and of a generation, bounds of peak jerk.
+
+    The bounds are by quantile.
+    """
 
     make: Callable[[CalibrationSettings, int], Task]
     evaluations: int
+    population: int
     jerk: Mapping[float, float]
     locks_once: bool
 
 
 _PROBLEMS = {
-    PolicyKind.KNOTS: Problem(make_task, 8000, {0.95: 50.0, 0.99: 60.0}, locks_once=False),
-    PolicyKind.SLIP: Problem(make_slip_task, 1440, {0.95: 32.0, 0.995: 45.0}, locks_once=True),
+    PolicyKind.KNOTS: Problem(make_task, 8000, 24, {0.95: 50.0, 0.99: 60.0}, locks_once=False),
+    PolicyKind.SLIP: Problem(make_slip_task, 1440, 12, {0.95: 32.0, 0.995: 45.0}, locks_once=True),
 }
 
 
@@ -119,6 +123,7 @@ def solve(problem: Problem, given: argparse.Namespace) -> list[str]:
         certificate_draws=FRESH,
         starts=given.starts,
         evaluations=given.evaluations or problem.evaluations,
+        population=problem.population,
     )
     task = problem.make(settings, given.seed)
     fresh = draw_scenarios(task.maneuver, task.draw, FRESH, CERTIFICATE_SEED, Purpose.CERTIFICATE)

@@ -31,6 +31,8 @@ _GAIN, _LARGEST_GAIN = 0.25, 4.0
 """Proportional gain, over inertia pressure per slip at the begin of the inertia phase."""
 _INTEGRAL, _LARGEST_INTEGRAL = 0.6, 25.0
 """Integral gain [1/s], over the same."""
+_LOCK_RATE = 10.0
+"""Starting rate of the final ramp [1/s], over system pressure."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def build_slip_policy(
     parameters = (
         *_list_fill_parameters(unit.oncoming, contact, system_pressure),
         *_list_torque_phase_parameters(pressures),
-        *_list_inertia_parameters(pressures, _compute_slip(maneuver)),
+        *_list_inertia_parameters(pressures, _compute_slip(maneuver), task),
         *_list_torque_parameters(abs(maneuver.point.engine_torque)),
     )
     start = {one.name: one.start for one in parameters}
@@ -131,7 +133,10 @@ def _list_torque_phase_parameters(pressures: PhasePressures) -> tuple[PolicyPara
     )  # fmt: skip
 
 
-def _list_inertia_parameters(pressures: PhasePressures, slip: float) -> tuple[PolicyParameter, ...]:
+def _list_inertia_parameters(
+    pressures: PhasePressures, slip: float, task: float
+) -> tuple[PolicyParameter, ...]:
+    """The final ramp may be a step: a locked element does not feel its pressure."""
     middle, highest = pressures.inertia, pressures.system
     unit = middle / slip
     return (
@@ -147,7 +152,8 @@ def _list_inertia_parameters(pressures: PhasePressures, slip: float) -> tuple[Po
                         "proportional gain of the slip loop"),
         PolicyParameter("integral_gain", "Pa/rad", 0.0, _LARGEST_INTEGRAL * unit,
                         _INTEGRAL * unit, "integral gain of the slip loop"),
-        PolicyParameter("lock_rate", "Pa/s", 0.1 * highest, 6.0 * highest, highest,
+        PolicyParameter("lock_rate", "Pa/s", 0.1 * highest, highest / task,
+                        min(_LOCK_RATE * highest, highest / task),
                         "final ramp to system pressure"),
     )  # fmt: skip
 
