@@ -15,7 +15,7 @@ from drivetwin.actuator.identify import (
     PressureRecord,
     identify_actuator,
 )
-from drivetwin.actuator.model import QUANTITIES
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.errors import IdentificationError
 
 NAMES = list(QUANTITIES)
@@ -81,3 +81,11 @@ def test_a_pressure_of_another_clutch_is_refused() -> None:
 def test_a_design_value_has_no_spread() -> None:
     model = make_actuator(np.random.default_rng(1)).model
     assert not IdentifiedActuator.from_design(model).std.any()
+
+
+def test_a_delay_lengthens_the_dead_time_within_its_bounds() -> None:
+    model = ActuatorModel(dead_time=0.02, rising_lag=0.02, falling_lag=0.03)
+    one = IdentifiedActuator.from_design(model)
+    assert one.delay(0.003).model.dead_time == pytest.approx(0.023)
+    assert one.delay(-1.0).model.dead_time == QUANTITIES["dead_time"].lower
+    assert one.delay(0.003).model.rising_lag == model.rising_lag

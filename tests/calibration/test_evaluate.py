@@ -32,3 +32,16 @@ def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     few = replace(plant, metrics=(Metric.FLARE,)).evaluate(profiles, draws)
     assert set(few.values) == {Metric.FLARE}
     assert np.array_equal(few.jerk.shape, whole.jerk.shape)
+
+
+def test_late_pressures_move_the_shift_by_their_delay() -> None:
+    """With a constant engine torque, a delay of all pressures moves the lock-up."""
+    shift = make_upshift()
+    policy = build_controller_policy(shift, SYSTEM).set_start({"reduction_depth": 0.0})
+    space = Space(policy)
+    control = space.build_control(space.start)
+    locks = []
+    for delay in (0.0, 0.01):
+        plant, draws = make_plant(replace(shift, pressure_delay=delay)), make_draws(shift, 4)
+        locks.append(plant.simulate(control, draws, ("shaft_torque",))[1])
+    np.testing.assert_allclose(locks[1] - locks[0], 0.01, rtol=0.1)
