@@ -24,14 +24,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.calibrate.true_units import TrueUnits, draw_true_units, record_shift
+from benchmarks.calibrate.true_units import draw_true_units, record_shift
 from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
 from benchmarks.estimation.vehicles import SHIFT
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.calibrate import Task, find_best, make_quick_plant
+from drivetwin.calibration.calibrate import Task, build_objective, find_best, make_quick_plant
 from drivetwin.calibration.learn import correct_twin
 from drivetwin.calibration.metrics import Metric, Outcome
-from drivetwin.calibration.objective import Objective, compute_tail_mean
+from drivetwin.calibration.objective import Objective
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
 from drivetwin.calibration.profiles import Profiles
@@ -92,8 +92,9 @@ def learn_vehicle(made: MadeVehicle, effort: float) -> Trial:
     request = _build_request(made, effort)
     task = build_task(made.twin, request)
     limits = tuple(one for one in task.limits if one.metric is Metric.SHIFT_TIME)
-    request = replace(request, limits=limits)
-    values = [_calibrate(made.twin, request)]
+    request, task = replace(request, limits=limits), task.set_limits(limits)
+    weight = build_objective(task, make_quick_plant(task)).weight
+    values = [_calibrate(made.twin, request, weight)]
     logged: list[LoggedShift] = []
     for number in range(1, ITERATIONS + 1):
         control = task.policy.build_control(values[-1])
@@ -104,23 +105,28 @@ def learn_vehicle(made: MadeVehicle, effort: float) -> Trial:
         twin = correct_twin(made.twin, logged, request.spread).twin
         names = (one.name for one in task.policy.parameters)
         start = dict(zip(names, values[-1].tolist(), strict=True))
-        values.append(_calibrate(twin, replace(request, start=start, settings=_WARM)))
-    return _compare(made, task.set_limits(limits), values)
+        warm = replace(request, start=start, settings=_WARM)
+        values.append(_calibrate(twin, warm, weight))
+    return _compare(made, task, values, weight)
 
 
-def _calibrate(twin: Twin, request: Request) -> FloatArray:
+def _calibrate(twin: Twin, request: Request, weight: float) -> FloatArray:
+    """Calibrate with a penalty of `weight`, whatever the comfort of the start is."""
     task = build_task(twin, request)
-    return Space(task.policy).to_values(find_best(task, make_quick_plant(task)))
+    plant = make_quick_plant(task)
+    penalty = task.settings.penalty * weight / build_objective(task, plant).weight
+    task = replace(task, settings=replace(task.settings, penalty=penalty))
+    return Space(task.policy).to_values(find_best(task, plant))
 
 
-def _compare(made: MadeVehicle, task: Task, values: Sequence[FloatArray]) -> Trial:
+def _compare(made: MadeVehicle, task: Task, values: Sequence[FloatArray], weight: float) -> Trial:
     """Compare calibrations with the optimum on fresh true units."""
     space = Space(task.policy)
     polished, fresh = (
         draw_true_units(made, task.maneuver, Spread(), count, seed)
         for seed, count in enumerate((_POLISHED, _FRESH))
     )
-    objective = _build_objective(task, polished)
+    objective = Objective(task.limits, task.settings.search_share, weight)
     outcomes = [fresh.evaluate(task.policy.build_control(one)) for one in values]
     reached = [_assess(objective, one) for one in outcomes]
     best = polish(
@@ -138,14 +144,6 @@ def _compare(made: MadeVehicle, task: Task, values: Sequence[FloatArray]) -> Tri
 def _assess(objective: Objective, outcome: Outcome) -> float:
     """Return the objective without the penalty on second slips."""
     return objective.evaluate(outcome) - objective.weight * float(outcome.relocked.mean())
-
-
-def _build_objective(task: Task, units: TrueUnits) -> Objective:
-    """Build the objective of the calibration on true units, scaled by their start."""
-    settings, space = task.settings, Space(task.policy)
-    start = units.evaluate(space.build_control(space.start))
-    comfort = compute_tail_mean(start.values[Metric.PEAK_JERK], settings.search_share)
-    return Objective(task.limits, settings.search_share, settings.penalty * comfort)
 
 
 def _build_request(made: MadeVehicle, effort: float) -> Request:

@@ -136,3 +136,22 @@ def test_a_clutch_without_a_curve_gets_a_law_of_its_own(twin: Twin, tmp_path: Pa
     assert curve.stribeck is not None
     assert curve.stribeck.mu_s == pytest.approx(other.mu_s, rel=0.02)
     assert found.after["output_torque"] < 1.3 * 15.0
+
+
+def test_a_second_log_narrows_the_values_of_a_distant_vehicle(twin: Twin, tmp_path: Path) -> None:
+    model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
+    old, new = model.elements
+    other = replace(model, elements=(old, replace(new, gain=1.08 * new.gain)))
+    logged = []
+    for seed in (1, 2):
+        path = tmp_path / f"bench-{seed}.csv"
+        write_bench_log(path, other, seed=seed)
+        log = read_log(path, twin.build_card())
+        logged.append(LoggedShift(log, require_shifts(log, twin.build_card()).shifts[0]))
+    once, twice = (correct_twin(twin, logged[:count], Spread()) for count in (1, 2))
+    for found in (once, twice):
+        assert found.after["output_torque"] < 1.3 * 15.0
+    stds = [one.twin.parameters["eta"].std_total for one in (once, twice)]
+    assert stds[0] is not None
+    assert stds[1] is not None
+    assert stds[1] < 0.9 * stds[0]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import notify_progress
+from drivetwin._util.progress import notify_progress, scale_progress
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.vehicle_unknowns import VehicleUnknowns, build_unknowns
 from drivetwin.errors import IdentificationError
@@ -31,7 +31,7 @@ _DIFFERENCE = 0.1
 """Step of the differences, in standard deviations of the prior."""
 _CORRELATION = 0.02
 """Time [s] within which errors of the model are the same: samples in it count as one."""
-_LEAST_STEP = 0.1
+_LEAST_STEP = 0.02
 """Share of a step below which the correction ends."""
 _LEAST_RMS = 1e-6
 """Deviation (SI) below which a signal counts as exact."""
@@ -49,30 +49,21 @@ class Correction:
 def correct_twin(twin: Twin, logged: Sequence[LoggedShift], spread: Spread) -> Correction:
     """Correct a twin by shifts of one vehicle between the same two gears.
 
+    Shifts join one after the other, each fit from the last result: from the twin itself all of them
+    together may be so far away that no step gains.
     Raises IdentificationError where a simulation of them does not reach its end, and what
     `simulate_shift` raises.
     """
     unknowns = build_unknowns(twin, logged[0].shift, spread)
     first = [one.simulate(twin) for one in logged]
-    shown = _Shown(unknowns, logged, first)
     z, covariance = np.zeros(unknowns.root.shape[1]), np.eye(unknowns.root.shape[1])
-    deviations = shown.compute(z)
-    if deviations is None:
-        raise IdentificationError(
-            "the simulation of a logged shift by the twin does not reach its end",
-            "check that the logs are of this vehicle, and identify it again",
-        )
-    before = _compute_rms(deviations)
-    for number in range(_ROUNDS):
-        notify_progress(number / _ROUNDS)
-        step, covariance = shown.solve(z, deviations)
-        if float(np.max(np.abs(step) / np.sqrt(np.diag(covariance)))) < _SETTLED:
-            break
-        found = shown.search(z, step, deviations)
-        if found is None:
-            break
-        z, deviations = found
-    return Correction(unknowns.build_twin(z, covariance), before, _compute_rms(deviations))
+    before = _Shown(unknowns, logged, first).require(z)
+    for count in range(1, len(logged) + 1):
+        shown = _Shown(unknowns, logged[:count], first[:count])
+        with scale_progress((count - 1) / len(logged), count / len(logged)):
+            z, covariance = shown.fit(z)
+    after = _Shown(unknowns, logged, first).require(z)
+    return Correction(unknowns.build_twin(z, covariance), _compute_rms(before), _compute_rms(after))
 
 
 _Deviations = dict[str, FloatArray]
@@ -86,6 +77,33 @@ class _Shown:
     unknowns: VehicleUnknowns
     logged: Sequence[LoggedShift]
     first: Sequence[Validation]
+
+    def fit(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the likeliest values (m,) from `z` on, and their covariance (m, m)."""
+        deviations, covariance = self.require(z), np.eye(z.size)
+        for number in range(_ROUNDS):
+            notify_progress(number / _ROUNDS)
+            step, covariance = self.solve(z, deviations)
+            if float(np.max(np.abs(step) / np.sqrt(np.diag(covariance)))) < _SETTLED:
+                break
+            found = self.search(z, step, deviations)
+            if found is None:
+                break
+            z, deviations = found
+        return z, covariance
+
+    def require(self, z: FloatArray) -> _Deviations:
+        """Compute the deviations of standardised values (m,).
+
+        Raises IdentificationError where they are impossible.
+        """
+        deviations = self.compute(z)
+        if deviations is None:
+            raise IdentificationError(
+                "the simulation of a logged shift by the twin does not reach its end",
+                "check that the logs are of this vehicle, and identify it again",
+            )
+        return deviations
 
     def compute(self, z: FloatArray) -> _Deviations | None:
         """Compute the deviations of standardised values (m,); None where they are impossible."""
