@@ -9,9 +9,9 @@ the shift, its log corrects the twin, and the shift is calibrated again from the
 bench follows torque and pressures by the sensors of the log. The objective is that of the
 calibration (tail mean of peak jerk, with the penalty of the shift time), over units made around the
 true vehicle. Its optimum is the least of all these results and of a polish on true units from the
-best of them. Units that slip again after their lock-up are counted beside it: one
-of 240 is below what the draws of a calibration can see. Wanted: after five iterations within 5 %
-above the optimum in at least 50 of 60 vehicles.
+best of them. Units that slip again after their lock-up are counted beside it: one of 240 is below
+what the draws of a calibration can see. Wanted: after five iterations within 5 % above the optimum
+in at least 50 of 60 vehicles.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ _LIGHT = CalibrationSettings(
 """Settings with one objective in all stages.
 
 The last polish has 512 draws: on 128 a policy of 17 free parameters is fitted to the draws, so that
-its tail mean on others is 5 to 20 % higher, on the true units too.
+its tail mean is higher on others, and on true units.
 
 The penalty is so large that the limit holds by it and seldom by a repair: results and optimum are
 compared by that objective.

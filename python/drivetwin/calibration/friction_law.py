@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.linear.friction_points import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
 
@@ -23,9 +24,7 @@ def to_law(values: FloatArray) -> Stribeck:
 
 def build_from_law(law: Stribeck) -> FloatArray:
     """Build the derivatives (4, 4) of the values by the fields of a law."""
-    rows = np.zeros((4, 4))
-    rows[0, 0], rows[1, :2], rows[2, 3], rows[3, 2] = 1.0, (-1.0, 1.0), 1.0, 1.0 / law.v_s
-    return rows
+    return np.asarray(np.linalg.inv(build_law_derivatives(law.v_s)), dtype=np.float64)
 
 
 def compute_law_covariance(curve: FrictionCurve) -> FloatArray | None:
@@ -57,7 +56,7 @@ def compute_scale_std(curve: FrictionCurve | None) -> float:
 
 
 def draw_law(curve: FrictionCurve, random: np.random.Generator) -> Stribeck | None:
-    """Draw a law by its covariance; None where the curve has none, or μ is not above zero."""
+    """Draw a law by its covariance, without one the law itself; None where μ is not above zero."""
     covariance = compute_law_covariance(curve)
     if curve.stribeck is None or covariance is None:
         return curve.stribeck

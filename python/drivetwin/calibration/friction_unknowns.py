@@ -10,14 +10,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.friction_law import (
-    build_from_law,
     compute_friction_std,
     compute_law_covariance,
     to_law,
     to_values,
 )
 from drivetwin.estimation.likelihood.priors import OFFGOING_STD
-from drivetwin.estimation.linear.friction_points import LAW_PRIOR, LOG_V
+from drivetwin.estimation.linear.friction_points import LAW_PRIOR, LOG_V, build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 
 
@@ -46,7 +45,7 @@ class FrictionUnknowns:
             law = to_law(values)
             scale = law.evaluate(curve.slip) / curve.stribeck.evaluate(curve.slip)
             slopes = law.compute_slopes(curve.slip)
-            back = np.linalg.inv(build_from_law(law))
+            back = build_law_derivatives(law.v_s)
             law_covariance = back @ covariance @ back.T
         half = Z95 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, covariance, slopes))
         mu = scale * curve.mu

@@ -136,7 +136,10 @@ def _list_torque_phase_parameters(pressures: PhasePressures) -> tuple[PolicyPara
 def _list_inertia_parameters(
     pressures: PhasePressures, slip: float, task: float
 ) -> tuple[PolicyParameter, ...]:
-    """The final ramp may be a step: a locked element does not feel its pressure."""
+    """List those of the inertia phase.
+
+    The final ramp may be a step, since a locked element does not feel its pressure.
+    """
     middle, highest = pressures.inertia, pressures.system
     unit = middle / slip
     return (

@@ -53,9 +53,8 @@ def simulate_shift(
     """Simulate one shift, from a calm moment in `before` to the end of `after`.
 
     The engine torque is moved by the twin's `te_delay`, the pressures by its `p_delay`; the start
-    state comes from the first
-    measured moments, unless `start` gives it. `model` replaces the twin's own (e.g. the other loss
-    law).
+    state comes from the first measured moments, unless `start` gives it. `model` replaces the
+    twin's own (e.g. the other loss law).
     Raises MissingChannelError, MissingParameterError, and DamagedChannelError if an input has a gap
     in the shift or a compared channel does not cover it; a run that fails returns its status.
     """

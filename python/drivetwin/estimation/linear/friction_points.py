@@ -82,6 +82,11 @@ def evaluate_stribeck(theta: FloatArray, slip: FloatArray) -> tuple[FloatArray, 
     return law.evaluate(slip), law.compute_slopes(slip)
 
 
+def build_law_derivatives(v_s: float) -> FloatArray:
+    """Derivatives (4, 4) of mu_c, mu_s, v_s, mu_v by (mu_c, mu_drop, mu_v, ln v_s)."""
+    return np.array([[1.0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, v_s], [0, 0, 1, 0]])
+
+
 def evaluate_fitted_stribeck(fit: FrictionFit, slip: FloatArray) -> FloatArray:
     """μ (n,) of a fitted law over |slip| (n,)."""
     return evaluate_stribeck(fit.fit.theta, slip)[0]
@@ -310,7 +315,7 @@ def _describe_fit(equations: _Equations, fit: Fit) -> FrictionFit:
             f"the friction of {equations.element.name} comes out as μ = {least:.3g}",
             "torques, pressures and speeds contradict each other: check signs, units and delays",
         )
-    to_law = np.array([[1.0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, v_s], [0, 0, 1, 0]])
+    to_law = build_law_derivatives(v_s)
     curve = FrictionCurve(
         slip=grid,
         mu=mu,

@@ -16,7 +16,7 @@ from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.likelihood.slip_contact import find_loaded_slips
-from drivetwin.estimation.linear.friction_points import evaluate_stribeck
+from drivetwin.estimation.linear.friction_points import build_law_derivatives, evaluate_stribeck
 from drivetwin.estimation.result.cause import Group
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
@@ -48,7 +48,7 @@ def build_friction_curves(
         half = Z95 * np.sqrt(variance)
         mu_c, drop, mu_v, ln_v_s = (float(v) for v in theta)
         v_s = float(np.exp(ln_v_s))
-        to_law = np.array([[1.0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, v_s], [0, 0, 1, 0]])
+        to_law = build_law_derivatives(v_s)
         found[name] = replace(
             base,
             mu=mu + change,
