@@ -54,14 +54,27 @@ def make_mismatch_log(
     with backlash has tips into overrun before the shift.
     Raises InputError for an impossible size, SimulationError where the run does not complete.
     """
-    vehicle = draw_vehicle(seed)
-    scenario = set_rates(hold_load(vehicle.scenario), rates)
+    recorded = record_vehicle(seed, effect, size, rates, tolerances=tolerances)
+    card = draw_vehicle(seed).card
+    return read_back(recorded, add_tolerances(card, recorded.scenario) if tolerances else card)
+
+
+def record_vehicle(
+    seed: int, effect: EffectId | None, size: float, rates: Rates, *, tolerances: bool = False
+) -> DynoRun:
+    """Record the vehicle of `seed` as `make_mismatch_log` does."""
+    scenario = set_rates(hold_load(draw_vehicle(seed).scenario), rates)
     if effect is EffectId.BACKLASH:
         scenario = replace(scenario, engine_torque=_build_tips(scenario))
     recorded = run(scenario, seed, effects={} if effect is None else {effect: size})
-    card = vehicle.card
-    if tolerances:
-        recorded, card = misread(recorded, seed), add_tolerances(card, scenario)
+    return misread(recorded, seed) if tolerances else recorded
+
+
+def read_back(recorded: DynoRun, card: str) -> MismatchLog:
+    """Write the log and the text of its vehicle card to files and read both.
+
+    Raises CardError for a card with faults.
+    """
     with tempfile.TemporaryDirectory() as folder:
         log_file, card_file = Path(folder) / "log.csv", Path(folder) / "card.toml"
         write_log(log_file, convert_channels(recorded))

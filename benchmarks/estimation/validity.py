@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -15,6 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch_log
+from benchmarks.estimation.rough_count import FAR, compute_kept
+from benchmarks.estimation.vehicles import draw_vehicle
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.effects.drum_inertia import REFERENCE_TORQUE
@@ -22,20 +25,33 @@ from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
+from drivetwin.twin.build import build_twin
+from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.effects import EffectId, EffectPrior
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
-FAR = 4.0
-"""Error in standard deviations from which a value is called far off."""
 MODE_HZ = (28.0, 110.0)
 """Range of the frequency of an input-shaft mode [Hz]."""
 EVIDENCE = 5.0
 """Log evidence from which a cause counts as named."""
+MOVED = 2.0
+"""Move of a parameter by an effect, in standard deviations, from which its cause must be found."""
+PHYSICAL = ("eta", "J_e", "J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+"""Unknowns of a fit whose moves count beside those of P0."""
+CERTAIN_CHI2 = 1.2
+"""Q per sample above which a fit does not explain the log, so that no cause may be certain."""
 
 
 @dataclass(frozen=True)
 class StudyLog:
     """Result of one log: errors over total standard deviations by id, of identified and of weak
-    values; the causes named with most evidence, and their evidence."""
+    values; the causes named with most evidence, and their evidence.
+
+    `possible` is the number of values that could be identified: those of the truth without the P0
+    that the card states exactly. `moved` is the largest move of a value by the effect, over its
+    standard deviation from noise, in fits without effects; None where it was not computed.
+    `chi2` is that of the fit, None without one.
+    """
 
     seed: int
     effect: str
@@ -46,6 +62,10 @@ class StudyLog:
     evidence: float
     certain: bool
     failure: str = ""
+    possible: int = 0
+    moved: float | None = None
+    chi2: float | None = None
+    status: str = ""
 
 
 def draw_size(seed: int, effect: EffectId, factor: float) -> float:
@@ -63,11 +83,36 @@ def make_log(seed: int, effect: EffectId | None, factor: float) -> tuple[Mismatc
     Every second log is from a bus, every third card states tolerances.
     """
     rates = Rates.BUS if seed % 2 else Rates.LOGGER
-    size = 0.0 if effect is None else draw_size(seed, effect, factor)
-    if effect is EffectId.DRUM_INERTIA:
-        torque = make_mismatch_log(seed, None, 0.0, rates).recorded.scenario.engine_torque
-        size *= max(abs(level) for _, level in torque.knots) / REFERENCE_TORQUE
+    size = 0.0 if effect is None else find_size(seed, effect, factor)
     return make_mismatch_log(seed, effect, size, rates, tolerances=seed % 3 == 0), size
+
+
+def find_size(seed: int, effect: EffectId, factor: float = 1.0) -> float:
+    """Return the size of an effect of the vehicle of `seed`; a drum grows with the vehicle."""
+    size = draw_size(seed, effect, factor)
+    if effect is EffectId.DRUM_INERTIA:
+        knots = draw_vehicle(seed).scenario.engine_torque.knots
+        size *= max(abs(level) for _, level in knots) / REFERENCE_TORQUE
+    return size
+
+
+def withhold(card: VehicleCard, *effects: EffectId) -> VehicleCard:
+    """Switch effects off on the card."""
+    return replace(card, effects={**card.effects, **dict.fromkeys(effects, EffectPrior(0.0))})
+
+
+def identify_validated(log: ShiftLog, card: VehicleCard) -> Identification:
+    """Identify and validate a log as `drivetwin identify` does."""
+    found = identify(log, card, detect_shifts(log, card))
+    return attach_validation(found, build_twin(found, card), log)
+
+
+def correct_delay(
+    truth: Mapping[str, float], effect: EffectId | None, size: float
+) -> dict[str, float]:
+    """Return the truth with the mean age of an engine torque that acts late, by the effect."""
+    lag = size if effect is EffectId.TORQUE_LAG else 0.0
+    return {**truth, "te_delay": truth["te_delay"] - lag}
 
 
 def study_log(
@@ -78,29 +123,71 @@ def study_log(
     A `withheld` effect is switched off on the card: a cause that the table does not list.
     """
     name = "" if effect is None else effect.value
+    possible = 0
     try:
         made, size = make_log(seed, effect, factor)
-        card = made.card
-        if withheld and effect is not None:
-            card = replace(card, effects={**card.effects, effect: EffectPrior(0.0)})
-        found = identify(made.log, card, detect_shifts(made.log, card))
+        possible = count_possible(made)
+        card = withhold(made.card, effect) if withheld and effect is not None else made.card
+        found = identify_validated(made.log, card)
     except DrivetwinError as error:
-        return StudyLog(seed, name, 0.0, {}, {}, (), 0.0, False, error.what)
-    truth = dict(made.recorded.truth.parameters)
-    if effect is EffectId.TORQUE_LAG:  # the delay of a torque that acts late is the mean one
-        truth["te_delay"] -= size
-    return judge(seed, name, size, found, truth)
+        return StudyLog(
+            seed, name, 0.0, {}, {}, (), 0.0, False, error.what, possible or LEAST_POSSIBLE
+        )
+    truth = correct_delay(made.recorded.truth.parameters, effect, size)
+    moved = None if effect is None else measure_move(seed, found)
+    return replace(judge(seed, name, size, found, truth), possible=possible, moved=moved)
+
+
+LEAST_POSSIBLE = 11
+"""Values that could be identified of a vehicle without a log: those of the truth less P0."""
+
+
+def count_possible(made: MismatchLog) -> int:
+    """Count the values of the truth that the card does not state exactly."""
+    known = sum(one.P0.std == 0.0 for one in made.card.elements.values())
+    return len(made.recorded.truth.parameters) - known
+
+
+def measure_move(seed: int, found: Identification) -> float | None:
+    """Measure by how much the effect of a log moves the unknowns of a fit without effects.
+
+    The same vehicle without the effect has the same noise, so that the difference of both fits is
+    the effect alone.
+
+    Returns
+    -------
+    float or None
+        Largest move over its standard deviation from noise; infinite where the fit has a part of
+        the plant or fails with the effect, None where the log without the effect has no fit.
+    """
+    try:
+        plain, _ = make_log(seed, None, 0.0)
+        card = withhold(plain.card, *EFFECTS)
+        other = identify(plain.log, card, detect_shifts(plain.log, card)).evidence.likelihood
+    except DrivetwinError:
+        return None
+    fit = found.evidence.likelihood
+    if other is None or other.plant is not None:
+        return None
+    if fit is None or fit.plant is not None:
+        return float("inf")
+    values = dict(zip(fit.mean.names, fit.mean.values.tolist(), strict=True))
+    std = np.sqrt(np.diag(other.noise_covariance))
+    rows = zip(other.mean.names, other.mean.values.tolist(), std.tolist(), strict=True)
+    moves = [
+        abs(values[name] - value) / spread
+        for name, value, spread in rows
+        if name in values and (name in PHYSICAL or name.endswith(".P0"))
+    ]
+    return max(moves, default=None)
 
 
 def judge(
-    seed: int, effect: str, size: float, found: Identification, truth: dict[str, float]
+    seed: int, effect: str, size: float, found: Identification, truth: Mapping[str, float]
 ) -> StudyLog:
     """Hold the estimates of an identification against the `truth` by id."""
-    values: dict[Verdict, dict[str, float]] = {Verdict.IDENTIFIED: {}, Verdict.WEAK: {}}
-    for one in found.estimates.values():
-        if one.verdict in values and one.value is not None and one.std_total and one.id in truth:
-            values[one.verdict][one.id] = (one.value - truth[one.id]) / one.std_total
-    cause = found.evidence.cause
+    values = judge_values(found, truth)
+    cause, fit = found.evidence.cause, found.evidence.likelihood
     named: tuple[str, ...] = ()
     if cause is not None:
         named = tuple(str(one.effect) for one in (cause.group, *cause.equivalent))
@@ -114,7 +201,20 @@ def judge(
         0.0 if cause is None else cause.evidence,
         cause is not None and cause.is_certain,
         found.evidence.gave_up,
+        chi2=None if fit is None else fit.chi2,
+        status=found.status.value,
     )
+
+
+def judge_values(
+    found: Identification, truth: Mapping[str, float]
+) -> dict[Verdict, dict[str, float]]:
+    """Return the errors over total standard deviations by id, of identified and weak values."""
+    values: dict[Verdict, dict[str, float]] = {Verdict.IDENTIFIED: {}, Verdict.WEAK: {}}
+    for one in found.estimates.values():
+        if one.verdict in values and one.value is not None and one.std_total and one.id in truth:
+            values[one.verdict][one.id] = (one.value - truth[one.id]) / one.std_total
+    return values
 
 
 def run_study(
@@ -162,7 +262,23 @@ def summarise(logs: Sequence[StudyLog]) -> list[str]:
     obeying = groups.get("", [])
     false = sum(one.evidence > EVIDENCE for one in obeying)
     lines.append(f"right cause {right} of {len(evident)}, false alarms {false} of {len(obeying)}")
+    moved = [one for one in departing if one.moved is not None and one.moved > MOVED]
+    right = sum(one.effect in one.named for one in moved)
+    lines.append(
+        f"right cause of effects that move a value by over {MOVED:g}: {right} of {len(moved)}"
+    )
+    certain = sum(one.certain and one.chi2 is not None and one.chi2 > CERTAIN_CHI2 for one in logs)
+    lines.append(f"causes called certain at chi2 above {CERTAIN_CHI2:g}: {certain}")
+    lines += [
+        f"kept of {name} {_format_kept(group)}"
+        for name, group in (("departing", departing), ("obeying", obeying))
+        if group
+    ]
     return lines
+
+
+def _format_kept(logs: Sequence[StudyLog]) -> str:
+    return str(compute_kept([len(one.identified) for one in logs], [one.possible for one in logs]))
 
 
 def _format_row(name: str, logs: Sequence[StudyLog]) -> str:

@@ -108,14 +108,19 @@ def misread_channels(
 def add_tolerances(text: str, scenario: Scenario) -> str:
     """Add the tolerances that sensor errors are drawn from to the card `text`."""
     card = tomlkit.parse(text).unwrap()
-    card["sensors"] = {
+    card["sensors"] = build_tolerances(scenario)
+    return tomlkit.dumps(card)
+
+
+def build_tolerances(scenario: Scenario) -> dict[str, dict[str, object]]:
+    """Build the table `sensors` of a vehicle card from the tolerances of the sensor errors."""
+    gain, offset = PRESSURE
+    stated = {"gain_tolerance": gain, "offset_tolerance_bar": offset / BAR}
+    torques: dict[str, dict[str, object]] = {
         role: {"gain_tolerance": gain, "offset_tolerance_Nm": offset}
         for role, (gain, offset) in TORQUES.items()
     }
-    gain, offset = PRESSURE
-    stated = {"gain_tolerance": gain, "offset_tolerance_bar": offset / BAR}
-    card["sensors"]["pressure"] = {one.name: stated for one in scenario.model.elements}
-    return tomlkit.dumps(card)
+    return {**torques, "pressure": {one.name: stated for one in scenario.model.elements}}
 
 
 def _draw_range(rng: np.random.Generator, value: float) -> tuple[float, float]:

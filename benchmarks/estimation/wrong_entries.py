@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch_log
-from benchmarks.estimation.validity import FAR, judge
+from benchmarks.estimation.rough_count import FAR
+from benchmarks.estimation.validity import judge
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.findings import Code, sort_by_severity
