@@ -44,6 +44,8 @@ RATIOS = ("ratio_", "i_f")
 """Begins of the ids of ratios and of the final drive."""
 CURVE_EFFECTS = (EffectId.FRICTION_SHAPE, EffectId.FRICTION_PRESSURE, EffectId.FRICTION_HEAT)
 """Effects after which the truth has no friction curve."""
+STANDARD_VALUES = 13
+"""Number of values that could be identified of a vehicle that was not made."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ def study_vehicle(seed: int) -> RoughLog:
     plan, start = plan_vehicle(seed), time.monotonic()
     size, possible = 0.0, 0
     try:
-        made, size = _make(seed, plan)
+        made, size = make_vehicle(seed, plan)
         possible = len(made.recorded.truth.parameters)
         hidden = [plan.effect] if plan.withheld and plan.effect is not None else []
         card = withhold(made.card, *hidden)
@@ -99,12 +101,12 @@ def study_vehicle(seed: int) -> RoughLog:
         taken = time.monotonic() - start
         return RoughLog(
             seed, plan.group, plan.mismatch, size, "no result", possible or STANDARD_VALUES,
-            failure=error.what, seconds=taken,
+            failure=" ".join(error.what.split()), seconds=taken,
         )  # fmt: skip
     truth = correct_delay(made.recorded.truth.parameters, plan.effect, size)
     values = judge_values(found, truth)
-    products = {} if plan.effect in CURVE_EFFECTS else _judge_products(found, made.recorded)
-    stated = {} if plan.effect in CURVE_EFFECTS else _judge_friction(found, made)
+    products = {} if plan.effect in CURVE_EFFECTS else judge_products(found, made.recorded)
+    stated = {} if plan.effect in CURVE_EFFECTS else judge_friction(found, made)
     return RoughLog(
         seed,
         plan.group,
@@ -123,11 +125,7 @@ def study_vehicle(seed: int) -> RoughLog:
     )
 
 
-STANDARD_VALUES = 13
-"""Number of values that could be identified of a vehicle that was not made."""
-
-
-def _make(seed: int, plan: Plan) -> tuple[MismatchLog, float]:
+def make_vehicle(seed: int, plan: Plan) -> tuple[MismatchLog, float]:
     """Make the log and the card of a vehicle, and return them with the size of its mismatch."""
     rng = np.random.default_rng([seed, 54])
     rates = Rates.BUS if rng.uniform() < 0.5 else Rates.LOGGER
@@ -149,7 +147,7 @@ def _list_ratios(recorded: DynoRun) -> dict[str, float]:
     return {**ratios, "i_f": scenario.model.i_f}
 
 
-def _judge_products(found: Identification, recorded: DynoRun) -> dict[str, float]:
+def judge_products(found: Identification, recorded: DynoRun) -> dict[str, float]:
     """Return the errors of the identified products of friction and gain over their deviations."""
     truth = {}
     for name, curve in found.friction.items():
@@ -161,7 +159,7 @@ def _judge_products(found: Identification, recorded: DynoRun) -> dict[str, float
     return judge_values(found, truth)[Verdict.IDENTIFIED]
 
 
-def _judge_friction(found: Identification, made: MismatchLog) -> dict[str, float]:
+def judge_friction(found: Identification, made: MismatchLog) -> dict[str, float]:
     """Return the errors of points of the identified friction curves over their deviations.
 
     The truth is that for the gain on the card, unless the card states its standard deviation: the
@@ -182,6 +180,8 @@ def _judge_friction(found: Identification, made: MismatchLog) -> dict[str, float
             )
             truth = scale * float(made.recorded.truth.friction[name].evaluate(np.array([slip]))[0])
             half = high - mu if truth > mu else mu - low
+            if not half > 0.0:
+                continue
             errors[f"{name} at {100.0 * place:.0f} %"] = Z95 * (mu - truth) / half
     return errors
 
@@ -219,13 +219,21 @@ def run_study(seeds: Iterable[int], output: Path, workers: int | None) -> list[R
     text = output.read_text(encoding="utf-8") if output.exists() else ""
     with output.open("a", encoding="utf-8") as file, ProcessPoolExecutor(workers) as pool:
         file.write("\n" if text and not text.endswith("\n") else "")
-        for job in as_completed([pool.submit(study_vehicle, seed) for seed in open_seeds]):
-            one = job.result()
+        jobs = {pool.submit(study_vehicle, seed): seed for seed in open_seeds}
+        for job in as_completed(jobs):
+            error = job.exception()
+            one = job.result() if error is None else _record_crash(jobs[job], error)
             file.write(json.dumps(asdict(one)) + "\n")
             file.flush()
             print(_format_log(one), file=sys.stderr, flush=True)
     found = read_results(output)
     return [found[seed] for seed in wanted]
+
+
+def _record_crash(seed: int, error: BaseException) -> RoughLog:
+    """Record an error that the package should have turned into one of its own."""
+    plan, text = plan_vehicle(seed), f"crash: {error!r}"
+    return RoughLog(seed, plan.group, plan.mismatch, 0.0, "crash", STANDARD_VALUES, failure=text)
 
 
 def _format_log(one: RoughLog) -> str:

@@ -122,7 +122,7 @@ def _summarise_group(name: str, logs: Sequence[RoughLog]) -> list[str]:
     return [
         f"{name}: {len(logs)} logs",
         f"  inside            {count_inside([one.identified for one in logs])}",
-        f"  beyond {FAR:g}          {len(far)} logs",
+        f"  logs beyond {FAR:g}     {len(far)}",
         *(f"    {line}" for line in far),
         f"  kept              {kept}",
         f"  weak inside       {count_inside([one.weak for one in logs])}",

@@ -36,6 +36,8 @@ EVIDENCE = 5.0
 """Log evidence from which a cause counts as named."""
 MOVED = 2.0
 """Move of a parameter by an effect, in standard deviations, from which its cause must be found."""
+LEAST_POSSIBLE = 11
+"""Values that could be identified of a vehicle without a log: those of the truth less P0."""
 PHYSICAL = ("eta", "J_e", "J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Unknowns of a fit whose moves count beside those of P0."""
 CERTAIN_CHI2 = 1.2
@@ -136,10 +138,6 @@ def study_log(
     truth = correct_delay(made.recorded.truth.parameters, effect, size)
     moved = None if effect is None else measure_move(seed, found)
     return replace(judge(seed, name, size, found, truth), possible=possible, moved=moved)
-
-
-LEAST_POSSIBLE = 11
-"""Values that could be identified of a vehicle without a log: those of the truth less P0."""
 
 
 def count_possible(made: MismatchLog) -> int:
@@ -245,7 +243,10 @@ def _format_log(one: StudyLog) -> str:
     }
     counts = f"{len(one.identified):2d} identified, {len(one.weak):2d} weak"
     cause = f"{', '.join(one.named)} {one.evidence:.1f}" if one.named else ""
-    return f"{one.seed} {one.effect} {one.size:.3g}: {counts} {outside} {cause} {one.failure[:60]}"
+    moved = "" if one.moved is None else f"moved {one.moved:.1f}"
+    chi2 = "" if one.chi2 is None else f"chi2 {one.chi2:.2f}"
+    head = f"{one.seed} {one.effect} {one.size:.3g}: {counts} {outside}"
+    return f"{head} {cause} {moved} {chi2} {one.failure[:60]}"
 
 
 def summarise(logs: Sequence[StudyLog]) -> list[str]:

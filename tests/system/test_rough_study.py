@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: MIT
+"""Made cards, mismatches and counts of the studies of rough cards and of validity."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.estimation.rough import (
+    judge_friction,
+    make_vehicle,
+    plan_vehicle,
+    read_results,
+    run_study,
+)
+from benchmarks.estimation.rough_card import draw_ratio_text, write_card, write_ratio
+from benchmarks.estimation.rough_count import (
+    RoughLog,
+    compute_kept,
+    compute_share,
+    count_inside,
+    list_far,
+    summarise,
+)
+from benchmarks.estimation.unlisted import UNLISTED, UnlistedId, add_unlisted, follow_with_play
+from benchmarks.estimation.validity import StudyLog, find_size, withhold
+from benchmarks.estimation.validity import summarise as summarise_validity
+from benchmarks.estimation.vehicles import draw_vehicle
+from drivetwin.estimation.likelihood.effects.table import EFFECTS
+from drivetwin.estimation.result.estimate import FrictionCurve
+from drivetwin.vehicle.effects import EffectId
+
+BARE = 4
+"""Seed of a vehicle that obeys the model and whose card states no gain with an error."""
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "cut", "text"),
+    [
+        (1.4845159, 3, False, "1.485"),
+        (1.4845159, 3, True, "1.484"),
+        (1.4999, 2, False, "1.50"),
+        (2.0049, 2, True, "2.00"),
+        (3.6439076, 5, True, "3.64390"),
+        (0.7194, 2, False, "0.72"),
+    ],
+)
+def test_ratio_is_rounded_or_cut_and_keeps_its_zeros(
+    value: float, digits: int, *, cut: bool, text: str
+) -> None:
+    assert write_ratio(value, digits, cut=cut) == text
+
+
+def _draw_errors(factor: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Errors of 4000 ratios in units of their last digit."""
+    errors = []
+    rng = np.random.default_rng(1)
+    for value in rng.uniform(1.2, 5.8, 4000).tolist():
+        text = draw_ratio_text(rng, value, factor)
+        digits = len(text.partition(".")[2])
+        assert 2 <= digits <= 5
+        errors.append((float(text) - value) * 10.0**digits)
+    return np.array(errors)
+
+
+def test_errors_of_ratios_are_those_of_rounding_and_cutting() -> None:
+    """Rounding has a mean square of 1/12 of a unit, cutting of 1/3; half are cut."""
+    usual, twice = _draw_errors(1.0), _draw_errors(2.0)
+    assert usual.min() > -1.001
+    assert usual.max() < 0.501
+    assert np.mean(usual**2) == pytest.approx((1.0 / 12.0 + 1.0 / 3.0) / 2.0, rel=0.06)
+    # Uniform within two units to either side (4/3), and then rounded (1/12).
+    assert np.mean(twice**2) == pytest.approx(4.0 / 3.0 + 1.0 / 12.0, rel=0.06)
+
+
+def _read_number(entry: object) -> tuple[float, float]:
+    """Value and standard deviation of an entry, 0 for a bare number."""
+    if isinstance(entry, dict):
+        return float(entry["value"]), float(entry["std"])
+    assert isinstance(entry, float)
+    return entry, 0.0
+
+
+def test_cards_are_valid_toml_and_their_errors_have_the_stated_sizes() -> None:
+    bare: list[float] = []
+    stated: list[float] = []
+    gains: list[float] = []
+    for seed in range(300):
+        scenario = draw_vehicle(seed).scenario
+        text = write_card(seed, scenario, tolerances=seed % 2 == 0)
+        assert text == write_card(seed, scenario, tolerances=seed % 2 == 0)
+        card = tomllib.loads(text)
+        assert ("sensors" in card) == (seed % 2 == 0)
+        assert [one["name"] for one in card["gears"]] == ["2", "3"]
+        for element in scenario.model.elements:
+            entry = card["elements"][element.name]
+            value, std = _read_number(entry["P0_bar"])
+            (stated if std else bare).append((1e5 * value - element.P0) / (1e5 * std or 1e4))
+            value, std = _read_number(entry["gain_m3"])
+            if std:
+                gains.append((value - element.gain) / std)
+            else:
+                assert value == pytest.approx(element.gain, rel=5e-4)
+    for errors in (bare, stated, gains):
+        assert len(errors) > 100
+        # The standard error of a root mean square of 100 values is 7 %.
+        assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(1.0, abs=0.25)
+
+
+def test_card_is_read_with_the_digits_of_its_text() -> None:
+    made, _ = make_vehicle(BARE, plan_vehicle(BARE))
+    scenario = made.recorded.scenario
+    text = tomllib.loads(write_card(BARE, scenario, tolerances=bool(made.card.sensors)))
+    ratios = [float(getattr(one.ratio, "value", one.ratio)) for one in made.card.gears]
+    assert ratios == [one["ratio"] for one in text["gears"]]
+    exact = [scenario.get_ratio(one.element) for one in scenario.gears]
+    assert ratios != exact
+    assert ratios == pytest.approx(exact, abs=0.01)
+
+
+def test_groups_of_two_hundred_vehicles_are_even() -> None:
+    plans = [plan_vehicle(seed) for seed in range(9000, 9200)]
+    groups = Counter(one.group for one in plans)
+    assert groups == {"obeying": 90, "listed": 45, "unlisted": 45, "twice as rough": 20}
+    assert {one.effect for one in plans if one.group == "listed"} == {*EFFECTS}
+    assert {one.unlisted for one in plans if one.group == "unlisted"} == {None, *UNLISTED}
+    assert sum(one.factor == 2.0 for one in plans) == 20
+    assert all(one.mismatch == "" for one in plans if one.group == "obeying")
+
+
+def test_play_follows_behind_its_half_width() -> None:
+    up, down = np.linspace(0.0, 10.0, 101), np.linspace(10.0, 0.0, 101)
+    followed = follow_with_play(np.concatenate((up, down)), 1.5)
+    assert followed[:101] == pytest.approx(np.maximum(up - 1.5, 0.0))
+    assert followed[101:] == pytest.approx(np.minimum(down + 1.5, 8.5))
+
+
+@pytest.mark.parametrize("which", UnlistedId)
+def test_unlisted_mismatch_changes_its_own_channels_alone(which: UnlistedId) -> None:
+    recorded = make_vehicle(BARE, plan_vehicle(BARE))[0].recorded
+    wrong = add_unlisted(recorded, which, 3.0 * UNLISTED[which].std)
+    pairs = zip(recorded.channels, wrong.channels, strict=True)
+    changed = {a.role for a, b in pairs if not np.array_equal(a.values, b.values)}
+    pressures = {"pressure.B2", "pressure.B3"}
+    expected = {
+        UnlistedId.TORQUE_MAP: {"engine_torque"},
+        UnlistedId.PRESSURE_HYSTERESIS: pressures,
+        UnlistedId.PRESSURE_CURVATURE: pressures,
+        UnlistedId.TORQUE_SENSOR_CURVATURE: {"output_torque"},
+        UnlistedId.SPEED_RUN_OUT: {"input_speed"},
+    }
+    assert changed == expected[which]
+    assert wrong.truth is recorded.truth
+
+
+def test_withheld_effect_is_off_on_the_card() -> None:
+    card = make_vehicle(BARE, plan_vehicle(BARE))[0].card
+    hidden = withhold(card, EffectId.TYRE_SLIP)
+    assert (hidden.effects[EffectId.TYRE_SLIP].std, len(hidden.effects)) == (0.0, 1)
+    assert withhold(card) == card
+
+
+def test_drum_grows_with_the_vehicle() -> None:
+    sizes = [find_size(seed, EffectId.DRUM_INERTIA) for seed in range(5)]
+    doubled = [find_size(seed, EffectId.DRUM_INERTIA, 2.0) for seed in range(5)]
+    assert len(set(sizes)) == 5
+    assert doubled == pytest.approx([2.0 * one for one in sizes])
+
+
+def test_friction_is_judged_for_a_bare_gain_of_the_card() -> None:
+    """The log determines friction times gain, so that the true curve is that for the card's."""
+    made, _ = make_vehicle(BARE, plan_vehicle(BARE))
+    law = made.recorded.truth.friction["B3"]
+    gain: Any = made.card.elements["B3"].gain
+    scale = made.recorded.scenario.get_element("B3").gain / float(getattr(gain, "value", gain))
+    slip = np.linspace(5.0, 80.0, 60)
+    mu = scale * law.evaluate(slip)
+    none = np.empty(0)
+    curve = FrictionCurve(slip, 1.02 * mu, 0.99 * mu, 1.05 * mu, none, none, None, "likelihood")
+    errors = judge_friction(SimpleNamespace(friction={"B3": curve}), made)  # type: ignore[arg-type]
+    assert list(errors) == ["B3 at 10 %", "B3 at 50 %", "B3 at 90 %"]
+    # 2 % off, the lower half of the band is 3 % wide. Curves are interpolated between 60 slips.
+    assert [*errors.values()] == pytest.approx([1.96 * 2.0 / 3.0] * 3, abs=2e-3)
+
+
+def _make_log(seed: int, errors: dict[str, float], **other: Any) -> RoughLog:
+    return RoughLog(seed, "obeying", "", 0.0, "valid", 13, errors, **other)
+
+
+def test_bootstrap_draws_logs_and_not_values() -> None:
+    """Of n logs with ten values each that are inside or outside together, the standard deviation
+    of the share is √(p(1 - p)/n), and not that of 10 n values."""
+    parts = [10 * (k % 4 != 0) for k in range(100)]
+    share = compute_share(parts, [10] * 100)
+    assert (share.part, share.whole) == (750, 1000)
+    half = 1.96 * np.sqrt(0.75 * 0.25 / 100.0)
+    assert (share.low, share.high) == pytest.approx((0.75 - half, 0.75 + half), abs=0.012)
+    even = compute_share([9] * 100, [10] * 100)
+    assert (even.low, even.high) == (0.9, 0.9)
+    assert str(compute_share([], [])) == "none"
+    assert str(compute_share([0], [0])) == "none"
+
+
+def test_values_inside_are_those_within_the_95_percent_interval() -> None:
+    share = count_inside([{"eta": 1.9, "k_o": -1.97}, {}, {"eta": 0.0}])
+    assert (share.part, share.whole) == (2, 3)
+
+
+def test_log_without_result_keeps_nothing() -> None:
+    share = compute_kept([11, 0], [13, 13])
+    assert (share.part, share.whole) == (11, 26)
+    logs = [
+        _make_log(1, {f"p{k}": 0.0 for k in range(11)}),
+        RoughLog(2, "obeying", "", 0.0, "no result", 13, failure="2 faults\n  - gain_m3"),
+    ]
+    text = "\n".join(summarise(logs))
+    assert "kept              11 of 26 = 42.3 %" in text
+    assert "inside            11 of 11 = 100.0 %" in text
+    assert "statuses          valid 1, no result 1" in text
+    assert "1 x 2 faults" in text
+    assert "mu_gain inside    not reported" in text
+
+
+def test_far_values_are_listed_once_for_a_log() -> None:
+    logs = [
+        _make_log(7, {"eta": 4.2, "k_o": -5.0, "c_o": 3.9}, mu_gain={"mu_gain.B3": 9.0}),
+        _make_log(8, {"eta": -1.0}),
+    ]
+    assert list_far(logs) == ["7 (none): eta +4.2, k_o -5.0"]
+    assert "  logs beyond 4     1" in summarise(logs)
+
+
+def test_mu_gain_is_counted_where_it_is_reported() -> None:
+    logs = [
+        _make_log(1, {}, mu_gain={"mu_gain.B3": 0.5}, mu_gain_reported=1),
+        _make_log(2, {}, mu_gain_reported=1),
+    ]
+    assert any("mu_gain inside    1 of 1" in line for line in summarise(logs))
+
+
+def test_finished_seeds_are_read_and_not_run_again(tmp_path: Path) -> None:
+    output = tmp_path / "rough.jsonl"
+    logs = [_make_log(seed, {"eta": 0.1 * seed}) for seed in (3, 4)]
+    lines = [json.dumps(asdict(one)) for one in logs]
+    output.write_text("\n".join([*lines, lines[0][:30]]), encoding="utf-8")
+    assert read_results(output) == {3: logs[0], 4: logs[1]}
+    assert run_study([3, 4], output, 1) == logs
+    assert output.read_text(encoding="utf-8").endswith("\n")
+    assert read_results(tmp_path / "none.jsonl") == {}
+
+
+def test_validity_counts_kept_moved_and_certain() -> None:
+    errors = {f"p{k}": 0.0 for k in range(8)}
+    right, missed, quiet = ("tyre_slip",), ("backlash",), ()
+    logs = [
+        StudyLog(1, "tyre_slip", 1.0, errors, {}, right, 9.0, True, "", 10, 3.0, 1.0, "valid"),
+        StudyLog(2, "tyre_slip", 1.0, errors, {}, missed, 9.0, True, "", 10, 3.0, 1.3, "valid"),
+        StudyLog(3, "tyre_slip", 1.0, errors, {}, quiet, 0.0, False, "", 10, 1.9, 1.5, "valid"),
+        StudyLog(4, "tyre_slip", 0.0, {}, {}, (), 0.0, False, "refused", 10),
+        StudyLog(5, "", 0.0, errors, {}, (), 0.0, False, "", 10, None, 1.0, "valid"),
+    ]
+    text = "\n".join(summarise_validity(logs))
+    assert "right cause of effects that move a value by over 2: 1 of 2" in text
+    assert "causes called certain at chi2 above 1.2: 1" in text
+    assert "kept of departing 24 of 40 = 60.0 %" in text
+    assert "kept of obeying 8 of 10 = 80.0 %" in text
