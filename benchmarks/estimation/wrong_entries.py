@@ -45,7 +45,7 @@ def scale_gains(factor: float, *elements: str) -> Change:
 
     def change(log: ShiftLog, card: VehicleCard) -> tuple[ShiftLog, VehicleCard]:
         changed = {
-            name: replace(one, gain=factor * one.gain) if name in elements else one
+            name: replace(one, gain=one.gain.scale(factor)) if name in elements else one
             for name, one in card.elements.items()
         }
         return log, replace(card, elements=changed)
@@ -56,13 +56,13 @@ def scale_gains(factor: float, *elements: str) -> Change:
 def scale_ratio(log: ShiftLog, card: VehicleCard) -> tuple[ShiftLog, VehicleCard]:
     """Raise the ratio of the second gear of the card by 1 %."""
     gears = list(card.gears)
-    gears[1] = replace(gears[1], ratio=1.01 * gears[1].ratio)
+    gears[1] = replace(gears[1], ratio=gears[1].ratio.scale(1.01))
     return log, replace(card, gears=tuple(gears))
 
 
 def scale_final_drive(log: ShiftLog, card: VehicleCard) -> tuple[ShiftLog, VehicleCard]:
     """Raise the final drive by 3 %."""
-    return log, replace(card, final_drive=1.03 * card.final_drive)
+    return log, replace(card, final_drive=card.final_drive.scale(1.03))
 
 
 def raise_fill_pressure(log: ShiftLog, card: VehicleCard) -> tuple[ShiftLog, VehicleCard]:

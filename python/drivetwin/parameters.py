@@ -81,6 +81,18 @@ _SPECS = (
         "element",
     ),
     ParameterSpec(
+        "mu_gain", "friction times gain", "μ·gain", "m^3",
+        "friction times gain N·D·A·r, at the middle slip of the friction curve", 0.0, 10.0,
+        "element",
+    ),
+    ParameterSpec(
+        "ratio", "gear ratio", "i", "1",
+        "input over output speed of a gear, without the input gear", 0.01, 100.0, "gear",
+    ),
+    ParameterSpec(
+        "i_f", "final drive", "i_f", "1", "output over wheel speed", 0.01, 1000.0,
+    ),
+    ParameterSpec(
         "mu", "friction", "μ", "1", "friction at the slip where a fleet compares", 0.0, 1.0,
         "element",
     ),
@@ -114,9 +126,16 @@ _SPECS = (
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}
 
 
+FINAL_DRIVE = "i_f"
+"""Id of the final drive."""
 OVER_ETA = "_over_eta"
 """Suffix of the id of a torque-like quantity divided by η. Without an output torque only this ratio
 is identifiable."""
+
+
+def make_ratio_id(gear: str) -> str:
+    """Return the id of the ratio of a gear."""
+    return f"ratio_{gear}"
 
 
 def get_parameter_spec(parameter_id: str) -> ParameterSpec:

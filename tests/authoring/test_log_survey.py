@@ -84,7 +84,7 @@ def test_products_follow_from_the_ratios_of_the_elements(
     card = load_card(made.card)
     known = draft(made.log, CardOptions(elements=["kind=brake,P0_bar=0.8"])).estimates.products
     (name,) = known
-    product = known[name].middle / card.get_element(name).gain
+    product = known[name].middle / card.get_element(name).gain.value
     assert 0.08 < product < 0.16
     unknown = draft(made.log, CardOptions({"--elements": "X,Y"})).estimates
     assert not unknown.products

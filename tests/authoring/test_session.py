@@ -61,7 +61,7 @@ def test_plain_answers_make_a_card(tmp_path: Path) -> None:
     session = make_session()
     session.ask_all(lambda question, _: answer_valid(question))
     card = load(format_card(session.answers), tmp_path)
-    assert [gear.ratio for gear in card.gears] == [1.86, 1.41]
+    assert [gear.ratio.value for gear in card.gears] == [1.86, 1.41]
     assert card.elements["B2"].i_out == pytest.approx(1.86)
     assert card.J_prime_range == (4.0, 20.0)
     assert card.J_vehicle_range[0] < 3000.0 < card.J_vehicle_range[1]

@@ -65,7 +65,7 @@ def test_an_existing_card_is_kept_without_force(
     assert "--force" in capsys.readouterr().err
     assert card.read_text(encoding="utf-8") == "mine"
     assert main(["card", "new", "-o", str(card), *COMPLETE, "--force"]) == 0
-    assert load_card(card).final_drive == 5.38
+    assert load_card(card).final_drive.value == 5.38
     assert list(tmp_path.iterdir()) == [card]
 
 

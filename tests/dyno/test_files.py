@@ -47,9 +47,9 @@ def test_card_knows_the_design(bench: DynoRun, tmp_path: Path) -> None:
     card = load_card(tmp_path / "card.toml")
     for element in bench.scenario.model.elements:
         assert card.get_clutch_ratios(element.name) == pytest.approx((element.i_c, element.i_out))
-        assert card.elements[element.name].gain == element.gain
+        assert card.elements[element.name].gain.value == element.gain
         assert card.elements[element.name].P0.value == pytest.approx(element.P0)
-    assert card.final_drive == bench.scenario.model.i_f
+    assert card.final_drive.value == bench.scenario.model.i_f
 
 
 def test_truth_file_names_parameters_with_units_and_the_run(bench: DynoRun) -> None:

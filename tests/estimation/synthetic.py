@@ -59,10 +59,10 @@ class Truth:
         """What the estimators are told."""
         P0 = PriorValue(self.P0, P0_std)
         a = ShiftElementKinematics(
-            "B2", 1.0 / (self.i_a - 1.0), self.i_a / (self.i_a - 1.0), self.gain_a, P0
+            "B2", 1.0 / (self.i_a - 1.0), self.i_a / (self.i_a - 1.0), self.gain_a, P0, "2"
         )
         b = ShiftElementKinematics(
-            "B3", 1.0 / (self.i_b - 1.0), self.i_b / (self.i_b - 1.0), self.gain_b, P0
+            "B3", 1.0 / (self.i_b - 1.0), self.i_b / (self.i_b - 1.0), self.gain_b, P0, "3"
         )
         return KnownDriveline(self.i_f, a, b, {"B2": a, "B3": b}, PriorValue(self.J_out, J_out_std))
 

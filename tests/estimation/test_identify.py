@@ -166,11 +166,14 @@ def test_the_papers_method_claims_no_interval_and_doubts_the_constant_torque() -
 @pytest.mark.parametrize("method", [Method.INTEGRAL, Method.PAPER])
 def test_design_values_do_not_pass_for_measured_ones(method: Method) -> None:
     found = identified("paper_like", method)
-    for name, value in (("J_out", 0.9), ("P0.B2", 0.8e5), ("P0.B3", 0.8e5)):
+    by_card = {"P0.B2": (0.8e5, 0.1e5)}  # the integral method estimates Jo′ from the log
+    if method is Method.PAPER:
+        by_card["J_out"] = (0.9, 0.09)
+    for name, (value, std) in by_card.items():
         estimate = found.estimates[name]
         assert (estimate.verdict, estimate.method) == (Verdict.DESIGN, "card")
-        assert estimate.value == pytest.approx(value)
-        assert estimate.std_total == 0.0
+        assert estimate.value == pytest.approx(value, rel=0.05)
+        assert estimate.std_total == pytest.approx(std, rel=0.2)
         assert "card" in estimate.reason
 
 

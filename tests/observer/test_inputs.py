@@ -26,7 +26,7 @@ def test_power_flows_by_the_torque_at_the_gears(name: ScenarioName, tmp_path: Pa
     log = drivetwin.read_log(file, card)
     shift = brief(log, card)
     model, motion = bench.scenario.model, bench.trajectory
-    seen = collect_recorded(log, shift, card.i_in)
+    seen = collect_recorded(log, shift, card.i_in.value)
     found = is_driving(model, seen, bench.truth.parameters["te_delay"])
     rate = np.gradient(motion.engine_speed, motion.time)
     carried = bench.scenario.compute_torque(motion.time) - model.J1 * rate

@@ -42,13 +42,17 @@ def card() -> VehicleCard:
     return VehicleCard(
         name="sample truck",
         loss_law="paper",
-        i_in=1.0,
-        final_drive=5.38,
-        gears=(Gear("2", 1.91, ("B2",)), Gear("3", 1.43, ("B3",))),
+        i_in=PriorValue(1.0),
+        final_drive=PriorValue(5.38),
+        gears=(Gear("2", PriorValue(1.91), ("B2",)), Gear("3", PriorValue(1.43), ("B3",))),
         elements={
-            "B2": ElementSpec("B2", "brake", 3.78e-2, PriorValue(8e4)),
+            "B2": ElementSpec("B2", "brake", PriorValue(3.78e-2), PriorValue(8e4)),
             "B3": ElementSpec(
-                "B3", "brake", 2.7e-2, PriorValue(8e4), drum_inertia=PriorValue(0.05)
+                "B3",
+                "brake",
+                PriorValue(2.7e-2),
+                PriorValue(8e4),
+                drum_inertia=PriorValue(0.05),
             ),
         },
         J_prime_range=(5.0, 40.0),

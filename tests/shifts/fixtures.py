@@ -42,17 +42,17 @@ def make_card(ratios: Mapping[str, float], P0: PriorValue = _P0) -> VehicleCard:
         elements[f"B{name}"] = ElementSpec(
             name=f"B{name}",
             kind="clutch" if direct else "brake",
-            gain=0.03,
+            gain=PriorValue(0.03),
             P0=P0,
-            i_c=0.7 if direct else None,
-            i_out=1.0 / 0.7 if direct else None,
+            i_c=PriorValue(0.7) if direct else None,
+            i_out=PriorValue(1.0 / 0.7) if direct else None,
         )
     return VehicleCard(
         name="made",
         loss_law="paper",
-        i_in=1.0,
-        final_drive=5.38,
-        gears=tuple(Gear(name, ratio, (f"B{name}",)) for name, ratio in ratios.items()),
+        i_in=PriorValue(1.0),
+        final_drive=PriorValue(5.38),
+        gears=tuple(Gear(name, PriorValue(ratio), (f"B{name}",)) for name, ratio in ratios.items()),
         elements=elements,
         J_prime_range=(5.0, 40.0),
         J_vehicle_range=(5000.0, 9000.0),

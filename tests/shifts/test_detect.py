@@ -167,7 +167,7 @@ def test_engine_and_wheel_speed_stand_in_with_warnings() -> None:
     stand_in = make_log(
         {
             "engine_speed": (engine.time, engine.values),
-            "wheel_speed": (output.time, output.values / card.final_drive),
+            "wheel_speed": (output.time, output.values / card.final_drive.value),
         }
     )
     (shift,), _ = detect_shifts(stand_in, card)

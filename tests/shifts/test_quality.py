@@ -95,7 +95,7 @@ def test_lockup_oscillation_and_jerk() -> None:
     ring = np.where(_TIME >= 1.6, 500.0 * np.sin(omega * (_TIME - 1.6)), 0.0)
     J_v = 6000.0
     figures = compute_shift_quality(_log(2000.0 + ring), _CARD, _SHIFT, J_vehicle=J_v)
-    gain = _CARD.final_drive / J_v
+    gain = _CARD.final_drive.value / J_v
     assert figures["lockup_oscillation"] == pytest.approx(1000.0, rel=0.02)
     assert figures["torque_rate_max"] == pytest.approx(500.0 * omega, rel=0.03)
     assert figures["wheel_jerk_max"] == pytest.approx(gain * figures["torque_rate_max"])
@@ -144,7 +144,7 @@ def test_without_torque_the_jerk_is_that_of_the_output_speed() -> None:
         }
     )
     jerk = compute_shift_quality(shaken, _CARD, _SHIFT)["wheel_jerk_of_speed_max"]
-    assert jerk == pytest.approx(3.0 * omega**2 / _CARD.final_drive, rel=0.05)
+    assert jerk == pytest.approx(3.0 * omega**2 / _CARD.final_drive.value, rel=0.05)
 
 
 def test_cut_or_damaged_torque_gives_no_torque_figures() -> None:

@@ -66,7 +66,7 @@ def record_bench(
         about = max(0.0, one.drum_inertia + know.drum * float(rng.standard_normal()))
         drum = PriorValue(about, know.drum)
         couplings[one.name] = ShiftElementKinematics(
-            one.name, 1.0 / one.i_c, one.i_out, one.gain, P0, drum
+            one.name, 1.0 / one.i_c, one.i_out, one.gain, P0, one.name.removeprefix("B"), drum
         )
     driveline = KnownDriveline(
         model.i_f,

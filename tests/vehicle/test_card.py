@@ -39,15 +39,19 @@ def changed(old: str, new: str) -> str:
 
 def test_values_are_si_and_defaults_stand(tmp_path: Path) -> None:
     card = load(tmp_path, CARD)
-    assert (card.loss_law, card.i_in, card.final_drive) == ("paper", 1.0, 5.0)
+    assert (card.loss_law, card.i_in.value, card.final_drive.value) == ("paper", 1.0, 5.0)
     assert card.J_prime_range == (4.0, 20.0)
     assert card.J_vehicle_range == (2500.0, 6500.0)
     assert card.J_out is None
     content = (tmp_path / "card.toml").read_bytes()
     assert card.inputs == {"card.toml": hashlib.sha256(content).hexdigest()}
     element = card.elements["B2"]
-    assert (element.P0.value, element.P0.std) == (0.8e5, 0.0)
-    assert (element.gain, element.peak, element.drum_inertia) == (0.03, 1.0, PriorValue(0.0))
+    assert (element.P0.value, element.P0.std) == (0.8e5, 0.1e5)
+    assert (element.gain, element.peak, element.drum_inertia) == (
+        PriorValue(0.03),
+        1.0,
+        PriorValue(0.0),
+    )
     assert card.sensors == {}
     assert card.channels == {}
 
@@ -99,7 +103,7 @@ def test_hydraulics_of_an_element(tmp_path: Path) -> None:
 def test_gain_from_geometry(tmp_path: Path) -> None:
     geometry = "surfaces = 14, derating = 0.9, area_m2 = 0.020, radius_m = 0.150"
     card = load(tmp_path, changed("gain_m3 = 0.03", geometry))
-    assert card.elements["B2"].gain == pytest.approx(3.78e-2)
+    assert card.elements["B2"].gain.value == pytest.approx(3.78e-2)
 
 
 def test_sensors_and_channels_go_by_role_in_si(tmp_path: Path) -> None:
@@ -243,7 +247,7 @@ def test_example_cards_load(name: str) -> None:
     card = load_card(EXAMPLES / f"{name}.toml")
     for gear in card.gears:
         i_c, i_out = card.get_clutch_ratios(card.get_gear_element(gear.name))
-        assert i_c * i_out == pytest.approx(gear.ratio, rel=1e-12)
+        assert i_c * i_out == pytest.approx(gear.ratio.value, rel=1e-12)
     assert card.J_out is not None
     assert card.sensors == {}
 

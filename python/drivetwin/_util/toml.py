@@ -37,6 +37,19 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+class WrittenNumber(float):
+    """A number of a file with its text, whose digits state how well it is known."""
+
+    text: str
+
+    @classmethod
+    def parse(cls, text: str) -> WrittenNumber:
+        """Return the number that `text` states."""
+        number = cls(text)
+        number.text = text.replace("_", "")
+        return number
+
+
 @dataclass(frozen=True)
 class Fault:
     """One thing wrong in a file: the key path, such as `gears[1].ratio`, and what is wrong."""
@@ -63,7 +76,7 @@ def read_toml(path: Path | str, error: type[InputError]) -> dict[str, Any]:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return the document in a text.
+    """Return the document in a text; its floats are `WrittenNumber`s.
 
     Raises ValueError where the text is no TOML or exceeds the limits on nesting, numbers and
     texts, which no file of this program reaches.
@@ -71,7 +84,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     if _LONG_KEY.search(text):
         raise ValueError(f"a dotted key has more than {MAX_DEPTH} parts")
     try:
-        document = tomllib.loads(text)
+        document = tomllib.loads(text, parse_float=WrittenNumber.parse)
     except RecursionError:
         raise ValueError("tables or arrays are nested too deep") from None
     except tomllib.TOMLDecodeError:

@@ -98,9 +98,9 @@ def make_provisional_card(answers: Answers) -> VehicleCard:
     return VehicleCard(
         name="",
         loss_law="paper",
-        i_in=get_value(answers, "i_in", default=1.0),
-        final_drive=get_value(answers, "final_drive", default=1.0),
-        gears=tuple(Gear(gear.name, gear.ratio, (gear.element,)) for gear in gears),
+        i_in=PriorValue(get_value(answers, "i_in", default=1.0)),
+        final_drive=PriorValue(get_value(answers, "final_drive", default=1.0)),
+        gears=tuple(Gear(one.name, PriorValue(one.ratio), (one.element,)) for one in gears),
         elements={gear.element: _make_element(answers, gear.element, gear.ratio) for gear in gears},
         J_prime_range=get_value(answers, "inertia", "J_prime", default=PLAUSIBILITY.engine_inertia),
         J_vehicle_range=get_value(
@@ -120,7 +120,14 @@ def _make_element(answers: Answers, name: str, ratio: float) -> ElementSpec:
         i_out = ratio / i_c
     P0 = get_value(answers, "elements", name, "P0_bar")
     fill = USUAL_FILL if P0 is None else PriorValue(P0[0] * BAR, P0[1] * BAR)
-    return ElementSpec(name, kind, 1.0, fill, i_c=i_c, i_out=i_out)
+    return ElementSpec(
+        name,
+        kind,
+        PriorValue(1.0),
+        fill,
+        i_c=None if i_c is None else PriorValue(i_c),
+        i_out=None if i_out is None else PriorValue(i_out),
+    )
 
 
 def name_pressures(log: ShiftLog, answers: Answers) -> ShiftLog:
@@ -149,7 +156,7 @@ def estimate_fill_pressures(
         role = make_pressure_role(shift.oncoming)
         if shift.kind is not ShiftKind.POWER_ON_UP or role not in log or shift.oncoming in found:
             continue
-        ratios = [card.get_gear(gear).ratio for gear in (shift.start_gear, shift.end_gear)]
+        ratios = [card.get_gear(gear).ratio.value for gear in (shift.start_gear, shift.end_gear)]
         span = (shift.before[0], shift.inertia_phase[1])
         torque = smooth_channel(log["output_torque"], span)
         onset = locate_torque_dip(torque, shift.inertia_phase[0], ratios[1] / ratios[0])

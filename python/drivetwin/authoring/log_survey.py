@@ -37,6 +37,8 @@ ENGAGED = 0.5
 """Least pressure of an engaged element over the largest mean pressure of its column."""
 MOST_LABEL = 40
 """Longest label that a pressure without a known form of name gets from its column."""
+NO_GEAR = PriorValue(1.0)
+"""Ratio of a gear that is not there."""
 LEAST_SAMPLES = 20
 """Fewest samples that two speeds are compared at."""
 
@@ -142,8 +144,8 @@ def _compare_input_speeds(log: ShiftLog) -> tuple[float | None, bool]:
 
 def name_pressures(specs: Mapping[str, ChannelSpec], stated: Mapped) -> tuple[VehicleCard, Mapped]:
     """Return a card without gears and a mapping by which pressures are read under their labels."""
-    elements = {label: ElementSpec(label, "brake", 1.0, PriorValue(0.0)) for label in specs}
-    card = VehicleCard("", "paper", 1.0, 1.0, (), elements, (1.0, 2.0), (1.0, 2.0))
+    elements = {label: ElementSpec(label, "brake", NO_GEAR, PriorValue(0.0)) for label in specs}
+    card = VehicleCard("", "paper", NO_GEAR, NO_GEAR, (), elements, (1.0, 2.0), (1.0, 2.0))
     pressures = {make_pressure_role(label): spec for label, spec in specs.items()}
     return card, replace(stated, channels={**stated.channels, **pressures})
 

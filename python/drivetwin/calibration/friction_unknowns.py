@@ -15,8 +15,9 @@ from drivetwin.calibration.friction_law import (
     to_law,
     to_values,
 )
-from drivetwin.estimation.likelihood.priors import OFFGOING_STD
-from drivetwin.estimation.linear.friction_points import LAW_PRIOR, LOG_V, build_law_derivatives
+from drivetwin.estimation.likelihood.parametrization import FOLLOWER
+from drivetwin.estimation.likelihood.priors import FOLLOWER_PRIOR
+from drivetwin.estimation.linear.friction_points import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 
 
@@ -86,7 +87,8 @@ def build_friction_unknowns(
 
 def _build_other_clutch(curve: FrictionCurve) -> FloatArray:
     """Covariance (k, k) of the friction of a clutch about that of another one."""
+    level, rest = (FOLLOWER_PRIOR[key].std for key in FOLLOWER)
     if curve.stribeck is None:
-        return np.array([[(OFFGOING_STD["mu_c"] / float(np.median(curve.mu))) ** 2]])
-    stds = (OFFGOING_STD["mu_c"], OFFGOING_STD["mu_drop"], 0.0, LAW_PRIOR[LOG_V][1])
-    return np.diag(np.square(stds))
+        return np.array([[level**2]])
+    scaled = to_values(curve.stribeck) * np.array([1.0, 1.0, 1.0, 0.0])
+    return level**2 * np.outer(scaled, scaled) + np.diag([0.0, rest**2, 0.0, 0.0])

@@ -47,11 +47,13 @@ def _check_ratios(card: VehicleCard) -> Iterator[Finding]:
     code = Code.CARD_RATIO_UNUSUAL
     for index, gear in enumerate(card.gears):
         place = find_entry(card, f"gears[{index}].ratio")
-        yield from _expect(code, place, [gear.ratio], usual.ratio, what="a gear")
+        yield from _expect(code, place, [gear.ratio.value], usual.ratio, what="a gear")
     place = find_entry(card, "i_in")
-    yield from _expect(code, place, [card.i_in], usual.ratio, what="an input gear")
+    yield from _expect(code, place, [card.i_in.value], usual.ratio, what="an input gear")
     place = find_entry(card, "final_drive")
-    yield from _expect(code, place, [card.final_drive], usual.final_drive, what="a final drive")
+    yield from _expect(
+        code, place, [card.final_drive.value], usual.final_drive, what="a final drive"
+    )
     if "eta" in card.known:
         found = [card.known["eta"].value]
         code = Code.CARD_EFFICIENCY_UNUSUAL
@@ -66,7 +68,7 @@ def _check_inertias(card: VehicleCard) -> Iterator[Finding]:
     key = find_entry(card, "inertia.J_prime_kgm2")
     yield from _expect(code, key, card.J_prime_range, usual.engine_inertia, what=what, why=why)
     low, high = usual.vehicle_inertia
-    if card.final_drive < 1.5:
+    if card.final_drive.value < 1.5:
         low /= 25.0  # referred to the output shaft
     masses = [low / max(usual.wheel_radius) ** 2, high / min(usual.wheel_radius) ** 2]
     what = "vehicle inertia at the wheel (J3)"
@@ -76,7 +78,7 @@ def _check_inertias(card: VehicleCard) -> Iterator[Finding]:
     yield from wrong
     if card.J_out is not None and not wrong:
         share = usual.output_share
-        at_output = share * card.J_vehicle_range[1] / card.final_drive**2
+        at_output = share * card.J_vehicle_range[1] / card.final_drive.value**2
         why = f"at most {share:.0%} of the vehicle's inertia at the output shaft"
         key = find_entry(card, "inertia.J_out_kgm2")
         what = "inertia of the output side (Jo′)"
@@ -88,7 +90,7 @@ def _check_element(card: VehicleCard, element: ElementSpec) -> Iterator[Finding]
     shape = element.geometry
     if shape is None:
         key = find_entry(card, f"{root}.gain_m3")
-        yield from _expect(Code.CARD_GAIN_UNUSUAL, key, [element.gain], usual.gain)
+        yield from _expect(Code.CARD_GAIN_UNUSUAL, key, [element.gain.value], usual.gain)
     else:
         for name, found, limits, what in (
             ("surfaces", shape.surfaces, usual.surfaces, "number of friction surfaces"),

@@ -133,7 +133,9 @@ def _bound_torque(
         return None
     driving = compute_mean(log["engine_torque"], span)
     rate = compute_engine_rate(log, card, span)
-    bounds = sorted(i_c * card.i_in * (driving - inertia * rate) for inertia in card.J_prime_range)
+    bounds = sorted(
+        i_c * card.i_in.value * (driving - inertia * rate) for inertia in card.J_prime_range
+    )
     if not np.isfinite(bounds).all() or min(bounds) <= 0.0:
         return None
     return bounds[0], bounds[1]
@@ -174,10 +176,10 @@ def _compare_gains(
     """Compare the gains of elements with the geometric mean of the `sound` ones."""
     if not sound:
         return
-    usual = float(np.exp(np.mean([np.log(card.get_element(name).gain) for name in sound])))
+    usual = float(np.exp(np.mean([np.log(card.get_element(name).gain.value) for name in sound])))
     limit = PLAUSIBILITY.unequal_gains
     for name in elements:
-        factor = card.get_element(name).gain / usual
+        factor = card.get_element(name).gain.value / usual
         if not 1.0 / limit <= factor <= limit:
             numbers = {"factor": factor}
             factors = (1.0 / limit / factor, limit / factor)
@@ -186,7 +188,7 @@ def _compare_gains(
 
 
 def _judge_product(card: VehicleCard, product: FrictionProduct) -> Iterator[Finding]:
-    gain = card.get_element(product.element).gain
+    gain = card.get_element(product.element).gain.value
     middle = product.middle / gain
     for code, (low, high), limits in (
         (
@@ -213,7 +215,7 @@ def _report_gain(
 ) -> Finding:
     """Report a gain, or the surfaces that it is computed from, and `factors` times it."""
     spec = card.get_element(element)
-    found = spec.gain if spec.geometry is None else float(spec.geometry.surfaces)
+    found = spec.gain.value if spec.geometry is None else float(spec.geometry.surfaces)
     unit = "m³" if spec.geometry is None else "friction surfaces"
     shown = {"found": found, "low": found * factors[0], "high": found * factors[1], **numbers}
     place = find_entry(card, get_gain_key(spec))
@@ -237,10 +239,10 @@ def _check_bounds(
     held = sample_span(log["engine_torque"], before)
     pressure = sample_span(log[role], before) - spec.P0.value
     rate = max(compute_engine_rate(log, card, before), 0.0)
-    torque = i_c * card.i_in * (held - card.J_prime_range[1] * rate)
+    torque = i_c * card.i_in.value * (held - card.J_prime_range[1] * rate)
     ready = np.isfinite(torque) & (pressure > PLAUSIBILITY.least_pressure * BAR)
     if np.count_nonzero(ready) > 5:
-        least = float(np.median(torque[ready] / pressure[ready])) / spec.gain / spec.peak
+        least = float(np.median(torque[ready] / pressure[ready])) / spec.gain.value / spec.peak
         if least > high:
             numbers = {"mu": least}
             names = {"side": "at least", "event": "holds", "shift": label}

@@ -48,7 +48,7 @@ def estimate_engine_inertia(
         turning = compute_output_rate(log, card, span)
         torque += inertia * turning if np.isfinite(turning) else 0.0
         bounds = [
-            (driving - torque / (eta * i_c * i_out * card.i_in)) / rate
+            (driving - torque / (eta * i_c * i_out * card.i_in.value)) / rate
             for eta in PLAUSIBILITY.efficiency
         ]
         if np.isfinite(bounds).all() and min(bounds) > 0.0:
@@ -81,7 +81,7 @@ def estimate_vehicle_inertia(log: ShiftLog, card: VehicleCard) -> Limits | None:
     product = covariance[0, 1]
     if product <= 0.0 or product < CORRELATED * np.sqrt(covariance[0, 0] * covariance[1, 1]):
         return None
-    at_wheel = card.final_drive**2
+    at_wheel = card.final_drive.value**2
     low, high = product / covariance[0, 0], covariance[1, 1] / product
     return float(at_wheel * low), float(at_wheel * high)
 

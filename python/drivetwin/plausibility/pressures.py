@@ -42,7 +42,9 @@ def _check_largest(log: ShiftLog, card: VehicleCard) -> Iterator[tuple[str, Find
     held = find_log_ratios(log, card)
     for name, element in card.elements.items():
         role = make_pressure_role(name)
-        engages = any(name in gear.elements and is_held(gear.ratio, held) for gear in card.gears)
+        engages = any(
+            name in gear.elements and is_held(gear.ratio.value, held) for gear in card.gears
+        )
         if role not in log or not engages:
             continue
         largest, P0 = float(np.nanmax(log[role].values)), element.P0.value

@@ -90,17 +90,17 @@ def check_ratios(log: ShiftLog, card: VehicleCard) -> list[Finding]:
     """Report each gear of the card that the log does not hold, if it holds one not on the card."""
     held = find_log_ratios(log, card)
     gears = dict(enumerate(card.gears))
-    free = [one for one in held if not any(is_held(gear.ratio, [one]) for gear in card.gears)]
-    absent = {index: gear for index, gear in gears.items() if not is_held(gear.ratio, held)}
+    free = [one for one in held if not any(is_held(gear.ratio.value, [one]) for gear in card.gears)]
+    absent = {index: gear for index, gear in gears.items() if not is_held(gear.ratio.value, held)}
     findings: list[Finding] = []
     while free and absent:
         index, nearest = min(
             ((index, one) for index in absent for one in free),
-            key=lambda pair: abs(np.log(pair[1].ratio / absent[pair[0]].ratio)),
+            key=lambda pair: abs(np.log(pair[1].ratio / absent[pair[0]].ratio.value)),
         )
         gear = absent.pop(index)
         free.remove(nearest)
-        shown = {"found": gear.ratio, "expected": nearest.ratio, "time": nearest.time}
+        shown = {"found": gear.ratio.value, "expected": nearest.ratio, "time": nearest.time}
         place = find_entry(card, f"gears[{index}].ratio")
         findings.append(report(Code.CARD_RATIO_DIFFERS, "", place, gear=gear.name, **shown))
     return [*findings, *_check_input_gear(log, card)]
@@ -119,7 +119,7 @@ def _check_input_gear(log: ShiftLog, card: VehicleCard) -> Iterator[Finding]:
     low, middle, high = np.quantile(ratios, (0.1, 0.5, 0.9))
     if high - low > PLAUSIBILITY.ratio_tolerance * middle:
         return  # slipping: a converter that the card does not state
-    if abs(middle / card.i_in - 1) > PLAUSIBILITY.ratio_tolerance:
+    if abs(middle / card.i_in.value - 1) > PLAUSIBILITY.ratio_tolerance:
         place = find_entry(card, "i_in")
-        shown = {"found": card.i_in, "expected": float(middle)}
+        shown = {"found": card.i_in.value, "expected": float(middle)}
         yield report(Code.CARD_INPUT_GEAR_DIFFERS, "", place, **shown)

@@ -39,7 +39,11 @@ def compute_engine_rate(log: ShiftLog, card: VehicleCard, span: Span) -> float:
     """ω_e' over a span [rad/s^2], of the engine speed or, without it, of the input speed."""
     if "engine_speed" in log:
         return compute_slope(log["engine_speed"], span)
-    return card.i_in * compute_slope(log["input_speed"], span) if "input_speed" in log else np.nan
+    return (
+        card.i_in.value * compute_slope(log["input_speed"], span)
+        if "input_speed" in log
+        else np.nan
+    )
 
 
 def compute_output_rate(log: ShiftLog, card: VehicleCard, span: Span) -> float:
@@ -47,5 +51,5 @@ def compute_output_rate(log: ShiftLog, card: VehicleCard, span: Span) -> float:
     if "output_speed" in log:
         return compute_slope(log["output_speed"], span)
     if "wheel_speed" in log:
-        return card.final_drive * compute_slope(log["wheel_speed"], span)
+        return card.final_drive.value * compute_slope(log["wheel_speed"], span)
     return np.nan

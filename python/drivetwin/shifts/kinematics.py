@@ -65,12 +65,12 @@ class GearboxSpeeds:
 
 def compute_gear_ratios(card: VehicleCard) -> dict[str, float]:
     """ω_in/ω_out of each gear by name (ic·iout, without the input gear)."""
-    return {gear.name: gear.ratio for gear in card.gears}
+    return {gear.name: gear.ratio.value for gear in card.gears}
 
 
 def resample_speeds(log: ShiftLog, card: VehicleCard) -> GearboxSpeeds:
     """Bring both speeds to one time base with the ratios of a card; see `resample_geared`."""
-    return resample_geared(log, card.i_in, card.final_drive)
+    return resample_geared(log, card.i_in.value, card.final_drive.value)
 
 
 def resample_geared(log: ShiftLog, i_in: float, final_drive: float) -> GearboxSpeeds:

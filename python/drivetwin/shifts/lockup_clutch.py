@@ -67,7 +67,7 @@ def compute_mean_slip(log: ShiftLog, card: VehicleCard, span: Span) -> float | N
         return None
     engine = log["engine_speed"]
     inside = (engine.time >= span[0]) & (engine.time <= span[1])
-    inlet = card.i_in * log["input_speed"].interpolate(engine.time[inside])
+    inlet = card.i_in.value * log["input_speed"].interpolate(engine.time[inside])
     known = np.isfinite(inlet) & (inlet > 0.0)
     if not known.any():
         return None
@@ -100,14 +100,14 @@ def refer_to_turbine(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftLog
     if card.converter is None or compute_converter_slip(log, card, shift) is None:
         return log
     engine = log["engine_speed"].updates
-    turbine = card.i_in * log["input_speed"].updates.interpolate(engine.time)
+    turbine = card.i_in.value * log["input_speed"].updates.interpolate(engine.time)
     known = np.isfinite(turbine) & (engine.values > 0.0)
     ratio = np.divide(turbine, engine.values, out=np.zeros_like(turbine), where=known)
     first, last = card.converter.speed_ratio[0], card.converter.speed_ratio[-1]
     beyond = known & ((ratio < first - _BEYOND) | (ratio > last + _BEYOND))
     _require_map(log, shift, engine.time[beyond], ratio[beyond], (first, last))
     known &= ~beyond
-    for start, end in _find_closed_spans(log, card.i_in):
+    for start, end in _find_closed_spans(log, card.i_in.value):
         known &= (engine.time < start - LETS_GO) | (engine.time > end + LETS_GO)
     torque = Channel(
         role="engine_torque",
@@ -175,7 +175,7 @@ def detect_lock_ups(log: ShiftLog, card: VehicleCard) -> tuple[LockUp, ...]:
             if span[0] > flag.time[0]
         )
     if "engine_speed" in log and "input_speed" in log:
-        return _detect_closings(log["engine_speed"], log["input_speed"], card.i_in)
+        return _detect_closings(log["engine_speed"], log["input_speed"], card.i_in.value)
     return ()
 
 

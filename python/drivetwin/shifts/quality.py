@@ -124,12 +124,12 @@ def compute_shift_quality(
     if torque is not None:
         J_v = J_vehicle or compute_middle(card.J_vehicle_range)
         figures |= _measure_torque_hole(torque, compute_gear_ratios(card), shift)
-        figures |= _compute_vibration(torque, shift, card.final_drive / J_v)
+        figures |= _compute_vibration(torque, shift, card.final_drive.value / J_v)
         figures |= _compute_friction_work(
             torque, speeds, card.get_clutch_ratios(shift.oncoming), shift
         )
     else:
-        figures |= _compute_speed_jerk(speeds, shift, card.final_drive)
+        figures |= _compute_speed_jerk(speeds, shift, card.final_drive.value)
     return figures
 
 

@@ -14,10 +14,14 @@ from drivetwin.channels.channel_spec import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.verdict import from_prior
+from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from drivetwin.simulation.dual_clutch import LossLaw
+    from drivetwin.vehicle.spec import PriorValue
     from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -31,18 +35,21 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
     assumptions += list_borrowed_friction(found)
     friction, load = _scale_absolute(found)
     ids, covariance = _build_covariance(found)
+    ratios = {
+        one.name: _choose_value(found, make_ratio_id(one.name), one.ratio) for one in card.gears
+    }
     loss_law: LossLaw = "dissipative" if found.loss_law == "dissipative" else "paper"
     return Twin(
         name=card.name,
         method=found.method,
         loss_law=loss_law,
-        i_in=card.i_in,
-        final_drive=card.final_drive,
+        i_in=card.i_in.value,
+        final_drive=_choose_value(found, FINAL_DRIVE, card.final_drive),
         gears={
-            gear.name: TwinGear(card.compute_ratio(gear.name), card.get_gear_element(gear.name))
-            for gear in card.gears
+            name: TwinGear(card.i_in.value * ratio, card.get_gear_element(name))
+            for name, ratio in ratios.items()
         },
-        elements={name: _build_element(card, name) for name in card.elements},
+        elements={name: _build_element(card, name, ratios) for name in card.elements},
         J_prime_range=card.J_prime_range,
         J_vehicle_range=card.J_vehicle_range,
         parameters=parameters,
@@ -77,12 +84,20 @@ def _remember_mapping(found: Identification, card: VehicleCard) -> RememberedMap
     return RememberedMapping({**stated, **found.mapping.channels}, found.mapping.options)
 
 
-def _build_element(card: VehicleCard, name: str) -> TwinElement:
-    """Design data of an element."""
+def _choose_value(found: Identification, parameter_id: str, design: PriorValue) -> float:
+    """Identified value of a ratio, or that of the card."""
+    estimate = found.estimates.get(parameter_id)
+    return design.value if estimate is None or estimate.value is None else estimate.value
+
+
+def _build_element(card: VehicleCard, name: str, ratios: Mapping[str, float]) -> TwinElement:
+    """Design data of an element; `ratios` by gear."""
     spec = card.elements[name]
     i_c, i_out = card.get_clutch_ratios(name)
     P0, drum = spec.P0.value, spec.drum_inertia.value
-    return TwinElement(spec.kind, i_c, i_out, spec.gain, P0, spec.peak, drum)
+    element = TwinElement(spec.kind, i_c, i_out, spec.gain.value, P0, spec.peak, drum)
+    gear = next((one.name for one in card.gears if name in one.elements), None)
+    return element if gear is None else element.replace_ratio(ratios[gear])
 
 
 def _scale_absolute(found: Identification) -> tuple[dict[str, FrictionCurve], LoadLaw | None]:

@@ -21,7 +21,7 @@ from drivetwin.estimation.result.estimate import (
     Verdict,
 )
 from drivetwin.estimation.result.method import Method
-from drivetwin.parameters import OVER_ETA
+from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, make_ratio_id
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_part import BACKLASH_ID, MODE_IDS, AddedPart, build_part
 from drivetwin.simulation.converter_map import Converter
@@ -33,7 +33,13 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Stribeck,
 )
-from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue
+from drivetwin.vehicle.spec import (
+    ElementKind,
+    ElementSpec,
+    Gear,
+    PriorValue,
+    move_clutch_ratios,
+)
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 COMMON = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -42,7 +48,7 @@ OF_ELEMENT = ("P0", "drum")
 """Stems of the element parameters that replace the design value if identified."""
 PRESSURE_DELAY = "p_delay"
 """Id of the delay of the acting pressures behind the logged ones."""
-SIMULATED = (*COMMON, "J_prime", *OF_ELEMENT, "te_delay", PRESSURE_DELAY)
+SIMULATED = (*COMMON, "J_prime", *OF_ELEMENT, "ratio", FINAL_DRIVE, "te_delay", PRESSURE_DELAY)
 """Stems of the parameters that a simulation depends on; the others follow from them."""
 
 
@@ -71,8 +77,15 @@ class TwinElement:
 
     def to_spec(self, name: str) -> ElementSpec:
         """Return the element as on a vehicle card, with all values known."""
-        P0, drum = PriorValue(self.P0), PriorValue(self.drum)
-        return ElementSpec(name, self.kind, self.gain, P0, self.peak, drum, self.i_c, self.i_out)
+        gain, P0, drum, i_c, i_out = (
+            PriorValue(one) for one in (self.gain, self.P0, self.drum, self.i_c, self.i_out)
+        )
+        return ElementSpec(name, self.kind, gain, P0, self.peak, drum, i_c, i_out)
+
+    def replace_ratio(self, gear_ratio: float) -> TwinElement:
+        """Return the element in a gear of another ratio (without the input gear)."""
+        i_c, i_out = move_clutch_ratios(self.kind, self.i_c, self.i_out, gear_ratio)
+        return replace(self, i_c=i_c, i_out=i_out)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,7 +155,9 @@ class Twin(DisplayMixin):
         if load is not None:
             given = {"Tv_over_if": scale * load if self.over_eta else load, **given}
         values = self._get_values((*COMMON, inertia_id), given, scale)
-        J_e = values[inertia_id] - values["J_out"] / self.get_gear(gear).ratio ** 2
+        ratio = given.get(make_ratio_id(gear), self.get_gear(gear).ratio / self.i_in) * self.i_in
+        final_drive = given.get(FINAL_DRIVE, self.final_drive)
+        J_e = values[inertia_id] - values["J_out"] / ratio**2
         return DualClutch(
             J1=J_e / values["eta"],
             J2e=0.0,
@@ -150,11 +165,11 @@ class Twin(DisplayMixin):
             loss_law=loss_law or self.loss_law,
             i_in=self.i_in,
             J_out=values["J_out"],
-            i_f=self.final_drive,
+            i_f=final_drive,
             J_v=values["J_vehicle"],
             k_o=values["k_o"],
             c_o=values["c_o"],
-            load=self._build_load(values["Tv_over_if"], scale),
+            load=self._build_load(values["Tv_over_if"], scale, final_drive),
             elements=tuple(
                 self._build_element(name, partner, given, scale)
                 for name, partner in (
@@ -191,17 +206,22 @@ class Twin(DisplayMixin):
         inertias = (f"J_prime_{gear}" for gear in (shift.start_gear, shift.end_gear))
         elements = (shift.offgoing, shift.oncoming)
         own = (f"{stem}.{element}" for stem in OF_ELEMENT for element in elements)
-        return (*COMMON, *inertias, *own)
+        ratios = (make_ratio_id(gear) for gear in (shift.start_gear, shift.end_gear))
+        return (*COMMON, *inertias, *own, *ratios, FINAL_DRIVE)
 
     def build_card(self) -> VehicleCard:
         """The vehicle card, as far as it takes to read another log and find its shifts."""
         return VehicleCard(
             name=self.name,
             loss_law=self.loss_law,
-            i_in=self.i_in,
-            final_drive=self.final_drive,
+            i_in=PriorValue(self.i_in),
+            final_drive=self._describe(FINAL_DRIVE, self.final_drive),
             gears=tuple(
-                Gear(name, gear.ratio / self.i_in, (gear.element,))
+                Gear(
+                    name,
+                    self._describe(make_ratio_id(name), gear.ratio / self.i_in),
+                    (gear.element,),
+                )
                 for name, gear in self.gears.items()
             ),
             elements={name: one.to_spec(name) for name, one in self.elements.items()},
@@ -211,11 +231,11 @@ class Twin(DisplayMixin):
             remembered=self.mapping,
         )
 
-    def _build_load(self, Tv_over_if: float, scale: float) -> RoadLoad:
+    def _build_load(self, Tv_over_if: float, scale: float, final_drive: float) -> RoadLoad:
         """Load at the wheel: constant, or with the part that grows with speed."""
         law = self.load_law or LoadLaw(aero=0.0, std=0.0, mean_speed=0.0)
         return (law.scale_by_eta(scale) if law.over_eta else law).to_road_load(
-            Tv_over_if, self.final_drive
+            Tv_over_if, final_drive
         )
 
     def get_gear(self, name: str) -> TwinGear:
@@ -240,6 +260,11 @@ class Twin(DisplayMixin):
             self._is_known("J_vehicle") is None
             and self._is_known("J_vehicle" + OVER_ETA) is not None
         )
+
+    def _describe(self, parameter_id: str, value: float) -> PriorValue:
+        """Distribution of a ratio; without an estimate it is exact."""
+        estimate = self.parameters.get(parameter_id)
+        return PriorValue(value, 0.0 if estimate is None else estimate.std_total or 0.0)
 
     def _is_known(self, parameter_id: str) -> float | None:
         estimate = self.parameters.get(parameter_id)
@@ -317,11 +342,18 @@ class Twin(DisplayMixin):
             return "not part of the identification"
         return estimate.reason or estimate.verdict.value
 
+    def _place_element(self, name: str, given: Mapping[str, float]) -> TwinElement:
+        """Design data of an element with an overridden ratio of its gear. Raises KeyError."""
+        element = self.elements[name]
+        ids = [make_ratio_id(gear) for gear, one in self.gears.items() if one.element == name]
+        changed = [given[one] for one in ids if one in given]
+        return element.replace_ratio(changed[0]) if changed else element
+
     def _build_element(
         self, name: str, partner: str, given: Mapping[str, float], scale: float
     ) -> ShiftElement:
         try:
-            design = self.elements[name]
+            design = self._place_element(name, given)
         except KeyError:
             raise InputError(
                 f"the twin {self.name!r} has no shift element {name!r}",

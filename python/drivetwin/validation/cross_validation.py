@@ -52,7 +52,7 @@ def _predict_shift(
         require_locked_converter(log, card, shift)
         log = refer_to_turbine(log, card, shift)
         fills = {name: card.get_element(name).P0 for name in (shift.offgoing, shift.oncoming)}
-        shift = trim_to_window(trim_to_recorded(log, shift, fills, card.i_in))
+        shift = trim_to_window(trim_to_recorded(log, shift, fills, card.i_in.value))
         told = _predict_misfit(fit, card, log, shift, number)
         mine, own = _select_log_estimates(found, log, number, told)
         mine, findings = _ensure_friction_law(mine, shift)
@@ -134,7 +134,9 @@ def _map_signal_bounds(
     found = dict(bounds)
     if "engine_speed" in found and "engine_speed" not in log:
         one = found.pop("engine_speed")
-        found["input_speed"] = PredictionInterval(one.usual / card.i_in, one.largest / card.i_in)
+        found["input_speed"] = PredictionInterval(
+            one.usual / card.i_in.value, one.largest / card.i_in.value
+        )
     return {name: one for name, one in found.items() if name in run.fit}
 
 

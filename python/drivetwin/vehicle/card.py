@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from drivetwin._util.toml import raise_faults, read_toml
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.errors import CardError
 from drivetwin.vehicle.check import check_card
+from drivetwin.vehicle.distribution import describe_inertia, multiply
 from drivetwin.vehicle.effects import EffectId
-from drivetwin.vehicle.schema import CardFile, SensorsTable
+from drivetwin.vehicle.schema import CardFile, ElementTable, GearTable, SensorsTable
 from drivetwin.vehicle.spec import (
     ElementSpec,
     Gear,
@@ -51,13 +54,13 @@ def load_card(path: Path | str) -> VehicleCard:
     return VehicleCard(
         name=file.name,
         loss_law=file.loss_law,
-        i_in=file.i_in,
-        final_drive=file.final_drive,
-        gears=tuple(gear.to_spec() for gear in file.gears),
+        i_in=file.i_in.to_prior(),
+        final_drive=file.final_drive.to_prior(),
+        gears=tuple(_build_gear(gear, file.elements) for gear in file.gears),
         elements={name: table.to_spec(name) for name, table in file.elements.items()},
         J_prime_range=(file.inertia.J_prime_kgm2[0], file.inertia.J_prime_kgm2[1]),
         J_vehicle_range=file.inertia.vehicle_range,
-        J_out=None if J_out is None else J_out.to_prior(),
+        J_out=None if J_out is None else J_out.to_prior(describe_inertia),
         sensors=_convert_tolerances(file.sensors),
         channels={role: table.to_spec() for role, table in file.channels.iterate_roles()},
         source=str(path),
@@ -67,6 +70,15 @@ def load_card(path: Path | str) -> VehicleCard:
         converter=None if file.converter is None else file.converter.to_spec(),
         sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
     )
+
+
+def _build_gear(table: GearTable, elements: Mapping[str, ElementTable]) -> Gear:
+    """Build a gear with its ratio as stated or as i_c·i_out of its element, whichever is known
+    better."""
+    gear = table.to_spec()
+    pairs = [(elements[name].i_c, elements[name].i_out) for name in table.elements]
+    products = [multiply(a.to_prior(), b.to_prior()) for a, b in pairs if a and b]
+    return replace(gear, ratio=min((gear.ratio, *products), key=lambda one: one.std))
 
 
 def _collect_known(file: CardFile) -> dict[str, PriorValue]:

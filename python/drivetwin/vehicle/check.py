@@ -87,12 +87,12 @@ def _check_gears(gears: Mapping[int, GearTable]) -> list[Fault]:
                 )
             )
         lower = gears.get(index - 1)
-        if lower is not None and gear.ratio >= lower.ratio:
+        if lower is not None and gear.ratio.value >= lower.ratio.value:
             faults.append(
                 Fault(
                     f"gears[{index}].ratio",
-                    f"gears run from low to high: gear {gear.name!r} with {gear.ratio:g} must be "
-                    f"below gear {lower.name!r} with {lower.ratio:g}",
+                    f"gears run from low to high: gear {gear.name!r} with {gear.ratio.value:g} "
+                    f"must be below gear {lower.name!r} with {lower.ratio.value:g}",
                 )
             )
     return faults
@@ -140,16 +140,17 @@ def _check_ratios(
             if element is None:
                 continue
             if element.i_c is None or element.i_out is None:
-                if gear.ratio == 1.0:
+                if gear.ratio.value == 1.0:
                     text = f"a brake cannot make gear {gear.name!r} with ratio 1 (i_c = i - 1 = 0)"
                     faults.append(Fault(f"elements.{name}", text))
                 continue
-            product = element.i_c * element.i_out
-            if abs(product - gear.ratio) > RATIO_TOLERANCE * gear.ratio:
+            product = element.i_c.value * element.i_out.value
+            if abs(product - gear.ratio.value) > RATIO_TOLERANCE * gear.ratio.value:
                 faults.append(
                     Fault(
                         f"elements.{name}.i_c",
-                        f"i_c·i_out = {product:.4g}, but gear {gear.name!r} has {gear.ratio:g}",
+                        f"i_c·i_out = {product:.4g}, but gear {gear.name!r} has "
+                        f"{gear.ratio.value:g}",
                     )
                 )
     faults += [

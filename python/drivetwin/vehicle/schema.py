@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
@@ -13,29 +15,114 @@ from drivetwin.channels.mapping_file import ByRole, ChannelTable
 from drivetwin.channels.units import BAR, RPM
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.converter import ConverterTable
+from drivetwin.vehicle.distribution import (
+    describe_fill_pressure,
+    describe_inertia,
+    describe_ratio,
+    parse_teeth,
+)
 from drivetwin.vehicle.effects import EffectPrior
 from drivetwin.vehicle.spec import ClutchGeometry, ElementSpec, Gear, PriorValue, SensorTolerance
 
 
 class PriorTable(StrictModel):
-    """A design value with its standard deviation in the same unit; 0 means exact."""
+    """A design value with its standard deviation in the same unit; 0 means exact.
+
+    Without `std` the standard deviation is the usual one of the quantity.
+    """
 
     value: float = Field(ge=0)
-    std: float = Field(default=0.0, ge=0)
+    std: float | None = Field(default=None, ge=0)
 
-    def to_prior(self, factor: float = 1.0) -> PriorValue:
-        """Return the value in SI, `factor` being the size of the file's unit."""
+    def to_prior(
+        self, describe: Callable[[float], PriorValue] = PriorValue, factor: float = 1.0
+    ) -> PriorValue:
+        """Return the value in SI.
+
+        Parameters
+        ----------
+        describe
+            Distribution of a number in SI without a stated standard deviation.
+        factor
+            Size of the file's unit in SI.
+        """
+        if self.std is None:
+            return describe(factor * self.value)
         return PriorValue(factor * self.value, factor * self.std)
 
 
-def _parse_exact_value(value: object) -> object:
-    """Read a bare number as an exact value."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return {"value": value} if is_number else value
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _parse_bare_value(value: object) -> object:
+    """Read a bare number as a value without a stated standard deviation."""
+    if isinstance(value, dict | StrictModel):
+        return value
+    if not _is_number(value):
+        raise ValueError("should be a valid number, or a table such as { value = 0.8, std = 0.1 }")
+    return {"value": value}
 
 
 PriorEntry = Annotated[
-    PriorTable, BeforeValidator(_parse_exact_value, json_schema_input_type=PriorTable | float)
+    PriorTable, BeforeValidator(_parse_bare_value, json_schema_input_type=PriorTable | float)
+]
+
+
+class RatioTable(StrictModel):
+    """A ratio and its standard deviation; 0 means exact."""
+
+    value: float
+    std: float = Field(ge=0)
+
+    def to_prior(self) -> PriorValue:
+        """Return the ratio."""
+        return PriorValue(self.value, self.std)
+
+
+def _parse_ratio(value: object) -> object:
+    """Read a bare ratio by its digits and a text as tooth counts."""
+    if isinstance(value, str):
+        return {"value": parse_teeth(value), "std": 0.0}
+    if isinstance(value, dict | StrictModel):
+        return value
+    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        raise ValueError(
+            "should be a valid number, tooth counts such as '49/33', or a table such as "
+            "{ value = 1.4848, std = 0.0001 }"
+        )
+    prior = describe_ratio(value)
+    return {"value": prior.value, "std": prior.std}
+
+
+def _require_positive(table: RatioTable) -> RatioTable:
+    if table.value <= 0.0:
+        raise ValueError(f"should be greater than 0, not {table.value:g}")
+    return table
+
+
+SignedRatioEntry = Annotated[
+    RatioTable, BeforeValidator(_parse_ratio, json_schema_input_type=RatioTable | float | str)
+]
+"""Ratio of either sign: a number whose digits state its precision, tooth counts such as `49/33`, or
+a table with its standard deviation."""
+RatioEntry = Annotated[SignedRatioEntry, AfterValidator(_require_positive)]
+NO_INPUT_GEAR = RatioTable(value=1.0, std=0.0)
+
+
+class GainTable(StrictModel):
+    """Gain N·D·A·r [m^3] with its standard deviation; 0: μ is given for this gain."""
+
+    value: float = Field(gt=0)
+    std: float = Field(default=0.0, ge=0)
+
+    def to_prior(self) -> PriorValue:
+        """Return the gain in SI."""
+        return PriorValue(self.value, self.std)
+
+
+GainEntry = Annotated[
+    GainTable, BeforeValidator(_parse_bare_value, json_schema_input_type=GainTable | float)
 ]
 
 
@@ -79,14 +166,14 @@ class GearTable(StrictModel):
     """`[[gears]]`: one gear, its ratio without the input gear, the shift elements that make it."""
 
     name: str = Field(min_length=1)
-    ratio: float = Field(gt=0)
+    ratio: RatioEntry
     elements: list[str] = Field(min_length=1)
     eta: MeasuredTable | None = None
 
     def to_spec(self) -> Gear:
         """Return the gear."""
         eta = None if self.eta is None else self.eta.to_prior()
-        return Gear(self.name, self.ratio, tuple(self.elements), eta)
+        return Gear(self.name, self.ratio.to_prior(), tuple(self.elements), eta)
 
 
 def _bound(name: str, unit: float = 1.0) -> Any:
@@ -123,7 +210,7 @@ class ElementTable(StrictModel):
     """`[elements.<name>]`: a brake or clutch; its gain as one number or from its geometry."""
 
     kind: Literal["brake", "clutch"]
-    gain_m3: float | None = Field(default=None, gt=0)
+    gain_m3: GainEntry | None = None
     surfaces: int | None = Field(default=None, ge=1)
     derating: float | None = Field(default=None, gt=0, le=1)
     area_m2: float | None = Field(default=None, gt=0)
@@ -131,8 +218,8 @@ class ElementTable(StrictModel):
     P0_bar: PriorEntry
     peak: float = Field(default=1.0, ge=1)
     drum_inertia_kgm2: PriorEntry = PriorTable(value=0.0)
-    i_c: float | None = None
-    i_out: float | None = None
+    i_c: SignedRatioEntry | None = None
+    i_out: SignedRatioEntry | None = None
     actuator: ActuatorTable | None = None
 
     @model_validator(mode="after")
@@ -145,7 +232,7 @@ class ElementTable(StrictModel):
             )
         if (self.i_c is None) != (self.i_out is None):
             raise ValueError("i_c and i_out belong together: give both or none")
-        if self.i_c == 0.0 or self.i_out == 0.0:
+        if any(one is not None and one.value == 0.0 for one in (self.i_c, self.i_out)):
             raise ValueError("i_c and i_out must not be zero")
         if self.kind == "clutch" and self.i_c is None:
             raise ValueError("a rotating clutch needs i_c and i_out (eq. 15)")
@@ -161,10 +248,11 @@ class ElementTable(StrictModel):
         )
 
     @property
-    def gain(self) -> float:
+    def gain(self) -> PriorValue:
         """N·D·A·r [m^3]."""
-        geometry = self.geometry
-        return (self.gain_m3 or 0.0) if geometry is None else geometry.gain
+        if self.gain_m3 is not None:
+            return self.gain_m3.to_prior()
+        return PriorValue(0.0 if self.geometry is None else self.geometry.gain)
 
     def to_spec(self, name: str) -> ElementSpec:
         """Return the element in SI."""
@@ -172,11 +260,11 @@ class ElementTable(StrictModel):
             name=name,
             kind=self.kind,
             gain=self.gain,
-            P0=self.P0_bar.to_prior(BAR),
+            P0=self.P0_bar.to_prior(describe_fill_pressure, BAR),
             peak=self.peak,
-            drum_inertia=self.drum_inertia_kgm2.to_prior(),
-            i_c=self.i_c,
-            i_out=self.i_out,
+            drum_inertia=self.drum_inertia_kgm2.to_prior(describe_inertia),
+            i_c=None if self.i_c is None else self.i_c.to_prior(),
+            i_out=None if self.i_out is None else self.i_out.to_prior(),
             geometry=self.geometry,
             actuator=None if self.actuator is None else self.actuator.to_model(),
         )
@@ -308,8 +396,8 @@ class CardFile(StrictModel):
 
     name: str = Field(min_length=1)
     loss_law: LossLaw = "paper"
-    i_in: float = Field(default=1.0, gt=0)
-    final_drive: float = Field(gt=0)
+    i_in: RatioEntry = NO_INPUT_GEAR
+    final_drive: RatioEntry
     eta: PriorEntry | None = None
     gears: list[GearTable] = Field(min_length=2)
     elements: dict[str, ElementTable] = Field(min_length=1)

@@ -10,14 +10,22 @@ from typing import Literal
 from drivetwin.actuator.model import ActuatorModel
 
 ElementKind = Literal["brake", "clutch"]
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class PriorValue:
-    """A design value and its standard deviation, same unit; `std` 0: taken as known."""
+    """A design value and its standard deviation, same unit; `std` 0: taken as known.
+
+    It is no float: a stage either uses the distribution or names the nominal `value`.
+    """
 
     value: float
     std: float = 0.0
+
+    def scale(self, factor: float) -> PriorValue:
+        """Return the quantity times an exact factor."""
+        return PriorValue(factor * self.value, abs(factor) * self.std)
 
 
 @dataclass(frozen=True)
@@ -38,7 +46,7 @@ class Gear:
     `eta` its efficiency, None if unknown."""
 
     name: str
-    ratio: float
+    ratio: PriorValue
     elements: tuple[str, ...]
     eta: PriorValue | None = None
 
@@ -71,12 +79,12 @@ class ElementSpec:
 
     name: str
     kind: ElementKind
-    gain: float
+    gain: PriorValue
     P0: PriorValue
     peak: float = 1.0
     drum_inertia: PriorValue = PriorValue(0.0)
-    i_c: float | None = None
-    i_out: float | None = None
+    i_c: PriorValue | None = None
+    i_out: PriorValue | None = None
     geometry: ClutchGeometry | None = None
     actuator: ActuatorModel | None = None
 
@@ -88,6 +96,17 @@ def compute_brake_ratios(ratio: float) -> tuple[float, float]:
     negative for i < 1. Raises ZeroDivisionError for i = 1, which no brake can make.
     """
     return ratio - 1.0, ratio / (ratio - 1.0)
+
+
+def move_clutch_ratios(kind: ElementKind, i_c: float, i_out: float, ratio: float) -> Pair:
+    """Return (i_c, i_out) of an element whose gear has another `ratio` (without the input gear).
+
+    Those of a brake follow from the ratio if they did so before; else i_c stays.
+    """
+    old = i_c * i_out
+    if kind == "brake" and math.isclose(i_c, old - 1.0, rel_tol=1e-6):
+        return compute_brake_ratios(ratio)
+    return i_c, ratio / i_c
 
 
 def compute_middle(limits: tuple[float, float]) -> float:

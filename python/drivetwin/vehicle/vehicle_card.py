@@ -39,8 +39,8 @@ class VehicleCard:
 
     name: str
     loss_law: LossLaw
-    i_in: float
-    final_drive: float
+    i_in: PriorValue
+    final_drive: PriorValue
     gears: tuple[Gear, ...]
     elements: Mapping[str, ElementSpec]
     J_prime_range: tuple[float, float]
@@ -72,8 +72,8 @@ class VehicleCard:
         )
 
     def compute_ratio(self, name: str) -> float:
-        """Return the overall ratio engine to output, i_in·i_c·i_out, of a gear."""
-        return self.i_in * self.get_gear(name).ratio
+        """Return the nominal overall ratio engine to output, i_in·i_c·i_out, of a gear."""
+        return self.i_in.value * self.get_gear(name).ratio.value
 
     def get_element(self, name: str) -> ElementSpec:
         """Return a shift element by name; raises CardError if the card has none."""
@@ -100,16 +100,19 @@ class VehicleCard:
         return elements[0]
 
     def get_clutch_ratios(self, element: str) -> tuple[float, float]:
-        """Return (i_c, i_out) of eq. 15: as stated, else of a brake from its gear's ratio."""
+        """Return the nominal (i_c, i_out) of eq. 15, whose product is the ratio of the gear.
+
+        i_c is as stated; that of a brake without a stated one follows from the ratio.
+        """
         spec = self.get_element(element)
-        if spec.i_c is not None and spec.i_out is not None:
-            return spec.i_c, spec.i_out
-        for gear in self.gears:
-            if element in gear.elements:
-                return compute_brake_ratios(gear.ratio)
-        raise self._make_error(
-            f"element {element!r} engages in no gear", "name it under a gear's elements"
-        )
+        gear = next((one for one in self.gears if element in one.elements), None)
+        if gear is None:
+            raise self._make_error(
+                f"element {element!r} engages in no gear", "name it under a gear's elements"
+            )
+        if spec.i_c is None:
+            return compute_brake_ratios(gear.ratio.value)
+        return spec.i_c.value, gear.ratio.value / spec.i_c.value
 
     def _make_error(self, what: str, remedy: str) -> CardError:
         return CardError(what, remedy, Where(file=self.source or None))

@@ -93,13 +93,15 @@ def _followed_by_another_shift(found: Identification) -> Identification:
     fit, signals = get_likelihood_fit(found)
     (part,), (shown,) = fit.problem.parts, signals
     first, record = part.structure, part.record
-    oncoming = replace(first.driveline.oncoming, name="K", a=5.0, b=6.0)  # a brake of ratio 1.2
+    oncoming = replace(
+        first.driveline.oncoming, name="K", a=5.0, b=6.0, gear="4"
+    )  # a brake of ratio 1.2
     held = {**first.driveline.couplings, "K": oncoming}
     driveline = replace(
         first.driveline, offgoing=first.driveline.oncoming, oncoming=oncoming, couplings=held
     )
     law = {f"K.{key}": fit.point[f"B3.{key}"] for key in LAW}
-    fixed = {**first.fixed, **law, "K.P0": oncoming.P0.value, "K.drum": 0.0}
+    fixed = {**first.fixed, **law, "K.P0": oncoming.P0.value, "K.drum": 0.0, "ratio_4": 1.2}
     renamed = {"B2": "B3", "B3": "K"}
     by_element: dict[str, Any] = {
         name: {renamed.get(key, key): each for key, each in one.items()}

@@ -24,7 +24,7 @@ from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import SensorTolerance
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import make_card
 
@@ -89,7 +89,7 @@ def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_spe
         "engine_speed": SensorTolerance(2e-3, 0.1),
         "output_torque": SensorTolerance(0.01, 30.0),
     }
-    log, card = drive(), replace(CARD, i_in=1.2, sensors=sensors)
+    log, card = drive(), replace(CARD, i_in=PriorValue(1.2), sensors=sensors)
     other = {"output_torque": sensors["output_torque"]}
     found = collect_tolerances(log, card, shift(100.0))
     assert found == {**other, "engine_speed": SensorTolerance(1e-3, 0.6)}

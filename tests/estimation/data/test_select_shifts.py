@@ -40,7 +40,7 @@ def drive(braked: tuple[float, float] = BRAKED) -> tuple[FloatArray, FloatArray,
     time = np.arange(0.0, 200.0, 0.01)
     torque = 800.0 + 400.0 * np.sin(1.3 * time)
     brake = np.interp(time, [braked[0], sum(braked) / 2.0, braked[1]], [0.0, 3000.0, 0.0])
-    wheel = 20.0 + np.cumsum(CARD.final_drive * (torque - 800.0 - brake)) * 0.01 / J_VEHICLE
+    wheel = 20.0 + np.cumsum(CARD.final_drive.value * (torque - 800.0 - brake)) * 0.01 / J_VEHICLE
     noisy = torque + rng.normal(0.0, 20.0, time.size), wheel + rng.normal(0.0, 0.03, time.size)
     return time, *noisy
 
@@ -65,14 +65,14 @@ def channels(
 def choose(
     given: tuple[MeasuredSignal, MeasuredSignal] | None, shifts: Sequence[Shift]
 ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
-    return select_shifts(given, CARD.final_drive, shifts)
+    return select_shifts(given, CARD.final_drive.value, shifts)
 
 
 def test_a_brake_leaves_much_of_the_vehicles_balance() -> None:
     time, torque, wheel = drive()
     torque_, wheel_ = MeasuredSignal(time, torque, 20.0), MeasuredSignal(time, wheel, 0.03)
     steady, braked, brief = (
-        fit_constant_load(torque_, wheel_, CARD.final_drive, span)
+        fit_constant_load(torque_, wheel_, CARD.final_drive.value, span)
         for span in ((15.0, 25.0), (39.0, 47.0), (39.0, 39.3))
     )
     assert steady is not None
@@ -90,7 +90,7 @@ def test_a_brake_that_looks_like_inertia_is_seen_against_the_other_shifts() -> N
     torque = torque.copy()
     torque[span] += 0.3 * (torque[span] - 800.0)
     torque_, wheel_ = MeasuredSignal(time, torque, 20.0), MeasuredSignal(time, wheel, 0.03)
-    alone = fit_constant_load(torque_, wheel_, CARD.final_drive, (38.5, 47.5))
+    alone = fit_constant_load(torque_, wheel_, CARD.final_drive.value, (38.5, 47.5))
     assert alone is not None
     assert alone.left < 1.5
     spans = [shift(20.0), shift(43.0), shift(60.0), shift(75.0)]

@@ -24,7 +24,7 @@ from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.likelihood.fixtures import bench, truth_of
 from tests.shifts.fixtures import make_card
 
-IDLE = ShiftElementKinematics("K2", 1.4, 1.4, 4.6e-2, PriorValue(8e4), PriorValue(0.2, 0.1))
+IDLE = ShiftElementKinematics("K2", 1.4, 1.4, 4.6e-2, PriorValue(8e4), "4", PriorValue(0.2, 0.1))
 DRUM = "K2.drum"
 
 

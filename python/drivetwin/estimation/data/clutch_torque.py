@@ -73,7 +73,8 @@ def _build_record(
     clutches: tuple[ShiftElementKinematics, ShiftElementKinematics],
     command: HeldSignal,
 ) -> TorqueRecord | None:
-    role, factor = ("engine_speed", 1.0) if "engine_speed" in log else ("input_speed", card.i_in)
+    of_input = ("input_speed", card.i_in.value)
+    role, factor = ("engine_speed", 1.0) if "engine_speed" in log else of_input
     if any(one not in log for one in (*_NEEDED, role)):
         return None
     count = int((span[1] - span[0]) / _STEP) // _BLOCK * _BLOCK

@@ -16,6 +16,7 @@ from drivetwin._util.progress import scale_progress
 from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError
+from drivetwin.estimation.data.measured_ratios import refine_ratios
 from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
 from drivetwin.estimation.data.shift_data import (
@@ -37,6 +38,7 @@ from drivetwin.shifts.lockup_clutch import (
 )
 from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.vehicle.distribution import multiply
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -65,7 +67,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLo
     first = fitted[0].log
     design = DesignData(
         loss_law=card.loss_law,
-        final_drive=card.final_drive,
+        final_drive=card.final_drive.value,
         J_prime_range=card.J_prime_range,
         J_vehicle_range=card.J_vehicle_range,
         J_out=card.J_out,
@@ -119,7 +121,7 @@ def _split_usable(
         try:
             require_locked_converter(log, card, shift)
             referred = refer_to_turbine(log, card, shift)
-            trimmed = trim_to_window(trim_to_recorded(referred, shift, fills, card.i_in))
+            trimmed = trim_to_window(trim_to_recorded(referred, shift, fills, card.i_in.value))
         except (DamagedChannelError, IdentificationError) as refusal:
             if len(shifts) == len(rejected) + 1:
                 raise
@@ -146,13 +148,13 @@ def _select(
     if len(shifts) < 2:
         return tuple(shifts), ()
     if "output_torque" not in log:
-        return select_shifts(None, card.final_drive, shifts)
+        return select_shifts(None, card.final_drive.value, shifts)
     torque = sampler.sample(log["output_torque"])
     if "wheel_speed" in log:
         wheel = sampler.sample(log["wheel_speed"])
     else:
-        wheel = sampler.sample(log["output_speed"], 1.0 / card.final_drive)
-    return select_shifts((torque, wheel), card.final_drive, shifts)
+        wheel = sampler.sample(log["output_speed"], 1.0 / card.final_drive.value)
+    return select_shifts((torque, wheel), card.final_drive.value, shifts)
 
 
 @dataclass(eq=False)
@@ -197,16 +199,9 @@ def _prepare_shift(
     if referred is not log:
         whole = replace(whole, torque_of_speeds=_build_speed_torque(log, card, whole, sampler))
         driveline = replace(driveline, known={**driveline.known, "te_delay": NO_AGE})
-    return ShiftData(
-        _cut(
-            whole,
-            (
-                shift.before[0] - SHIFT_SELECTION.kept_beside,
-                shift.after[1] + SHIFT_SELECTION.kept_beside,
-            ),
-        ),
-        driveline,
-    )
+    beside = SHIFT_SELECTION.kept_beside
+    signals = _cut(whole, (shift.before[0] - beside, shift.after[1] + beside))
+    return ShiftData(signals, refine_ratios(driveline, signals))
 
 
 def _cut(whole: ShiftSignals, span: tuple[float, float]) -> ShiftSignals:
@@ -235,7 +230,7 @@ def _sample_shift(
     if "engine_speed" in log:
         engine_speed = sample(log["engine_speed"])
     else:
-        engine_speed = sample(log["input_speed"], card.i_in)
+        engine_speed = sample(log["input_speed"], card.i_in.value)
     engine_torque = sample(log["engine_torque"])
     return ShiftSignals(
         engine_torque=engine_torque,
@@ -269,20 +264,25 @@ def _build_speed_torque(
 def build_driveline(card: VehicleCard, shift: Shift) -> KnownDriveline:
     """Return the known structure in `shift`, ratios referred to the engine speed."""
     couplings = {}
+    gears = {element: gear.name for gear in card.gears for element in gear.elements}
     for name, spec in card.elements.items():
         i_c, i_out = card.get_clutch_ratios(name)
         couplings[name] = ShiftElementKinematics(
-            name,
-            1.0 / (card.i_in * i_c),
-            i_out,
-            spec.gain,
-            spec.P0,
-            spec.drum_inertia,
-            spec.peak,
+            name=name,
+            a=1.0 / (card.i_in.value * i_c),
+            b=i_out,
+            gain=spec.gain.value,
+            P0=spec.P0,
+            drum=spec.drum_inertia,
+            peak=spec.peak,
+            gain_std=spec.gain.std,
+            gear=gears[name],
+            i_in=card.i_in.value,
+            follows_ratio=spec.i_c is None,
         )
     left, entered = (card.get_gear(name).eta for name in (shift.start_gear, shift.end_gear))
     return KnownDriveline(
-        i_f=card.final_drive,
+        i_f=card.final_drive.value,
         offgoing=couplings[shift.offgoing],
         oncoming=couplings[shift.oncoming],
         couplings=couplings,
@@ -291,7 +291,15 @@ def build_driveline(card: VehicleCard, shift: Shift) -> KnownDriveline:
         known=card.known if left is None else {"eta": left, **card.known},
         J1=card.J1,
         eta_change=None if left is None or entered is None else _subtract(entered, left),
+        final_drive=card.final_drive,
+        ratios={gear.name: _add_input_gear(gear.ratio, card.i_in) for gear in card.gears},
     )
+
+
+def _add_input_gear(ratio: PriorValue, i_in: PriorValue) -> PriorValue:
+    """Return the distribution of a gear's ratio with the error of the input gear as its own: the
+    motion depends on their product."""
+    return PriorValue(ratio.value, i_in.value**-1 * multiply(ratio, i_in).std)
 
 
 def _subtract(one: PriorValue, other: PriorValue) -> PriorValue:
@@ -317,7 +325,7 @@ def _collect_tolerances(
     read = "engine_speed" if "engine_speed" in referred else "input_speed"
     found = {role: one for role, one in card.sensors.items() if role not in ENGINE_SPEEDS}
     if read in card.sensors:
-        one, factor = card.sensors[read], card.i_in if read == "input_speed" else 1.0
+        one, factor = card.sensors[read], card.i_in.value if read == "input_speed" else 1.0
         found["engine_speed"] = replace(one, offset=factor * one.offset)
     for role, channel in log.channels.items():
         if channel.late and (role not in ENGINE_SPEEDS or role == read):

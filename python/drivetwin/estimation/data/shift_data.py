@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,11 +13,11 @@ from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.channels.shiftlog import find_pauses
 from drivetwin.findings import Finding
-from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.effects import EffectId, EffectPrior
-from drivetwin.vehicle.spec import PriorValue, SensorTolerance
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance, compute_brake_ratios
 
 PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox if no output torque shows it."""
@@ -77,8 +77,10 @@ class ShiftElementKinematics:
     """A shift element in the dual-clutch form: slip = a·ω_e - b·ω_out (eq. 15).
 
     `a` = 1/(i_in·i_c), `b` = i_out; its torque acts as -a·T on the engine and b·T on the output
-    side. `gain` N·D·A·r [m^3]; `drum` [kg m^2] is the inertia that turns with the slip; `peak` is
-    the static over the kinetic capacity at zero slip.
+    side. `gain` N·D·A·r [m^3] with `gain_std`: the motion depends on μ times the gain alone, so
+    that μ is stated for this gain. `drum` [kg m^2] is the inertia that turns with the slip; `peak`
+    is the static over the kinetic capacity at zero slip. `gear` is the gear that the element makes;
+    `follows_ratio` marks a brake, whose i_c is the ratio of the gear less 1.
     """
 
     name: str
@@ -86,20 +88,45 @@ class ShiftElementKinematics:
     b: float
     gain: float
     P0: PriorValue
+    gear: str
     drum: PriorValue = NO_DRUM
     peak: float = 1.0
+    gain_std: float = 0.0
+    i_in: float = 1.0
+    follows_ratio: bool = False
 
     @property
     def ratio(self) -> float:
         """Overall ratio ω_e/ω_out with this element locked."""
         return self.b / self.a
 
+    @property
+    def gear_ratio(self) -> float:
+        """Ratio of the gear that the element makes, without the input gear."""
+        return self.ratio / self.i_in
+
+    def replace_ratio(self, gear_ratio: float) -> ShiftElementKinematics:
+        """Return the element in a gear of another ratio (without the input gear)."""
+        if self.follows_ratio:
+            i_c, i_out = compute_brake_ratios(gear_ratio)
+            return replace(self, a=1.0 / (self.i_in * i_c), b=i_out)
+        return replace(self, b=self.a * self.i_in * gear_ratio)
+
+    def compute_ratio_slopes(self) -> tuple[float, float]:
+        """Compute the derivatives of 1/a and b by the ratio of the gear."""
+        if self.follows_ratio:
+            return self.i_in, -((self.a * self.i_in) ** 2)
+        return 0.0, self.a * self.i_in
+
 
 @dataclass(frozen=True)
 class KnownDriveline:
     """Known structure during one shift. `couplings` holds every shift element by name.
 
-    `known` is what is known beforehand, by parameter id, beside Jo′, J1, P0 and drums.
+    `i_f` and the ratios of `couplings` are the nominal values of this log: those of the card, or as
+    far as they are roughly known there, those that the speeds show. `final_drive` and `ratios` by
+    gear (without the input gear) are the card's distributions.
+    `known` is what is known beforehand, by parameter id, beside Jo′, J1, P0, drums and ratios.
     `eta_change` is the known efficiency of the gear that is entered less that of the gear that is
     left, None if unknown.
     """
@@ -113,6 +140,23 @@ class KnownDriveline:
     known: Mapping[str, PriorValue] = field(default_factory=dict)
     J1: PriorValue | None = None
     eta_change: PriorValue | None = None
+    final_drive: PriorValue | None = None
+    ratios: Mapping[str, PriorValue] = field(default_factory=dict)
+
+    @property
+    def ratio_priors(self) -> dict[str, PriorValue]:
+        """Card's distributions of the ratios that the shift depends on, by parameter id."""
+        gears = (self.offgoing.gear, self.oncoming.gear)
+        found = {make_ratio_id(gear): self.ratios[gear] for gear in gears if gear in self.ratios}
+        return found if self.final_drive is None else {**found, FINAL_DRIVE: self.final_drive}
+
+    @property
+    def ratio_values(self) -> dict[str, float]:
+        """Nominal values of these ratios, by parameter id."""
+        nominal = {
+            make_ratio_id(one.gear): one.gear_ratio for one in (self.offgoing, self.oncoming)
+        }
+        return {**nominal, FINAL_DRIVE: self.i_f}
 
     @property
     def i_before(self) -> float:
@@ -129,6 +173,7 @@ class KnownDriveline:
         spec = get_parameter_spec(name)
         ending = OVER_ETA if name.endswith(OVER_ETA) else ""
         known = self.known.get(spec.stem + ending if spec.suffix == "log" else name)
+        known = self.ratio_priors.get(name, known)
         if known is not None:
             return known
         stem, _, element = name.removesuffix(OVER_ETA).partition(".")

@@ -6,8 +6,13 @@
 
 On a hilly road the load of each shift deviates from T_v/i_f by d. The deviations add up to zero
 over the shifts of a log, so T_v/i_f is the mean: the d of the first is minus the sum of the others.
-An element that engages in one of the shifts has its own Stribeck law. Of an element that only
-disengages, the level of the law is identifiable alone, from the instant of break-away.
+An element that engages in one of the shifts has its own Stribeck law. An element that only
+disengages has the law of its partner, the element that engages when it opens, times a level of its
+own, with a rise of its own to zero slip:
+
+    mu_c = level·mu_c', mu_drop = level·mu_drop' + rest, mu_v = level·mu_v', v_s = v_s'
+
+Ratios of gears and final drive are unknowns unless the card states them exactly.
 """
 
 from __future__ import annotations
@@ -23,6 +28,7 @@ from drivetwin.estimation.likelihood.extension import Extension
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.simulation.added_part import AddedPart
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
@@ -40,6 +46,9 @@ TE_OFFSET = "te_offset"
 LOG_SPECIFIC = ("Tv_over_if", "te_delay", TE_OFFSET)
 """Unknowns that each of several logs has of its own: road, logger and rounding differ."""
 LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
+FOLLOWER = ("level", "rest")
+"""Unknowns of an element that has its partner's law: factor on the law [-], rise of friction to
+zero slip beyond that of the law [-]."""
 NO_LAW = (0.1, 0.1, 1.0, 0.0)
 """Any friction law, for an element without pressure."""
 START = ("speed", "wheel_speed", "twist")
@@ -63,10 +72,10 @@ def map_log_names(log: int) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Tie:
-    """A known `inertia` J′ [kg m^2] of the gear of `ratio` i: Je = J′ - Jo′/i²."""
+    """A known `inertia` J′ [kg m^2] in the gear that `element` makes: Je = J′ - Jo′/i²."""
 
     inertia: float
-    ratio: float
+    element: ShiftElementKinematics
 
 
 @dataclass(frozen=True)
@@ -78,7 +87,8 @@ class ShiftModel:
     T_v/i_f holds where the load grows with the speed. A `tie` takes the place of the unknown J_e.
     `log` is the number of the log among several, 0 where it is the only one. `departure` is how
     the load of this shift departs from that of its log: a factor by unknown; empty where it does
-    not. An `extension` is a part that the plant has beside the dual clutch.
+    not. An `extension` is a part that the plant has beside the dual clutch. `partners` are the
+    elements whose law an element without a law of its own follows, by its name.
     """
 
     driveline: KnownDriveline
@@ -90,6 +100,7 @@ class ShiftModel:
     log: int = 0
     departure: Mapping[str, float] = field(default_factory=dict)
     extension: Extension | None = None
+    partners: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def elements(self) -> tuple[ShiftElementKinematics, ShiftElementKinematics]:
@@ -105,9 +116,37 @@ class ShiftModel:
     def get_value(self, point: ParameterVector, name: str) -> float:
         """Return the value of an unknown, free, fixed or tied."""
         if name == "J_e" and self.tie is not None:
-            return self.tie.inertia - self.get_value(point, "J_out") / self.tie.ratio**2
+            ratio = self.place_element(point, self.tie.element).ratio
+            return self.tie.inertia - self.get_value(point, "J_out") / ratio**2
         free = self.get_unknown(name)
         return point[free] if free in point.names else self.fixed[name]
+
+    def get_final_drive(self, point: ParameterVector) -> float:
+        """Return the final drive at `point`."""
+        return self.get_value(point, FINAL_DRIVE)
+
+    def place_element(
+        self, point: ParameterVector, one: ShiftElementKinematics
+    ) -> ShiftElementKinematics:
+        """Return an element of the shift with the ratio that its gear has at `point`."""
+        return one.replace_ratio(self.get_value(point, make_ratio_id(one.gear)))
+
+    def compute_ratio_before(self, point: ParameterVector) -> float:
+        """Compute the overall ratio of the gear that is left at `point`."""
+        return self.place_element(point, self.driveline.offgoing).ratio
+
+    def compute_ratio_after(self, point: ParameterVector) -> float:
+        """Compute the overall ratio of the gear that is entered at `point`."""
+        return self.place_element(point, self.driveline.oncoming).ratio
+
+    def get_law(self, point: ParameterVector, element: str) -> tuple[float, float, float, float]:
+        """Return the coefficients `LAW` of the friction law of an element at `point`."""
+        partner = self.partners.get(element, element)
+        c, drop, v, ln_v_s = (self.get_value(point, f"{partner}.{key}") for key in LAW)
+        if partner == element:
+            return c, drop, v, ln_v_s
+        level, rest = (self.get_value(point, f"{element}.{key}") for key in FOLLOWER)
+        return level * c, level * drop + rest, level * v, ln_v_s
 
     def get_unknown(self, name: str) -> str:
         """Return the name of the unknown that stands for `name` in this shift's log."""
@@ -123,7 +162,7 @@ class ShiftModel:
             loss_law=self.loss_law,
             i_in=1.0,
             J_out=self.get_value(point, "J_out"),
-            i_f=self.driveline.i_f,
+            i_f=self.get_final_drive(point),
             J_v=self.get_value(point, "J_vehicle"),
             k_o=self.get_value(point, "k_o"),
             c_o=self.get_value(point, "c_o"),
@@ -143,7 +182,7 @@ class ShiftModel:
 
     def _build_load(self, point: ParameterVector) -> RoadLoad:
         aero = self.get_value(point, AERO)
-        mean = self.compute_load(point) * self.driveline.i_f
+        mean = self.compute_load(point) * self.get_final_drive(point)
         return RoadLoad(constant=mean - aero * self.mean_speed**2, aero=aero)
 
     def compute_load(self, point: ParameterVector) -> float:
@@ -153,11 +192,12 @@ class ShiftModel:
         return self.get_value(point, "Tv_over_if") + departure
 
     def _build_element(self, point: ParameterVector, one: ShiftElementKinematics) -> ShiftElement:
-        c, drop, v, ln_v_s = (self.get_value(point, f"{one.name}.{key}") for key in LAW)
+        c, drop, v, ln_v_s = self.get_law(point, one.name)
+        placed = self.place_element(point, one)
         return ShiftElement(
             name=one.name,
-            i_c=1.0 / one.a,
-            i_out=one.b,
+            i_c=1.0 / placed.a,
+            i_out=placed.b,
             gain=one.gain,
             P0=self.get_value(point, f"{one.name}.P0"),
             friction=Stribeck(c, c + drop, float(np.exp(ln_v_s)), v),
@@ -174,7 +214,7 @@ class ShiftModel:
     def build_start(self, point: ParameterVector) -> State:
         """Build the initial state of the run at `point`: the off-going element is locked."""
         speed, wheel, twist = (point[f"{self.label}.{key}"] for key in START)
-        ratio = self.driveline.i_before
+        ratio = self.compute_ratio_before(point)
         return State(ratio * speed, speed, wheel, twist, (self.driveline.offgoing.name,))
 
     def compute_jacobian(self, point: ParameterVector) -> tuple[tuple[str, ...], FloatArray]:
@@ -192,11 +232,14 @@ class ShiftModel:
         """Yield (name in the core, unknown, derivative) of one unknown; nothing for foreign
         ones."""
         i_f, eta, J_e = (
-            self.driveline.i_f,
+            self.get_final_drive(point),
             self.get_value(point, "eta"),
             self.get_value(point, "J_e"),
         )
-        by_tie = 0.0 if self.tie is None else -1.0 / (self.tie.ratio**2 * eta)
+        by_tie, tied = 0.0, None
+        if self.tie is not None:
+            tied = self.place_element(point, self.tie.element)
+            by_tie = -1.0 / (tied.ratio**2 * eta)
         table: dict[str, Sequence[tuple[str, float]]] = {
             "eta": (("eta", 1.0), ("J1", -J_e / eta**2)),
             "J_e": (("J1", 1.0 / eta),),
@@ -207,30 +250,57 @@ class ShiftModel:
             "k_o": (("k_o", 1.0),),
             "c_o": (("c_o", 1.0),),
             f"{self.label}.speed": (
-                ("start.engine_speed", self.driveline.i_before),
+                ("start.engine_speed", self.compute_ratio_before(point)),
                 ("start.output_speed", 1.0),
             ),
             f"{self.label}.wheel_speed": (("start.wheel_speed", 1.0),),
             f"{self.label}.twist": (("start.twist", 1.0),),
+            FINAL_DRIVE: (("i_f", 1.0), ("load.constant", self.compute_load(point))),
         }
         for own, factor in self.departure.items():
             table[own] = (("load.constant", factor * i_f),)
-        for one in self.elements:
-            v_s = float(np.exp(self.get_value(point, f"{one.name}.ln_v_s")))
-            fields = {
-                "P0": (("P0", 1.0),),
-                "mu_c": (("mu_c", 1.0), ("mu_s", 1.0)),
-                "mu_drop": (("mu_s", 1.0),),
-                "mu_v": (("mu_v", 1.0),),
-                "ln_v_s": (("v_s", v_s),),
-                "drum": (("drum_inertia", 1.0),),
-            }
-            for key, slopes in fields.items():
-                table[f"{one.name}.{key}"] = [(f"{one.name}.{f}", d) for f, d in slopes]
+        if tied is not None:
+            by_ratio = -2.0 * by_tie * self.get_value(point, "J_out") / tied.gear_ratio
+            table[make_ratio_id(tied.gear)] = (("J1", by_ratio),)
         for one in self.spinning:
             table[f"{one.name}.drum"] = [(f"{one.name}.drum_inertia", 1.0)]
         for known, slope in table.get(name, ()):
             yield known, name, slope
+        for one in self.elements:
+            for known, slope in self._list_element_entries(point, one).get(name, ()):
+                yield known, name, slope
+
+    def _list_element_entries(
+        self, point: ParameterVector, one: ShiftElementKinematics
+    ) -> dict[str, list[tuple[str, float]]]:
+        """List by unknown the fields of an element that it acts on, with their derivatives."""
+        fields: dict[str, list[tuple[str, float]]] = {
+            f"{one.name}.P0": [("P0", 1.0)],
+            f"{one.name}.drum": [("drum_inertia", 1.0)],
+        }
+        partner = self.partners.get(one.name, one.name)
+        level = 1.0 if partner == one.name else self.get_value(point, f"{one.name}.level")
+        v_s = float(np.exp(self.get_law(point, one.name)[3]))
+        fields |= {
+            f"{partner}.mu_c": [("mu_c", level), ("mu_s", level)],
+            f"{partner}.mu_drop": [("mu_s", level)],
+            f"{partner}.mu_v": [("mu_v", level)],
+            f"{partner}.ln_v_s": [("v_s", v_s)],
+        }
+        if partner != one.name:
+            c, drop, v = (self.get_value(point, f"{partner}.{key}") for key in LAW[:3])
+            fields[f"{one.name}.level"] = [("mu_c", c), ("mu_s", c + drop), ("mu_v", v)]
+            fields[f"{one.name}.rest"] = [("mu_s", 1.0)]
+        by_i_c, by_i_out = self.place_element(point, one).compute_ratio_slopes()
+        fields[make_ratio_id(one.gear)] = [("i_c", by_i_c), ("i_out", by_i_out)]
+        found = {
+            unknown: [(f"{one.name}.{key}", slope) for key, slope in entries]
+            for unknown, entries in fields.items()
+        }
+        if one is self.driveline.offgoing:
+            speed = one.i_in * point[f"{self.label}.speed"]
+            found[make_ratio_id(one.gear)].append(("start.engine_speed", speed))
+        return found
 
 
 def retract(point: ParameterVector, step: FloatArray) -> FloatArray:

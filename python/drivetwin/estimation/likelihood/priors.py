@@ -18,7 +18,12 @@ from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import InputError
 from drivetwin.estimation.data.quantization_error import estimate_quantization_error
 from drivetwin.estimation.data.segments import MOMENTUM
-from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.data.shift_data import (
+    KnownDriveline,
+    MeasuredSignal,
+    ShiftElementKinematics,
+    ShiftSignals,
+)
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.data.shift_record import RECORD, build_record
 from drivetwin.estimation.likelihood.data.slipping_elements import find_all_slipping_elements
@@ -38,7 +43,7 @@ from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE, compute
 from drivetwin.estimation.linear.momentum_balance import DELAY
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.parameters import OVER_ETA, SPECS
+from drivetwin.parameters import OVER_ETA, SPECS, make_ratio_id
 from drivetwin.shifts.split_gears import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
@@ -55,15 +60,18 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
     "ln_v_s": (float(np.log(1.0)), float(np.log(60.0))),
     AERO: (0.0, 1e4),
     "drum": (0.0, SPECS["J_out"].upper),
+    "level": (0.1, 10.0),
+    "rest": (-0.3, 0.5),
 }
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
 _GEAR_INERTIA = "J_prime_"
 DESIGN_FACTOR = 10.0
 """Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
 small that, with the shaft's damping, one run takes as long as a whole fit."""
-OFFGOING_STD = {"mu_c": 0.03, "mu_drop": 0.02}
-"""Prior standard deviation of the friction of an element that only disengages, about that of the
-engaging one: the log shows the break-away pressure and the decrease of its torque with slip."""
+FOLLOWER_PRIOR = {"level": PriorValue(1.0, 0.07), "rest": PriorValue(0.0, 0.015)}
+"""Friction of an element that only disengages, relative to the law of its partner: engineering
+estimates for two clutches with the same lining and oil [-]. The standard deviations of both gains
+come on top of that of the level."""
 
 
 def build_problem(
@@ -82,12 +90,16 @@ def build_problem(
     holds too little.
     """
     logs = tuple(dict.fromkeys(s.log for s in signals))
-    guess = _add_log_values(guess, logs)
+    ratios = {name: value for d in reversed(drivelines) for name, value in d.ratio_values.items()}
+    partners = _find_partners(signals, drivelines)
+    follow = {f"{e}.{key}": one.value for e in partners for key, one in FOLLOWER_PRIOR.items()}
+    guess = _add_log_values({**ratios, **follow, **guess}, logs)
     priors = _collect_priors(signals, drivelines, guess)
     every = (
         *_expand_logs(COMMON, logs),
         *_list_law_coefficients(signals, drivelines),
         *_list_fill_unknowns(drivelines),
+        *(name for name in ratios if name in priors),
     )
     names = [n for n in every if not _is_fixed(priors.get(n))]
     inertias = list_gear_inertias(signals, drivelines)
@@ -109,7 +121,9 @@ def build_problem(
         own = {name: fixed[n] for name, n in map_log_names(s.log).items() if n in fixed}
         speed = compute_mean_speed(same, d.i_f)
         departure = departures.get(k, {})
-        structure = ShiftModel(d, loss_law, label, fixed | own, speed, tie, s.log, departure)
+        structure = ShiftModel(
+            d, loss_law, label, fixed | own, speed, tie, s.log, departure, partners=partners
+        )
         parts.append(ShiftTerm.from_sensor_noise(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
@@ -180,7 +194,7 @@ def get_bounds(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds (p,) of unknowns."""
     pairs = []
     for name in names:
-        stem = name.split(".")[-1]
+        stem = "ratio" if name.startswith(make_ratio_id("")) else name.split(".")[-1]
         if stem in BOUNDS:
             pairs.append(BOUNDS[stem])
         elif stem in SPECS:
@@ -210,7 +224,16 @@ def _list_law_coefficients(
     shown = find_all_slipping_elements(signals, drivelines)
     leaving = [d.offgoing.name for d in drivelines if d.offgoing.name not in shown]
     free = [f"{e}.{key}" for e in shown for key in LAW]
-    return free + [f"{e}.{key}" for e in leaving for key in OFFGOING_STD]
+    return free + [f"{e}.{key}" for e in dict.fromkeys(leaving) for key in FOLLOWER_PRIOR]
+
+
+def _find_partners(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline]
+) -> dict[str, str]:
+    """Find by element without a law of its own the element whose law it follows."""
+    shown = find_all_slipping_elements(signals, drivelines)
+    pairs = {d.offgoing.name: d.oncoming.name for d in drivelines}
+    return {one: partner for one, partner in pairs.items() if one not in shown}
 
 
 def _list_fill_unknowns(drivelines: Sequence[KnownDriveline]) -> list[str]:
@@ -239,19 +262,20 @@ def _collect_priors(
             found.setdefault(own.get(TE_OFFSET, TE_OFFSET), PriorValue(0.0, rounding))
     if AERO in guess:
         found[AERO] = PriorValue(0.0, LOAD_BALANCE.aero_std)
-    law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)}
+    law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)} | FOLLOWER_PRIOR
     for name in _list_law_coefficients(signals, drivelines):
         found[name] = law[name.split(".")[-1]]
-    shown = find_all_slipping_elements(signals, drivelines)
+    for one, partner in _find_partners(signals, drivelines).items():
+        level, gains = FOLLOWER_PRIOR["level"], (drivelines[0].couplings[e] for e in (one, partner))
+        spread = float(np.linalg.norm([level.std, *(e.gain_std / e.gain for e in gains)]))
+        found[f"{one}.level"] = PriorValue(level.value, spread)
     for d in drivelines:
+        found |= d.ratio_priors
         for e in (d.offgoing, d.oncoming):
             found[f"{e.name}.P0"] = e.P0
         for e in d.couplings.values():
             drum = e.drum if signals[0].scale_known else d.divide_by_eta(e.drum)
             found[f"{e.name}.drum"] = drum
-        if d.offgoing.name not in shown:
-            names = {f"{d.offgoing.name}.{key}": std for key, std in OFFGOING_STD.items()}
-            found |= {name: PriorValue(guess[name], std) for name, std in names.items()}
     return found
 
 
@@ -274,28 +298,36 @@ def collect_direct_priors(driveline: KnownDriveline, scale_known: bool) -> dict[
     return found
 
 
+@dataclass(frozen=True)
+class GearInertia:
+    """The element that makes a gear, and the prior of J′ [kg m^2] in that gear."""
+
+    element: ShiftElementKinematics
+    prior: PriorValue
+
+
 def list_gear_inertias(
     signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline]
-) -> list[tuple[float, PriorValue]]:
-    """Return the overall ratio of each gear whose J′ is known, with the prior [kg m^2]."""
+) -> list[GearInertia]:
+    """Return the gears whose J′ is known."""
     ending = "" if signals[0].scale_known else OVER_ETA
-    ratios: dict[str, float] = {}
+    makers: dict[str, ShiftElementKinematics] = {}
     for s, d in zip(signals, drivelines, strict=True):
-        ratios |= {s.shift.start_gear: d.i_before, s.shift.end_gear: d.i_after}
+        makers |= {s.shift.start_gear: d.offgoing, s.shift.end_gear: d.oncoming}
     known = drivelines[0].known
     return [
-        (ratio, known[name])
-        for gear, ratio in ratios.items()
+        GearInertia(element, known[name])
+        for gear, element in makers.items()
         if (name := f"{_GEAR_INERTIA}{gear}{ending}") in known
     ]
 
 
-def build_tie(inertias: Sequence[tuple[float, PriorValue]]) -> Tie | None:
+def build_tie(inertias: Sequence[GearInertia]) -> Tie | None:
     """Build the tie of Je to Jo′ by a J′ that is exactly known; None without one.
 
     Raises InputError for two: between them Jo′ would follow, which has an entry of its own.
     """
-    exact = [Tie(prior.value, ratio) for ratio, prior in inertias if prior.std == 0.0]
+    exact = [Tie(one.prior.value, one.element) for one in inertias if one.prior.std == 0.0]
     if len(exact) > 1:
         raise InputError(
             f"J′ of {len(exact)} gears are fixed, and all follow from one inertia and J_out",
@@ -314,16 +346,17 @@ class SumPrior:
 
 
 def list_sum_priors(
-    inertias: Sequence[tuple[float, PriorValue]], J1: PriorValue | None, eta: float
+    inertias: Sequence[GearInertia], J1: PriorValue | None, eta: float
 ) -> list[SumPrior]:
     """Return the priors on sums: J′ = Je + Jo′/i² of gears, and J1 = Je/η as Je - J1·η = 0.
 
-    `inertias` are overall ratios with J′ [kg m^2]; `eta` is the usual efficiency.
+    `eta` is the usual efficiency; of roughly known ratios the nominal value is used, which a sum
+    of unknowns allows.
     """
     found = [
-        SumPrior({"J_e": 1.0, "J_out": ratio**-2}, known.value, known.std)
-        for ratio, known in inertias
-        if known.std > 0.0
+        SumPrior({"J_e": 1.0, "J_out": one.element.ratio**-2}, one.prior.value, one.prior.std)
+        for one in inertias
+        if one.prior.std > 0.0
     ]
     if J1 is not None:
         found.append(SumPrior({"J_e": 1.0, "eta": -J1.value}, 0.0, eta * J1.std))

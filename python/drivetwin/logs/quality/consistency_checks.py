@@ -83,8 +83,8 @@ def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str)
 
     Finds a speed with the unit of another (rpm taken as rad/s) and exchanged columns.
     """
-    ratios = [gear.ratio for gear in card.gears]
-    final = card.final_drive
+    ratios = [gear.ratio.value for gear in card.gears]
+    final = card.final_drive.value
     low, high = 1.0 - FINAL_DRIVE_TOLERANCE, 1.0 + FINAL_DRIVE_TOLERANCE
     limits = (
         ("output_speed", "wheel_speed", low * final, high * final, f"the final drive {final:g}"),
@@ -119,7 +119,8 @@ def check_final_drive(channels: Mapping[str, Channel], card: VehicleCard) -> lis
     """Return a finding if the ratio of output and wheel speed is not the final drive."""
     if "output_speed" not in channels or "wheel_speed" not in channels:
         return []
-    outlet, wheel, final = channels["output_speed"], channels["wheel_speed"], card.final_drive
+    outlet, wheel = channels["output_speed"], channels["wheel_speed"]
+    final = card.final_drive.value
     found = estimate_speed_ratio(outlet, wheel)
     if found is None or abs(found[0] - final) < FINAL_DRIVE_DRIFT * final + SIGNIFICANT * found[1]:
         return []
@@ -157,7 +158,7 @@ def check_torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> 
     findings = []
     loaded = (engine.values > LEAST_LOAD * engine.values.max()) & np.isfinite(output)
     for gear in card.gears:
-        expected = gear.ratio * outlet
+        expected = gear.ratio.value * outlet
         held = loaded & (np.abs(inlet - expected) < IN_GEAR * np.abs(expected))
         if np.count_nonzero(held) < LEAST_SAMPLES:
             continue

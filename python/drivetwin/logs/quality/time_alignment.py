@@ -176,11 +176,11 @@ def check_speed_clocks(channels: Mapping[str, Channel], card: VehicleCard) -> li
     findings: list[Finding] = []
     if "output_speed" in channels:
         outlet = channels["output_speed"].updates
-        found = estimate_speed_delay(inlet, outlet, [gear.ratio for gear in card.gears])
+        found = estimate_speed_delay(inlet, outlet, [gear.ratio.value for gear in card.gears])
         findings += _check_delay(found, outlet, inlet)
     if "engine_speed" in channels:
         engine = channels["engine_speed"].updates
-        found = estimate_speed_delay(engine, inlet, [card.i_in])
+        found = estimate_speed_delay(engine, inlet, [card.i_in.value])
         turned = None if found is None else replace(found, value=-found.value, drift=-found.drift)
         findings += _check_delay(turned, engine, inlet)
     return findings

@@ -102,15 +102,17 @@ def _build_content(opened: Opened) -> list[Component]:
 
 
 def _build_tables(card: VehicleCard) -> list[Component]:
-    gears = [(gear.name, f"{gear.ratio:.4g}", ", ".join(gear.elements)) for gear in card.gears]
+    gears = [
+        (gear.name, f"{gear.ratio.value:.4g}", ", ".join(gear.elements)) for gear in card.gears
+    ]
     elements = [
-        (name, spec.kind, f"{spec.P0.value * 1e-5:.3g} bar", f"{spec.gain:.4g} m³")
+        (name, spec.kind, f"{spec.P0.value * 1e-5:.3g} bar", f"{spec.gain.value:.4g} m³")
         for name, spec in card.elements.items()
     ]
     low, high = card.J_prime_range
     least, most = card.J_vehicle_range
     facts = [
-        ("Final drive", f"{card.final_drive:.4g}"),
+        ("Final drive", f"{card.final_drive.value:.4g}"),
         ("Inertia at the engine J′", f"{low:.3g} to {high:.3g} kg·m²"),
         ("Inertia of the vehicle J3", f"{least:.4g} to {most:.4g} kg·m²"),
         ("Sensor tolerances", ", ".join(card.sensors) or "none: intervals cover noise only"),

@@ -24,7 +24,9 @@ NOISY = 4.0
 
 def _design(file: Path) -> DesignData:
     card = load_card(file)
-    return DesignData(card.loss_law, card.final_drive, card.J_prime_range, card.J_vehicle_range)
+    return DesignData(
+        card.loss_law, card.final_drive.value, card.J_prime_range, card.J_vehicle_range
+    )
 
 
 def test_noise_of_the_speeds_does_not_make_the_vehicle_light(tmp_path: Path) -> None:

@@ -84,8 +84,8 @@ def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
     made = bench()
     posed, start = problem(made)
     part = posed.parts[0]
-    driveline = replace(part.structure.driveline, i_f=1.3 * part.structure.driveline.i_f)
-    wrong = replace(part, structure=replace(part.structure, driveline=driveline))
+    fixed = {**part.structure.fixed, "i_f": 1.3 * part.structure.driveline.i_f}
+    wrong = replace(part, structure=replace(part.structure, fixed=fixed))
     with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
         fit_multistart(replace(posed, parts=(wrong,)), start, [made.signals.shift])
 

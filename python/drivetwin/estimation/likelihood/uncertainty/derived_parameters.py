@@ -35,8 +35,8 @@ def compute_parameters(
     first = structures[0]
     values = {"eta": first.get_value(point, "eta")}
     for structure, s in zip(structures, signals, strict=True):
-        d = structure.driveline
-        for gear, ratio in ((s.shift.start_gear, d.i_before), (s.shift.end_gear, d.i_after)):
+        before, after = structure.compute_ratio_before(point), structure.compute_ratio_after(point)
+        for gear, ratio in ((s.shift.start_gear, before), (s.shift.end_gear, after)):
             J_out = structure.get_value(point, "J_out")
             values[f"J_prime_{gear}"] = structure.get_value(point, "J_e") + J_out / ratio**2
     for name in DIRECT:
@@ -48,6 +48,10 @@ def compute_parameters(
             values[f"P0.{element.name}"] = structure.get_value(point, f"{element.name}.P0")
     for element in structures[0].driveline.drums:
         values[f"drum.{element.name}"] = first.get_value(point, f"{element.name}.drum")
+    for structure in structures:
+        values |= {
+            name: point[name] for name in structure.driveline.ratio_priors if name in point.names
+        }
     values |= get_part_values(first.build_part(point, first.build_model(point)))
     return values if signals[0].scale_known else _rename_over_eta(values)
 
@@ -77,12 +81,12 @@ def list_absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
 
 def compute_oscillation(structure: ShiftModel, point: ParameterVector) -> tuple[float, float]:
     """Compute the damped frequency [Hz] and damping ratio of the lock-up oscillation."""
-    d = structure.driveline
+    after = structure.compute_ratio_after(point)
     inertia = structure.get_value(point, "J_e")
     for one in (*structure.elements, *structure.spinning):
-        inertia += structure.get_value(point, f"{one.name}.drum") * (one.a - one.b / d.i_after) ** 2
-    J4 = inertia * d.i_after**2 + structure.get_value(point, "J_out")
-    J5 = structure.get_value(point, "J_vehicle") / d.i_f**2
+        inertia += structure.get_value(point, f"{one.name}.drum") * (one.a - one.b / after) ** 2
+    J4 = inertia * after**2 + structure.get_value(point, "J_out")
+    J5 = structure.get_value(point, "J_vehicle") / structure.get_final_drive(point) ** 2
     J = compute_series_inertia(J4, J5)
     k_o, c_o = structure.get_value(point, "k_o"), structure.get_value(point, "c_o")
     zeta = c_o / (2.0 * np.sqrt(J * k_o))
