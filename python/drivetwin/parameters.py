@@ -138,6 +138,27 @@ def make_ratio_id(gear: str) -> str:
     return f"ratio_{gear}"
 
 
+def is_ratio(parameter_id: str) -> bool:
+    """Return True for the ratio of a gear or of the final drive."""
+    return parameter_id == FINAL_DRIVE or parameter_id.startswith(make_ratio_id(""))
+
+
+def describe_ratio_id(parameter_id: str) -> str:
+    """Return a ratio in words: `ratio of gear 2`, `final drive`."""
+    if parameter_id == FINAL_DRIVE:
+        return "final drive"
+    return f"ratio of gear {parameter_id.removeprefix(make_ratio_id(''))}"
+
+
+LAW_KEYS = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
+"""Coefficients of a friction law in which covariances are stated: μ_c, μ_s - μ_c, μ_v, ln v_s."""
+
+
+def make_law_id(element: str, key: str) -> str:
+    """Return the id of a coefficient of a friction law in the joint covariance of a twin."""
+    return f"{key}.{element}"
+
+
 def get_parameter_spec(parameter_id: str) -> ParameterSpec:
     """Return the declaration behind an id: `J_prime_2`, `P0.B3`, `te_delay.1`, `k_o_over_eta`.
 

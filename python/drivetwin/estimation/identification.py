@@ -19,6 +19,7 @@ from drivetwin.estimation.result.estimate import (
     SignalFit,
     Verdict,
 )
+from drivetwin.estimation.result.joint import JointCovariance
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Finding
@@ -51,6 +52,8 @@ class Identification(DisplayMixin):
     assumptions: tuple[str, ...] = ()
     correlation_ids: tuple[str, ...] = ()
     correlation: FloatArray | None = None
+    joint: JointCovariance | None = None
+    """Total covariance of parameters and friction laws; None if the method has none."""
     load: LoadLaw | None = None
     status: ModelStatus = ModelStatus.NOT_VALIDATED
     mapping: RememberedMapping = field(default_factory=RememberedMapping)

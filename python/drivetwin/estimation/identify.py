@@ -96,6 +96,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         ),
         correlation_ids=found.correlation_ids,
         correlation=found.correlation,
+        joint=found.joint,
         load=found.load,
         mapping=log.mapping,
     )
@@ -245,7 +246,7 @@ def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet)
     grows = "" if found.load is None else GROWS
     texts = [
         f"loss law {design.loss_law} (theory page, section 3)",
-        "gear ratios, final drive and clutch gains are as on the card",
+        "μ is for the clutch gains on the card: the log determines μ times the gain",
         f"the load torque {grows}is constant over {'each shift' if found.loads else 'the log'}",
         "the off-going element carries no torque once its pressure is below P0",
     ]

@@ -26,14 +26,20 @@ from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.selection.loss_law import check_other_law
 from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
-    compute_jacobian,
+    compute_laws,
     compute_parameters,
+    differentiate,
     list_absolute_ids,
     make_log_id,
 )
-from drivetwin.estimation.likelihood.uncertainty.friction_bands import METHOD, build_friction_curves
+from drivetwin.estimation.likelihood.uncertainty.friction_bands import (
+    METHOD,
+    build_friction_curves,
+    find_reference_slips,
+)
 from drivetwin.estimation.likelihood.uncertainty.predicted_spread import predict_spread
 from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
@@ -41,6 +47,14 @@ from drivetwin.estimation.result.estimate_set import (
     check_excitation,
     collect_shift_labels,
 )
+from drivetwin.estimation.result.friction_verdict import (
+    adopt_verdicts,
+    assess_friction,
+    report_gains,
+)
+from drivetwin.estimation.result.joint import JointCovariance
+from drivetwin.estimation.result.prior_conflict import report_refined
+from drivetwin.estimation.result.prior_update import PRIOR
 from drivetwin.estimation.result.verdict import (
     add_systematic,
     apply_errors,
@@ -80,14 +94,17 @@ def build_estimates(
     """
     correction = correct_fit(fit, priors)
     corrected = correction or keep_fit(fit)
-    own = _fit_parameters(fit, corrected, signals, drivelines)
+    slips = find_reference_slips(fit, linear)
+    own = _fit_parameters(fit, corrected, signals, drivelines, slips)
     sensors = None if correction is None else correct_fit(fit, priors.drop_effects())
     if sensors is not None:
-        plain = _fit_parameters(fit, sensors, signals, drivelines)
+        plain = _fit_parameters(fit, sensors, signals, drivelines, slips)
         if _is_card_likelier(plain.fitted, corrected):
             corrected, own = sensors, plain
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
-    ids, estimates = fitted.ids, fitted.downgrade_conflicts(fitted.assess())
+    curves = build_friction_curves(fit, linear, corrected)
+    estimates = fitted.downgrade_conflicts(assess_friction(fitted.assess(), curves))
+    ids = fitted.ids
     limits = [
         one
         for one in find_at_bounds(fit, ids, matrix)
@@ -107,9 +124,10 @@ def build_estimates(
     estimates = apply_errors(estimates, (*limits, *disagreements))
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
     cause = find_cause(corrected)
+    curves = adopt_verdicts(curves, estimates)
     return EstimateSet(
         estimates,
-        build_friction_curves(fit, linear, corrected),
+        curves,
         ids,
         compute_correlation(own.covariance),
         (
@@ -120,36 +138,43 @@ def build_estimates(
             *(one for one in disagreements if one.subject not in estimates),
             *find_null_directions(fit),
             *report_different_loads(collect_loads(fit)),
-            *_check_other_law(fit, signals, matrix),
+            *report_refined(fitted.priors, estimates),
+            *report_gains(curves, estimates),
+            *_check_levels(fit, corrected),
+            *_check_other_law(fit, signals, dict(zip(ids, matrix, strict=True))),
         ),
         _build_load_law(fit, corrected),
         collect_loads(fit),
         predict_spread(fit, corrected),
         cause,
+        own.joint,
     )
 
 
 def _check_other_law(
-    fit: LikelihoodFit, signals: Sequence[ShiftSignals], matrix: FloatArray
+    fit: LikelihoodFit, signals: Sequence[ShiftSignals], slopes: Mapping[str, FloatArray]
 ) -> list[Finding]:
     """Compare the loss laws by their fits without effects: an effect may stand in for a wrong law.
 
-    `matrix` (k, p) are the derivatives of the parameters by the unknowns.
+    `slopes` are the derivatives (p,) of the parameters by the unknowns, by id.
     """
     values = compute_parameters(fit.problem, fit.mean, signals)
+    matrix = np.array([slopes[name] for name in values])
     return check_other_law(fit, values, matrix, _compute_std(matrix, fit.covariance))
 
 
 @dataclass(frozen=True, eq=False)
 class _ReportedParameters:
     """Reported parameters of a correction: `values` by id, their `jacobian` (k, p) by the
-    unknowns, total `covariance` (k, k) and `std` (k,)."""
+    unknowns, total `covariance` (k, k) and `std` (k,). `joint` is the total covariance with the
+    friction laws."""
 
     fitted: FittedParameters
     values: Mapping[str, float]
     jacobian: FloatArray
     covariance: FloatArray
     std: FloatArray
+    joint: JointCovariance
 
 
 def _fit_parameters(
@@ -157,13 +182,19 @@ def _fit_parameters(
     corrected: Correction,
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[KnownDriveline],
+    slips: Mapping[str, float],
 ) -> _ReportedParameters:
     """Compute the reported parameters with their noise and total covariance."""
-    values = compute_parameters(fit.problem, corrected.mean, signals)
-    matrix = compute_jacobian(
-        fit.problem, corrected.mean, np.sqrt(np.diag(fit.covariance)), signals
-    )
-    covariance = matrix @ corrected.covariance @ matrix.T
+
+    def compute(at: ParameterVector) -> dict[str, float]:
+        laws = compute_laws(fit.problem, at)
+        return {**compute_parameters(fit.problem, at, signals, slips), **laws}
+
+    every = compute(corrected.mean)
+    both = differentiate(compute, corrected.mean, np.sqrt(np.diag(fit.covariance)))
+    joint = JointCovariance(tuple(every), both @ corrected.covariance @ both.T)
+    values = compute_parameters(fit.problem, corrected.mean, signals, slips)
+    matrix, covariance = both[: len(values)], joint.covariance[: len(values), : len(values)]
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     noise = np.minimum(_compute_std(matrix, corrected.noise), std)
     fitted = FittedParameters(
@@ -177,7 +208,23 @@ def _fit_parameters(
         method=METHOD,
         prior_method=WITH_PRIOR,
     )
-    return _ReportedParameters(fitted, values, matrix, covariance, std)
+    return _ReportedParameters(fitted, values, matrix, covariance, std, joint)
+
+
+def _check_levels(fit: LikelihoodFit, corrected: Correction) -> list[Finding]:
+    """Report an element whose friction level contradicts that of its partner: one of the gains is
+    likely wrong."""
+    found = []
+    for name, partner in fit.problem.parts[0].structure.partners.items():
+        unknown, prior = f"{name}.level", fit.problem.prior
+        if unknown not in fit.point.names:
+            continue
+        k = fit.point.names.index(unknown)
+        std = float(prior.precision[k, k]) ** -0.5
+        ratio = corrected.mean[unknown]
+        if abs(ratio - prior.mean[k]) > PRIOR.contradiction * std:
+            found.append(report(Code.GAINS_CONTRADICT, element=name, partner=partner, ratio=ratio))
+    return found
 
 
 def _is_card_likelier(fitted: FittedParameters, correction: Correction) -> bool:

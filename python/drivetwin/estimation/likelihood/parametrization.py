@@ -28,7 +28,7 @@ from drivetwin.estimation.likelihood.extension import Extension
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
+from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
 from drivetwin.simulation.added_part import AddedPart
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
@@ -45,7 +45,7 @@ TE_OFFSET = "te_offset"
 """Mean rounding error of the engine torque [N m]: what is read is the truth plus this."""
 LOG_SPECIFIC = ("Tv_over_if", "te_delay", TE_OFFSET)
 """Unknowns that each of several logs has of its own: road, logger and rounding differ."""
-LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
+LAW = LAW_KEYS
 FOLLOWER = ("level", "rest")
 """Unknowns of an element that has its partner's law: factor on the law [-], rise of friction to
 zero slip beyond that of the law [-]."""

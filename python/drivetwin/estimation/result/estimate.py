@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
+from drivetwin.vehicle.spec import PriorValue
 
 FloatArray = NDArray[np.float64]
 
@@ -84,8 +85,10 @@ class FrictionCurve:
 
     `mu_lo`, `mu_hi` bound the 95 % band (total). `points_slip`, `points_mu` are the raw points
     behind it. `stribeck` is the fitted law, or None; `stribeck_covariance` (4, 4) is over its
-    fields, from noise. `divide_by_eta` marks a curve that is μ/η: no output torque gave μ its
-    scale.
+    fields. `over_eta` marks a curve that is μ/η: no output torque gave μ its scale. μ holds for the
+    `gain` N·D·A·r [m^3] of the vehicle card: the log determines μ times the gain. The band contains
+    the standard deviation of the gain, the covariance of the law does not. `verdict` and `reason`
+    are those of `mu_gain`; `design value` marks the law of a partner.
     """
 
     slip: FloatArray
@@ -98,6 +101,25 @@ class FrictionCurve:
     method: str
     stribeck_covariance: FloatArray | None = None
     over_eta: bool = False
+    gain: PriorValue | None = None
+    verdict: Verdict = Verdict.IDENTIFIED
+    reason: str = ""
+
+    @property
+    def middle_slip(self) -> float:
+        """Slip [rad/s] in the middle of the curve, at which `mu_gain` holds."""
+        return 0.5 * float(self.slip[0] + self.slip[-1])
+
+    @property
+    def gain_spread(self) -> float:
+        """Relative standard deviation of the gain; 0 where none is stated."""
+        return 0.0 if self.gain is None else self.gain.std / self.gain.value
+
+    def add_gain_spread(self, gain: PriorValue) -> FrictionCurve:
+        """Return the curve as μ for `gain`, whose standard deviation widens the band."""
+        spread = Z95 * self.mu * gain.std / gain.value
+        below, above = (np.hypot(end - self.mu, spread) for end in (self.mu_lo, self.mu_hi))
+        return replace(self, mu_lo=self.mu - below, mu_hi=self.mu + above, gain=gain)
 
     @property
     def method_text(self) -> str:

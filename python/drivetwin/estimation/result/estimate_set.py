@@ -13,6 +13,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.result.cause import Cause
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
+from drivetwin.estimation.result.joint import JointCovariance
 from drivetwin.estimation.result.spread import PredictedSpread
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import make_shift_labels
@@ -36,6 +37,8 @@ class EstimateSet:
     """Predicted spread of the free-running simulation of each shift by signal; likelihood only."""
     cause: Cause | None = None
     """Departure from the model that the log shows; likelihood method only."""
+    joint: JointCovariance | None = None
+    """Total covariance of parameters and friction laws; likelihood method only."""
 
 
 def _check_excitation(signals: ShiftSignals) -> Finding | None:

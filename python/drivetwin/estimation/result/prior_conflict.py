@@ -19,7 +19,12 @@ from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.prior_update import PRIOR, remove_prior
 from drivetwin.estimation.result.verdict import reject_identified
 from drivetwin.findings import Code, Finding, Number, explain, report
-from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.parameters import (
+    OVER_ETA,
+    describe_ratio_id,
+    get_parameter_spec,
+    is_ratio,
+)
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
 
@@ -63,6 +68,8 @@ def find_contradictions(
     for name, design in designs.items():
         k, sensors = ids.index(name), systematic.get(name, 0.0)
         moved, spec = abs(float(values[k]) - design.value), get_parameter_spec(name)
+        if is_ratio(name):  # an unknown that the log determines; `report_refined` compares it
+            continue
         if design.std == 0.0 or not spec.lower <= values[k] <= spec.upper:
             continue
         if moved <= design.std:  # no further off than the card allows, however sure the log is
@@ -102,6 +109,29 @@ def apply_contradictions(
                 why = explain(Code.DEPENDS_ON_PRIOR, prior=one.id, value=value)
                 told[name] = reject_identified(other, why)
     return told
+
+
+def report_refined(
+    priors: Mapping[str, PriorValue], estimates: Mapping[str, Estimate]
+) -> list[Finding]:
+    """Report each ratio that the log determines and whose interval excludes the card's number.
+
+    Within the prior the log only refines the written number; beyond it the number is likely wrong.
+    Neither withdraws anything, because the ratio is an unknown of the fit.
+    """
+    found = []
+    for name, prior in priors.items():
+        one = estimates.get(name)
+        interval = None if one is None else one.ci95_total
+        if one is None or one.value is None or interval is None or not is_ratio(name):
+            continue
+        if prior.std == 0.0 or interval[0] <= prior.value <= interval[1]:
+            continue
+        is_within = abs(one.value - prior.value) <= Z95 * prior.std
+        code = Code.RATIO_REFINED if is_within else Code.RATIO_OFF_CARD
+        log = Number(one.value, one.unit, Z95 * (one.std_total or 0.0))
+        found.append(report(code, name, what=describe_ratio_id(name), log=log, card=prior.value))
+    return found
 
 
 def check_design_ranges(

@@ -8,29 +8,36 @@ J4 = (Je + Σ I_drum·(a - b/i)²)·i² + Jo′,  J5 = J_v/i_f²,  1/J = 1/J4 + 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.parametrization import LOG_SPECIFIC, ShiftModel
+from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, ShiftModel
+from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.parameters import OVER_ETA, get_parameter_spec, make_law_id
 from drivetwin.simulation.added_part import get_part_values
 from drivetwin.simulation.dual_clutch import compute_series_inertia
 
-TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "drum")
+TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "drum", "mu_gain")
 """Stems of parameters that share the one scale that only an output torque shows."""
 DIRECT = ("J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Unknowns that are parameters themselves."""
 
 
 def compute_parameters(
-    problem: LikelihoodObjective, point: ParameterVector, signals: Sequence[ShiftSignals]
+    problem: LikelihoodObjective,
+    point: ParameterVector,
+    signals: Sequence[ShiftSignals],
+    slips: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
-    """Compute every reported parameter by id at `point`, in reporting order."""
+    """Compute every reported parameter by id at `point`, in reporting order.
+
+    `slips` are those [rad/s] at which μ·gain is reported, by element; without it none is.
+    """
     structures = [part.structure for part in problem.parts]
     first = structures[0]
     values = {"eta": first.get_value(point, "eta")}
@@ -46,6 +53,10 @@ def compute_parameters(
         values |= {f"f_d_{s.shift.end_gear}": f_d, f"zeta_{s.shift.end_gear}": zeta}
         for element in structure.elements:
             values[f"P0.{element.name}"] = structure.get_value(point, f"{element.name}.P0")
+        for element in structure.elements:
+            if element.name in (slips or {}):
+                mu = compute_friction(structure, point, element.name, (slips or {})[element.name])
+                values[f"mu_gain.{element.name}"] = element.gain * mu
     for element in structures[0].driveline.drums:
         values[f"drum.{element.name}"] = first.get_value(point, f"{element.name}.drum")
     for structure in structures:
@@ -54,6 +65,24 @@ def compute_parameters(
         }
     values |= get_part_values(first.build_part(point, first.build_model(point)))
     return values if signals[0].scale_known else _rename_over_eta(values)
+
+
+def compute_friction(
+    structure: ShiftModel, point: ParameterVector, element: str, slip: float
+) -> float:
+    """Compute μ of an element at one slip [rad/s]."""
+    theta = np.array(structure.get_law(point, element))
+    return float(evaluate_stribeck(theta, np.array([slip]))[0][0])
+
+
+def compute_laws(problem: LikelihoodObjective, point: ParameterVector) -> dict[str, float]:
+    """Compute the coefficients of the friction laws of all elements, by `make_law_id`."""
+    return {
+        make_law_id(element.name, key): value
+        for part in problem.parts
+        for element in part.structure.elements
+        for key, value in zip(LAW, part.structure.get_law(point, element.name), strict=True)
+    }
 
 
 def make_log_id(name: str, log: int) -> str:
@@ -101,12 +130,22 @@ def compute_jacobian(
 ) -> FloatArray:
     """Compute the derivative (q, p) of the parameters by central differences over a part of
     `std` (p,)."""
+    return differentiate(lambda at: compute_parameters(problem, at, signals), point, std)
+
+
+def differentiate(
+    function: Callable[[ParameterVector], Mapping[str, float]],
+    point: ParameterVector,
+    std: FloatArray,
+) -> FloatArray:
+    """Compute the derivative (q, p) of quantities by central differences over a part of `std`
+    (p,)."""
     columns = []
     for k, width in enumerate(0.01 * std):
         shift = np.zeros_like(std)
         shift[k] = width
         ahead, behind = (
-            np.array(list(compute_parameters(problem, point.replace_values(x), signals).values()))
+            np.array(list(function(point.replace_values(x)).values()))
             for x in (point.values + shift, point.values - shift)
         )
         columns.append((ahead - behind) / (2.0 * width))

@@ -16,50 +16,109 @@ from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.likelihood.slip_contact import find_loaded_slips
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import differentiate
 from drivetwin.estimation.linear.friction_points import build_law_derivatives, evaluate_stribeck
 from drivetwin.estimation.result.cause import Group
-from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
+from drivetwin.findings import Code, explain
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.spec import PriorValue
 
 METHOD = "likelihood"
 POINTS = 60
 
 
+def find_reference_slips(
+    fit: LikelihoodFit, linear: Mapping[str, FrictionCurve]
+) -> dict[str, float]:
+    """Return the slip [rad/s] in the middle of the curve of every element whose law is free."""
+    return {name: _find_base(fit, linear, name).middle_slip for name in _list_free_laws(fit)}
+
+
 def build_friction_curves(
     fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], told: Correction
 ) -> dict[str, FrictionCurve]:
-    """Compute the curve of every element whose friction law is free.
+    """Compute the curves of all elements, for the gains of the vehicle card.
 
     `linear` are the curves of the linear method: their points and slip range are shown. Its
     place is taken by the slips of the simulation where there is none. The band is that of the law
-    and of the shapes beside it, with all effects; the curve contains shapes with evidence.
+    and of the shapes beside it, with all effects; the curve contains shapes with evidence. An
+    element that only disengages has the law of its partner with a level of its own, over the slips
+    of the partner.
     """
     found: dict[str, FrictionCurve] = {}
-    parts = fit.problem.parts
-    for name in dict.fromkeys(one.name for part in parts for one in part.structure.elements):
-        if not has_free_law(fit.point, name):
-            continue
-        base = linear.get(name) or _build_empty_curve(fit, name)
-        index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
-        theta, square = told.mean.values[index], np.ix_(index, index)
-        mu, slopes = evaluate_stribeck(theta, base.slip)
+    for name in _list_free_laws(fit):
+        base = _find_base(fit, linear, name)
+        curve = _build_curve(fit, told, name, base)
+        slopes = evaluate_stribeck(_get_law(fit, told, name)[0], base.slip)[1]
         change, variance = _add_shapes(fit, told, name, base.slip, slopes)
-        half = Z95 * np.sqrt(variance)
-        mu_c, drop, mu_v, ln_v_s = (float(v) for v in theta)
-        v_s = float(np.exp(ln_v_s))
-        to_law = build_law_derivatives(v_s)
-        found[name] = replace(
-            base,
-            mu=mu + change,
-            mu_lo=mu + change - half,
-            mu_hi=mu + change + half,
-            stribeck=Stribeck(mu_c, mu_c + drop, v_s, mu_v),
-            method=METHOD,
-            stribeck_covariance=to_law @ told.covariance[square] @ to_law.T,
-            over_eta=not parts[0].scale_known,
-        )
-    return found
+        found[name] = _set_band(curve, curve.mu + change, np.sqrt(variance))
+    for name, partner in fit.problem.parts[0].structure.partners.items():
+        if partner in found:
+            empty = np.empty(0)
+            base = replace(found[partner], points_slip=empty, points_mu=empty)
+            curve = _build_curve(fit, told, name, base)
+            found[name] = replace(
+                curve,
+                verdict=Verdict.DESIGN,
+                reason=explain(Code.PARTNER_FRICTION, partner=partner),
+            )
+    return {name: curve.add_gain_spread(_get_gain(fit, name)) for name, curve in found.items()}
+
+
+def _list_free_laws(fit: LikelihoodFit) -> list[str]:
+    """List the elements whose friction law is free."""
+    every = (one.name for part in fit.problem.parts for one in part.structure.elements)
+    return [name for name in dict.fromkeys(every) if has_free_law(fit.point, name)]
+
+
+def _find_base(fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], name: str) -> FrictionCurve:
+    return linear.get(name) or _build_empty_curve(fit, name)
+
+
+def _get_gain(fit: LikelihoodFit, name: str) -> PriorValue:
+    one = fit.problem.parts[0].structure.driveline.couplings[name]
+    return PriorValue(one.gain, one.gain_std)
+
+
+def _get_law(fit: LikelihoodFit, told: Correction, name: str) -> tuple[FloatArray, FloatArray]:
+    """Return the coefficients `LAW` (4,) of an element and their derivatives (4, p) by the
+    unknowns."""
+    structure = next(
+        part.structure
+        for part in fit.problem.parts
+        if name in (one.name for one in part.structure.elements)
+    )
+    std = np.sqrt(np.diag(fit.covariance))
+    rows = differentiate(
+        lambda at: dict(zip(LAW, structure.get_law(at, name), strict=True)), told.mean, std
+    )
+    return np.array(structure.get_law(told.mean, name)), rows
+
+
+def _build_curve(
+    fit: LikelihoodFit, told: Correction, name: str, base: FrictionCurve
+) -> FrictionCurve:
+    """Build the curve of the friction law of an element over the slips of `base`."""
+    theta, rows = _get_law(fit, told, name)
+    covariance = rows @ told.covariance @ rows.T
+    mu, slopes = evaluate_stribeck(theta, base.slip)
+    mu_c, drop, mu_v, ln_v_s = (float(v) for v in theta)
+    to_law = build_law_derivatives(float(np.exp(ln_v_s)))
+    curve = replace(
+        base,
+        stribeck=Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v),
+        method=METHOD,
+        stribeck_covariance=to_law @ covariance @ to_law.T,
+        over_eta=not fit.problem.parts[0].scale_known,
+    )
+    return _set_band(curve, mu, np.sqrt(np.einsum("pn,pq,qn->n", slopes, covariance, slopes)))
+
+
+def _set_band(curve: FrictionCurve, mu: FloatArray, std: FloatArray) -> FrictionCurve:
+    """Return the curve with other values (n,) and standard deviations (n,)."""
+    return replace(curve, mu=mu, mu_lo=mu - Z95 * std, mu_hi=mu + Z95 * std)
 
 
 def _add_shapes(
