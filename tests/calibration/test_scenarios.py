@@ -17,12 +17,12 @@ from drivetwin.calibration.scenarios import (
     collect_scenarios,
     draw_scenarios,
     is_possible,
-    scale_friction,
     scale_units,
 )
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import FrictionTable, Signal, simulate
+from drivetwin.twin.distribution import scale_friction
 from tests.calibration.cases import (
     SYSTEM,
     build_profiles,

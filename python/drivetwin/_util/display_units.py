@@ -32,6 +32,7 @@ RAD_PER_S = Display("rad/s")
 _BY_SI = {
     "1": Display("–"),
     "kg*m^2": Display("kg·m²"),
+    "m^3": Display("m³"),
     "N*m": NM,
     "N*m/rad": Display("Nm/rad"),
     "N*m*s/rad": Display("Nm·s/rad"),

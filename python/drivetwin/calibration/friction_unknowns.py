@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.friction_law import (
+from drivetwin.estimation.linear.friction_points import build_law_derivatives
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.twin.friction_law import (
+    build_partner_spread,
     compute_friction_std,
     compute_law_covariance,
     to_law,
     to_values,
 )
-from drivetwin.estimation.likelihood.parametrization import FOLLOWER
-from drivetwin.estimation.likelihood.priors import FOLLOWER_PRIOR
-from drivetwin.estimation.linear.friction_points import build_law_derivatives
-from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +87,6 @@ def build_friction_unknowns(
 
 def _build_other_clutch(curve: FrictionCurve) -> FloatArray:
     """Covariance (k, k) of the friction of a clutch about that of another one."""
-    level, rest = (FOLLOWER_PRIOR[key].std for key in FOLLOWER)
     if curve.stribeck is None:
-        return np.array([[level**2]])
-    scaled = to_values(curve.stribeck) * np.array([1.0, 1.0, 1.0, 0.0])
-    return level**2 * np.outer(scaled, scaled) + np.diag([0.0, rest**2, 0.0, 0.0])
+        return np.array([[PARTNER_LEVEL_STD**2]])
+    return build_partner_spread(curve.stribeck)

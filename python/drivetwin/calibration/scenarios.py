@@ -16,21 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.friction_law import compute_scale_std, draw_law
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import DrawUnit
 from drivetwin.errors import InputError
-from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.dual_clutch import (
-    DualClutch,
-    FrictionTable,
-    ShiftElement,
-    Stribeck,
-)
+from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
 from drivetwin.simulation.shift_control import ControlledUnit
+from drivetwin.twin.distribution import ModelDistribution, describe_model
 from drivetwin.twin.twin import Twin
 
 _TRIES = 20
@@ -172,11 +166,9 @@ def scale_units(model: DualClutch, spread: Spread, random: np.random.Generator) 
 
 @dataclass(frozen=True, eq=False)
 class TwinDraws:
-    """Draws of a twin: parameters by covariance, friction by its band, and made units.
+    """Draws of a twin: parameters and friction laws by their joint covariance, and made units.
 
-    The covariance is the total one, with sensor tolerances and effects. The friction law of each
-    element is drawn by its covariance. The curve is scaled as a whole by what its band in the
-    middle has beside it.
+    The covariance is the total one, with sensor tolerances and effects.
     """
 
     twin: Twin
@@ -185,29 +177,17 @@ class TwinDraws:
 
     def __call__(self, random: np.random.Generator) -> DualClutch | None:
         """Draw a driveline; None where it is impossible."""
-        overrides = self._draw_parameters(random)
-        if any(value <= 0.0 and name != "Tv_over_if" for name, value in overrides.items()):
-            return None
-        model = self.twin.build_dual_clutch(self.shift, overrides=overrides)
-        elements = [self._draw_friction(one, random) for one in model.elements]
-        old, new = elements
-        if old is None or new is None:
-            return None
-        return scale_units(replace(model, elements=(old, new)), self.spread, random)
+        known = self._known
+        model = known.draw_model(known.draw(random, self._directions), random)
+        return None if model is None else scale_units(model, self.spread, random)
 
-    def _draw_parameters(self, random: np.random.Generator) -> dict[str, float]:
-        twin = self.twin
-        ids = self.drawn_ids
-        if not ids or twin.covariance is None:
-            return {}
-        index = [twin.covariance_ids.index(one) for one in ids]
-        mean = np.array([twin.get_value(one, 0.0) for one in ids])
-        covariance = twin.covariance[np.ix_(index, index)]
-        values = random.multivariate_normal(mean, covariance, method="eigh")
-        return {
-            name.removesuffix(OVER_ETA): float(value)
-            for name, value in zip(ids, values, strict=True)
-        }
+    @cached_property
+    def _known(self) -> ModelDistribution:
+        return describe_model(self.twin, self.shift, self.drawn_ids)
+
+    @cached_property
+    def _directions(self) -> FloatArray:
+        return self._known.directions
 
     @cached_property
     def drawn_ids(self) -> list[str]:
@@ -221,40 +201,3 @@ class TwinDraws:
             for one in twin.covariance_ids
             if one.removesuffix(OVER_ETA) in used and twin.parameters[one].value is not None
         ]
-
-    def _draw_friction(
-        self, element: ShiftElement, random: np.random.Generator
-    ) -> ShiftElement | None:
-        """Draw the friction of an element; None where it is impossible."""
-        curve = self._curves.get(element.name)
-        scale = float(random.normal(1.0, self._scale_stds[element.name]))
-        if curve is None or curve.stribeck_covariance is None:
-            return scale_friction(element, scale)
-        law = draw_law(curve, random)
-        return None if law is None else scale_friction(replace(element, friction=law), scale)
-
-    @cached_property
-    def _curves(self) -> dict[str, FrictionCurve]:
-        """Curves of μ by element; one over η is scaled as in the model."""
-        eta = self.twin.get_value("eta", 1.0)
-        return {
-            name: curve.scale_by_eta(eta) if curve.over_eta else curve
-            for name, curve in self.twin.friction.items()
-        }
-
-    @cached_property
-    def _scale_stds(self) -> dict[str, float]:
-        names = (self.shift.offgoing, self.shift.oncoming)
-        return {name: compute_scale_std(self._curves.get(name)) for name in names}
-
-
-def scale_friction(element: ShiftElement, scale: float) -> ShiftElement:
-    """Return the element with its friction coefficient times `scale`."""
-    law = element.friction
-    if isinstance(law, FrictionTable):
-        friction: Stribeck | FrictionTable = FrictionTable(
-            law.slip, tuple(scale * value for value in law.mu)
-        )
-    else:
-        friction = Stribeck(scale * law.mu_c, scale * law.mu_s, law.v_s, scale * law.mu_v)
-    return replace(element, friction=friction)

@@ -146,18 +146,21 @@ def list_limits(suggestions: Sequence[ExperimentRanking]) -> list[str]:
 
 
 def build_friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
-    """μ with its 95 % band at the ends and in the middle of the slip range seen."""
+    """μ with its 95 % band at the ends and in the middle of the slip range seen, and its verdict.
+
+    μ is for the gain on the vehicle card; the log determines μ times the gain.
+    """
     table = make_table(
-        "Friction", "element", "slip rad/s", "μ", "95 %", right=("slip rad/s", "μ", "95 %")
-    )
+        "Friction, for the gains on the vehicle card",
+        "element", "slip rad/s", "μ", "95 %", "verdict", right=("slip rad/s", "μ", "95 %"),
+    )  # fmt: skip
     for name, curve in friction.items():
         element = f"{name} ({curve.symbol})" if curve.over_eta else name
         for place, index in enumerate((0, curve.slip.size // 2, curve.slip.size - 1)):
             band = (float(curve.mu_lo[index]), float(curve.mu_hi[index]))
             value, interval, _ = format_estimate(float(curve.mu[index]), band, "1")
-            table.add_row(
-                element if place == 0 else "", f"{curve.slip[index]:.1f}", value, interval
-            )
+            first = (element, curve.verdict.value) if place == 0 else ("", "")
+            table.add_row(first[0], f"{curve.slip[index]:.1f}", value, interval, first[1])
     return table
 
 

@@ -24,6 +24,7 @@ from drivetwin.estimation.result.suggestion import Experiment, ExperimentRanking
 from drivetwin.findings import Code, Finding, Number, Severity
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.vehicle.spec import PriorValue
 
 OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(convert_nonfinite)]
 Interval = tuple[FiniteFloat, FiniteFloat]
@@ -83,6 +84,10 @@ class FrictionRecord(Record):
     stribeck: StribeckRecord | None = None
     stribeck_covariance: list[list[FiniteFloat]] | None = None
     method: str
+    gain_m3: OptionalFloat = None
+    gain_std_m3: OptionalFloat = None
+    verdict: Verdict = Verdict.IDENTIFIED
+    reason: str = ""
 
     @model_validator(mode="after")
     def _check_array_sizes(self) -> Self:
@@ -102,6 +107,10 @@ class FrictionRecord(Record):
             "stribeck": source.stribeck,
             "stribeck_covariance": _convert_rows(source.stribeck_covariance),
             "method": source.method_text,
+            "gain_m3": None if source.gain is None else source.gain.value,
+            "gain_std_m3": None if source.gain is None else source.gain.std,
+            "verdict": source.verdict,
+            "reason": source.reason,
         }
 
     def to_curve(self) -> FrictionCurve:
@@ -119,6 +128,11 @@ class FrictionRecord(Record):
             if self.stribeck_covariance is None
             else np.asarray(self.stribeck_covariance),
             over_eta=self.method.endswith(OF_RATIO),
+            gain=None
+            if self.gain_m3 is None
+            else PriorValue(self.gain_m3, self.gain_std_m3 or 0.0),
+            verdict=self.verdict,
+            reason=self.reason,
         )
 
 

@@ -8,7 +8,6 @@ of them; each run goes through its own lock and break-away, so nothing is linear
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from drivetwin.estimation.data.prepare import collect_pressures
 from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.observer.kind import Observer
-from drivetwin.observer.propagate import sample_friction, select_uncertain
+from drivetwin.observer.propagate import select_uncertain
 from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_part import AddedPart, simulate_plant
@@ -61,7 +60,8 @@ def simulate_observed(
         )
     run = base.trajectory
     ids = (*STEMS, *(f"P0.{one.name}" for one in base.model.elements))
-    known = select_uncertain(twin, shift, ids)
+    known = select_uncertain(twin, shift, ids, laws=True)
+    directions = known.directions
     generators = np.random.SeedSequence(seed).spawn(runs)
     noise = collect_pressures(quiet, shift)
     torque = prepare_signal(quiet["engine_torque"])
@@ -70,9 +70,10 @@ def simulate_observed(
     found: list[Trajectory] = []
     for generator in generators:
         rng = np.random.default_rng(generator)
-        values = known.values + known.directions @ rng.standard_normal(known.directions.shape[1])
-        model = known.build_model(values)
-        model = replace(model, elements=sample_friction(model, twin, rng))
+        values = known.draw(rng, directions)
+        model = known.draw_model(values, rng)
+        if model is None:
+            continue
         one = _simulate_member(
             model,
             twin.part,

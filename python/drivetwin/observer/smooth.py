@@ -35,11 +35,12 @@ from drivetwin.observer.linear_model import (
     build_linear_model,
     compute_impulse_response,
 )
-from drivetwin.observer.propagate import Uncertain, select_uncertain
+from drivetwin.observer.propagate import select_uncertain
 from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.observer.smoother import Measurement, Process, filter_forward, smooth_states
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch
+from drivetwin.twin.distribution import ModelDistribution
 from drivetwin.twin.twin import Twin
 
 STEMS = ("eta", "J_prime", "J_out", "J_vehicle", "k_o", "c_o", "te_delay")
@@ -74,7 +75,7 @@ class _Setting:
     """
 
     seen: Recorded
-    known: Uncertain
+    known: ModelDistribution
     directions: FloatArray
     driving: BoolArray
 

@@ -12,10 +12,12 @@ from drivetwin._util.version import get_program_version
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.channel_spec import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
+from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw, Verdict
+from drivetwin.estimation.result.joint import JointCovariance
 from drivetwin.estimation.result.verdict import from_prior
-from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
+from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
+from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -112,19 +114,53 @@ def _scale_absolute(found: Identification) -> tuple[dict[str, FrictionCurve], Lo
     return friction, load.scale_by_eta(*by) if load is not None and load.over_eta else load
 
 
+def _widen_joint(
+    found: Identification, joint: JointCovariance
+) -> tuple[tuple[str, ...], FloatArray | None]:
+    """Joint covariance without the quantities that have no value, with the stated intervals."""
+    std = np.sqrt(np.maximum(np.diag(joint.covariance), 0.0))
+    factors, kept = np.ones(std.size), []
+    for k, name in enumerate(joint.ids):
+        estimate = found.estimates.get(name)
+        if estimate is None:
+            if name.startswith(LAW_KEYS):
+                kept.append(k)
+            continue
+        if estimate.value is None or estimate.std_total is None:
+            continue
+        kept.append(k)
+        if std[k] > 0.0:
+            factors[k] = estimate.std_total / std[k]
+    scaled = np.outer(factors, factors) * joint.covariance
+    return tuple(joint.ids[k] for k in kept), scaled[np.ix_(kept, kept)]
+
+
 def list_borrowed_friction(found: Identification) -> list[str]:
     """List the elements with their partner's friction curve; they never slipped under load."""
     pairs = {
         (a, b)
         for shift in found.shifts
         for a, b in ((shift.offgoing, shift.oncoming), (shift.oncoming, shift.offgoing))
-        if a not in found.friction and b in found.friction
+        if _is_borrowed(found.friction.get(a)) and not _is_borrowed(found.friction.get(b))
     }
-    return [f"friction of {a} is taken to be that of {b}" for a, b in sorted(pairs)]
+    return [
+        f"friction of {a} is taken to be that of {b}, ± {100.0 * PARTNER_LEVEL_STD:.0f} %"
+        for a, b in sorted(pairs)
+    ]
+
+
+def _is_borrowed(curve: FrictionCurve | None) -> bool:
+    """Return True for an element whose friction the log does not determine."""
+    return curve is None or curve.verdict is Verdict.DESIGN
 
 
 def _build_covariance(found: Identification) -> tuple[tuple[str, ...], FloatArray | None]:
-    """Covariance from the correlation and the total standard deviations, where all are known."""
+    """Total covariance of the estimates, with the friction laws where the method has theirs.
+
+    Estimates whose interval was widened have the wider one; their correlations stay.
+    """
+    if found.joint is not None:
+        return _widen_joint(found, found.joint)
     if found.correlation is None:
         return (), None
     stds = {i: found.estimates[i].std_total for i in found.correlation_ids if i in found.estimates}

@@ -46,6 +46,7 @@ from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS, make_ratio_id
 from drivetwin.shifts.split_gears import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD, PARTNER_REST_STD
 from drivetwin.vehicle.spec import PriorValue
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
@@ -68,10 +69,12 @@ _GEAR_INERTIA = "J_prime_"
 DESIGN_FACTOR = 10.0
 """Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
 small that, with the shaft's damping, one run takes as long as a whole fit."""
-FOLLOWER_PRIOR = {"level": PriorValue(1.0, 0.07), "rest": PriorValue(0.0, 0.015)}
-"""Friction of an element that only disengages, relative to the law of its partner: engineering
-estimates for two clutches with the same lining and oil [-]. The standard deviations of both gains
-come on top of that of the level."""
+FOLLOWER_PRIOR = {
+    "level": PriorValue(1.0, PARTNER_LEVEL_STD),
+    "rest": PriorValue(0.0, PARTNER_REST_STD),
+}
+"""Friction of an element that only disengages, relative to the law of its partner [-]. The standard
+deviations of both gains come on top of that of the level."""
 
 
 def build_problem(

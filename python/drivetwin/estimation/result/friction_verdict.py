@@ -38,10 +38,8 @@ def assess_friction(
         value, std = compute_mu_gain(curve)
         noise = min(one.std_noise if one.std_noise is not None else std, std)
         systematic = float(np.sqrt(max(std**2 - noise**2, 0.0)))
-        slip = Number(curve.middle_slip, "rad/s")
-        found[name] = assess(
-            name, value, noise, one.method, systematic, explain(Code.MU_GAIN_SLIP, slip=slip)
-        )
+        note = explain(Code.MU_GAIN_SLIP, slip=curve.middle_slip)
+        found[name] = assess(name, value, noise, one.method, systematic, note)
     return found
 
 

@@ -8,16 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.calibration.friction_law import (
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.twin.friction_law import (
     build_from_law,
     compute_law_covariance,
     compute_scale_std,
-    draw_law,
     to_law,
     to_values,
 )
-from drivetwin.estimation.result.estimate import Z95, FrictionCurve
-from drivetwin.simulation.dual_clutch import Stribeck
 
 LAW = Stribeck(0.12, 0.14, 9.0, 2e-4)
 STDS = np.array([2e-3, 3e-3, 1e-5, 0.2])
@@ -50,24 +49,6 @@ def test_derivatives_of_the_values_are_those_of_differences() -> None:
         np.testing.assert_allclose(build_from_law(LAW)[:, place], slope, rtol=1e-5, atol=1e-9)
 
 
-def test_draws_have_the_covariance_of_the_law() -> None:
-    random, curve = np.random.default_rng(2), make_curve()
-    laws = [draw_law(curve, random) for _ in range(4000)]
-    values = np.array([to_values(one) for one in laws if one is not None])
-    np.testing.assert_allclose(values.std(axis=0), STDS, rtol=0.05)
-    np.testing.assert_allclose(values.mean(axis=0), to_values(LAW), atol=4.0 * STDS.max() / 60.0)
-
-
-def test_an_impossible_law_is_no_draw() -> None:
-    curve = make_curve()
-    assert curve.stribeck_covariance is not None
-    wide = replace(curve, stribeck_covariance=1e4 * curve.stribeck_covariance)
-    random = np.random.default_rng(3)
-    laws = [draw_law(wide, random) for _ in range(200)]
-    assert any(one is None for one in laws)
-    assert all(min(one.mu_c, one.mu_s) > 0.0 for one in laws if one is not None)
-
-
 def test_a_scale_is_drawn_for_the_rest_of_the_band_alone() -> None:
     assert compute_scale_std(make_curve()) == pytest.approx(0.0, abs=1e-6)
     assert compute_scale_std(make_curve(0.05)) == pytest.approx(0.05, rel=0.02)
@@ -77,5 +58,4 @@ def test_a_scale_is_drawn_for_the_rest_of_the_band_alone() -> None:
 def test_a_curve_without_a_covariance_has_its_band_as_scale() -> None:
     curve = replace(make_curve(0.05), stribeck_covariance=None)
     assert compute_law_covariance(curve) is None
-    assert draw_law(curve, np.random.default_rng(1)) == LAW
     assert compute_scale_std(curve) > 0.05

@@ -9,6 +9,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.linear.friction_points import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD, PARTNER_REST_STD
 
 
 def to_values(law: Stribeck) -> FloatArray:
@@ -45,8 +46,13 @@ def compute_friction_std(curve: FrictionCurve | None) -> float:
 
 
 def compute_scale_std(curve: FrictionCurve | None) -> float:
-    """Relative standard deviation of μ that its band has beside the covariance of its law."""
+    """Relative standard deviation of μ that its band has beside the covariance of its law.
+
+    That of the gain is left out: the motion depends on μ times the gain.
+    """
     whole = compute_friction_std(curve)
+    if curve is not None:
+        whole = float(np.sqrt(max(whole**2 - curve.gain_spread**2, 0.0)))
     covariance = None if curve is None else compute_law_covariance(curve)
     if curve is None or curve.stribeck is None or covariance is None:
         return whole
@@ -55,11 +61,9 @@ def compute_scale_std(curve: FrictionCurve | None) -> float:
     return float(np.sqrt(max(whole**2 - float(np.median(variance)), 0.0)))
 
 
-def draw_law(curve: FrictionCurve, random: np.random.Generator) -> Stribeck | None:
-    """Draw a law by its covariance, without one the law itself; None where μ is not above zero."""
-    covariance = compute_law_covariance(curve)
-    if curve.stribeck is None or covariance is None:
-        return curve.stribeck
-    values = random.multivariate_normal(to_values(curve.stribeck), covariance, method="eigh")
-    law = to_law(values)
-    return law if min(law.mu_c, law.mu_s) > 0.0 else None
+def build_partner_spread(law: Stribeck) -> FloatArray:
+    """Build the covariance (4, 4) by which the values of an element's law depart from those of its
+    partner's `law`, where the log does not determine them."""
+    scaled = to_values(law) * np.array([1.0, 1.0, 1.0, 0.0])
+    rest = np.array([0.0, PARTNER_REST_STD, 0.0, 0.0])
+    return PARTNER_LEVEL_STD**2 * np.outer(scaled, scaled) + np.outer(rest, rest)

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: MIT
+"""Joint distribution of what the model of a shift depends on, as a twin knows it.
+
+The one place from which drivelines are drawn: calibration and observer use it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.result.estimate import FrictionCurve
+from drivetwin.parameters import LAW_KEYS, OVER_ETA, make_law_id
+from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, ShiftElement, Stribeck
+from drivetwin.twin.friction_law import (
+    build_partner_spread,
+    compute_law_covariance,
+    compute_scale_std,
+    to_law,
+    to_values,
+)
+from drivetwin.twin.twin import Twin
+from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
+
+_NEGLIGIBLE = 1e-9
+"""Variance of a direction over the largest below which it is rounding [ratio]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelDistribution:
+    """Normal distribution of parameters and friction laws of one shift.
+
+    `values` (p,) and total `covariance` (p, p) are over `ids`: parameters, and coefficients of the
+    friction laws by `make_law_id`. `scales` are relative standard deviations of μ by element that a
+    friction curve has beside its law.
+    """
+
+    twin: Twin
+    shift: Shift
+    ids: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    scales: Mapping[str, float]
+
+    @property
+    def directions(self) -> FloatArray:
+        """Columns (p, r) of one standard deviation each, independent of each other."""
+        scale = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        unit = self.covariance / np.outer(*(np.where(scale > 0.0, scale, np.inf),) * 2)
+        power, axes = np.linalg.eigh(unit)
+        kept = power > _NEGLIGIBLE * max(1.0, float(power[-1]))
+        return np.asarray(scale[:, None] * axes[:, kept] * np.sqrt(power[kept]))
+
+    def to_named(self, values: FloatArray) -> dict[str, float]:
+        """Return `values` (p,) by id."""
+        return dict(zip(self.ids, values.tolist(), strict=True))
+
+    def build_model(self, values: FloatArray) -> DualClutch:
+        """Build the model at `values` (p,)."""
+        named = self.to_named(values)
+        used = self.twin.list_model_ids(self.shift)
+        own = {
+            plain: value
+            for name, value in named.items()
+            if (plain := name.removesuffix(OVER_ETA)) in used
+        }
+        model = self.twin.build_dual_clutch(self.shift, overrides=own)
+        return replace(model, elements=tuple(_replace_law(one, named) for one in model.elements))
+
+    def draw(self, random: np.random.Generator, directions: FloatArray) -> FloatArray:
+        """Draw values (p,) along `directions` (p, r), which are those of this distribution."""
+        return np.asarray(self.values + directions @ random.standard_normal(directions.shape[1]))
+
+    def draw_model(self, values: FloatArray, random: np.random.Generator) -> DualClutch | None:
+        """Build the model at drawn `values` (p,) and draw the scale of each friction curve.
+
+        None where a value that must be positive is not.
+        """
+        named = self.to_named(values)
+        signed = (*LAW_KEYS, "Tv_over_if", "te_delay", "p_delay")
+        if any(value <= 0.0 and not name.startswith(signed) for name, value in named.items()):
+            return None
+        model = self.build_model(values)
+        elements = tuple(
+            scale_friction(one, float(random.normal(1.0, self.scales.get(one.name, 0.0))))
+            for one in model.elements
+        )
+        laws = [one.friction for one in elements]
+        if any(isinstance(law, Stribeck) and min(law.mu_c, law.mu_s) <= 0.0 for law in laws):
+            return None
+        return replace(model, elements=elements)
+
+
+def describe_model(
+    twin: Twin,
+    shift: Shift,
+    ids: Sequence[str],
+    *,
+    more: Mapping[str, float] | None = None,
+    laws: bool = True,
+) -> ModelDistribution:
+    """Describe the parameters `ids` of a shift and, with `laws`, the friction of both elements.
+
+    Parameters
+    ----------
+    twin, shift
+        The identified model and the shift whose model is described.
+    ids
+        Parameter ids, those of a twin over η with that ending.
+    more
+        Further standard deviations by id, of errors that are not the twin's.
+    laws
+        False for a model whose friction laws do not act.
+    """
+    model = twin.build_dual_clutch(shift)
+    fallback = {f"P0.{one.name}": one.P0 for one in model.elements}
+    values = np.array([twin.get_value(name, fallback.get(name, 0.0)) for name in ids])
+    covariance = _collect_covariance(twin, ids)
+    for k, name in enumerate(ids):
+        estimate = twin.parameters.get(name)
+        if covariance[k, k] == 0.0 and estimate is not None and estimate.std_total is not None:
+            covariance[k, k] = estimate.std_total**2
+        covariance[k, k] += (more or {}).get(name, 0.0) ** 2
+    parameters = ModelDistribution(twin, shift, tuple(ids), values, covariance, {})
+    return _add_laws(parameters, model, _collect_curves(twin)) if laws else parameters
+
+
+def _add_laws(
+    known: ModelDistribution, model: DualClutch, curves: Mapping[str, FrictionCurve]
+) -> ModelDistribution:
+    """Add the friction laws of the elements: by the joint covariance of the twin, else by that of
+    the curve, else by the law of the partner."""
+    twin, laws = known.twin, [one for one in model.elements if isinstance(one.friction, Stribeck)]
+    law_ids = [make_law_id(one.name, key) for one in laws for key in LAW_KEYS]
+    means = [to_values(one.friction) for one in laws if isinstance(one.friction, Stribeck)]
+    scales = {one.name: compute_scale_std(curves.get(one.name)) for one in model.elements}
+    for one in model.elements:
+        if one.name not in curves and not isinstance(one.friction, Stribeck):
+            scales[one.name] = float(np.hypot(scales[one.name], PARTNER_LEVEL_STD))
+    ids = (*known.ids, *law_ids)
+    if all(name in twin.covariance_ids for name in law_ids):
+        eta = twin.get_value("eta", 1.0) if twin.over_eta else 1.0
+        factor = np.array([eta, eta, eta, 1.0] * len(laws))
+        scale = np.concatenate([np.ones(len(known.ids)), factor])
+        covariance = np.outer(scale, scale) * _collect_covariance(twin, ids)
+        size = len(known.ids)
+        covariance[:size, :size] = known.covariance
+    else:
+        blocks = [_describe_law(one, curves) for one in laws]
+        covariance = block_diag(known.covariance, *blocks)
+    values = np.concatenate([known.values, *means])
+    return replace(known, ids=ids, values=values, covariance=covariance, scales=scales)
+
+
+def _describe_law(one: ShiftElement, curves: Mapping[str, FrictionCurve]) -> FloatArray:
+    """Covariance (4, 4) of the law of an element by itself."""
+    own = curves.get(one.name)
+    if own is None and isinstance(one.friction, Stribeck):
+        return build_partner_spread(one.friction)
+    covariance = None if own is None else compute_law_covariance(own)
+    return np.zeros((4, 4)) if covariance is None else covariance
+
+
+def _collect_covariance(twin: Twin, ids: Sequence[str]) -> FloatArray:
+    """Total covariance (n, n) of ids; zero where the twin has none."""
+    found = np.zeros((len(ids), len(ids)))
+    if twin.covariance is None:
+        return found
+    known = [k for k, name in enumerate(ids) if name in twin.covariance_ids]
+    place = [twin.covariance_ids.index(ids[k]) for k in known]
+    found[np.ix_(known, known)] = twin.covariance[np.ix_(place, place)]
+    return found
+
+
+def _collect_curves(twin: Twin) -> dict[str, FrictionCurve]:
+    """Curves of μ by element; one over η is scaled as in the model."""
+    eta = twin.get_value("eta", 1.0)
+    return {
+        name: curve.scale_by_eta(eta) if curve.over_eta else curve
+        for name, curve in twin.friction.items()
+    }
+
+
+def _replace_law(one: ShiftElement, named: Mapping[str, float]) -> ShiftElement:
+    """Return an element with the law that `named` contains for it."""
+    values = [named.get(make_law_id(one.name, key)) for key in LAW_KEYS]
+    if any(value is None for value in values):
+        return one
+    return replace(one, friction=to_law(np.array(values, dtype=float)))
+
+
+def scale_friction(element: ShiftElement, scale: float) -> ShiftElement:
+    """Return the element with its friction coefficient times `scale`."""
+    law = element.friction
+    if isinstance(law, FrictionTable):
+        friction: Stribeck | FrictionTable = FrictionTable(
+            law.slip, tuple(scale * value for value in law.mu)
+        )
+    else:
+        friction = Stribeck(scale * law.mu_c, scale * law.mu_s, law.v_s, scale * law.mu_v)
+    return replace(element, friction=friction)
