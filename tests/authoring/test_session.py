@@ -62,7 +62,8 @@ def test_plain_answers_make_a_card(tmp_path: Path) -> None:
     session.ask_all(lambda question, _: answer_valid(question))
     card = load(format_card(session.answers), tmp_path)
     assert [gear.ratio.value for gear in card.gears] == [1.86, 1.41]
-    assert card.elements["B2"].i_out == pytest.approx(1.86)
+    assert card.elements["B2"].i_out is not None
+    assert card.elements["B2"].i_out.value == pytest.approx(1.86)
     assert card.J_prime_range == (4.0, 20.0)
     assert card.J_vehicle_range[0] < 3000.0 < card.J_vehicle_range[1]
     assert not session.list_open()
@@ -162,9 +163,10 @@ def test_options_leave_nothing_open(tmp_path: Path) -> None:
     session.fill_defaults()
     card = load(format_card(session.answers), tmp_path)
     assert [gear.name for gear in card.gears] == ["2", "3"]
-    assert card.elements["C4"].gain == pytest.approx(0.03)
-    assert card.elements["C3"].gain == pytest.approx(10 * 0.9 * 0.02 * 0.150889, rel=1e-5)
-    assert card.elements["C3"].i_c == pytest.approx(0.41, rel=1e-4)
+    assert card.elements["C4"].gain.value == pytest.approx(0.03)
+    assert card.elements["C3"].gain.value == pytest.approx(10 * 0.9 * 0.02 * 0.150889, rel=1e-5)
+    assert card.elements["C3"].i_c is not None
+    assert card.elements["C3"].i_c.value == pytest.approx(0.41, rel=1e-4)
     assert card.elements["C3"].P0.std == pytest.approx(1e4)
     assert card.sensors["engine_torque"].gain == pytest.approx(0.07 / 3**0.5, rel=1e-2)
     assert card.sensors["pressure.C3"].offset == pytest.approx(0.4e5 / 3**0.5, rel=1e-2)

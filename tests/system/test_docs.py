@@ -34,7 +34,7 @@ def test_the_documented_vehicle_card_loads(tmp_path: Path) -> None:
     path.write_text(text, encoding="utf-8")
     card = load_card(path)
     assert card.elements["B2"].P0.std == pytest.approx(5e3)
-    assert card.elements["B3"].gain == pytest.approx(0.027)
+    assert card.elements["B3"].gain.value == pytest.approx(0.027)
     assert card.sensors["output_torque"].offset == pytest.approx(30.0)
     assert card.effects[EffectId.TYRE_SLIP] == EffectPrior(std=0.002)
     assert card.effects[EffectId.BACKLASH] == EffectPrior(0.0)

@@ -109,7 +109,7 @@ def test_an_mdf_log_in_several_rates_makes_a_card(folder: Path) -> None:
     assert main(command) == 0
     card = load_card(folder / "card.toml")
     assert [one.elements for one in card.gears] == [("C4",), ("C3",)]
-    assert [one.ratio for one in card.gears] == pytest.approx([1.91, 1.43], abs=2e-3)
+    assert [one.ratio.value for one in card.gears] == pytest.approx([1.91, 1.43], abs=2e-3)
     assert main(["card", "check", "card.toml", "fahrt.mf4"]) == 0
     assert main(["shifts", "fahrt.mf4", "--vehicle", "card.toml"]) == 0
 

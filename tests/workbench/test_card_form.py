@@ -82,7 +82,7 @@ def test_a_complete_form_is_written_and_opened(begun: Session) -> None:
     assert source.name == "truck.toml"
     card = load_card(source.path)
     assert card.name == "Truck 7"
-    assert card.elements["B2"].gain == pytest.approx(0.0378)
+    assert card.elements["B2"].gain.value == pytest.approx(0.0378)
     assert "guess:" in source.path.read_text()
     begun.open_card(source)
     assert len(begun.work.shifts) == 1

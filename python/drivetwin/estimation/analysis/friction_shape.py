@@ -32,7 +32,7 @@ from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.simulation.dual_clutch import FrictionTable, ShiftElement, Stribeck
 
 KNOTS = 12
@@ -103,7 +103,11 @@ def fit_friction_shape(
     Raises IdentificationError where the identification is by another method or no fit converges.
     """
     base, signals = get_likelihood_fit(found)
-    tables = {name: KnotTable(_place_knots(curve)) for name, curve in found.friction.items()}
+    tables = {
+        name: KnotTable(_place_knots(curve))
+        for name, curve in found.friction.items()
+        if curve.verdict is not Verdict.DESIGN
+    }
     problem, start = _build_problem(base, signals, tables)
     normal = problem.update_weighting(start).normal(start)
     smooth = {bend: _build_prior(problem.prior, start, tables, bend) for bend in BENDS}
