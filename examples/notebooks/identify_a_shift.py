@@ -32,7 +32,7 @@ known = drivetwin.identify(
     log,
     card,
     found,
-    fixed={"eta": 0.93},
+    fixed={"eta": 0.85},
     priors={"J_out": (0.9, 0.1)},
     bounds={"J_vehicle": (5000.0, 7000.0)},
 )

@@ -81,7 +81,7 @@ def test_another_method_predicts_its_own_log_without_a_judgement() -> None:
 
 def test_a_law_of_another_element_is_said_and_not_judged() -> None:
     found: Identification = together().found
-    (law,) = found.friction.values()
+    law = found.friction["B3"]
     log = pair()[0]
     fit, _ = get_likelihood_fit(found)
     names = tuple(name.replace("B3.", "B9.") for name in fit.point.names)

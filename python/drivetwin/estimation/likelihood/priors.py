@@ -43,7 +43,7 @@ from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE, compute
 from drivetwin.estimation.linear.momentum_balance import DELAY
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.parameters import OVER_ETA, SPECS, make_ratio_id
+from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
 from drivetwin.shifts.split_gears import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD, PARTNER_REST_STD
@@ -61,14 +61,17 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
     "ln_v_s": (float(np.log(1.0)), float(np.log(60.0))),
     AERO: (0.0, 1e4),
     "drum": (0.0, SPECS["J_out"].upper),
-    "level": (0.1, 10.0),
-    "rest": (-0.3, 0.5),
+    "level": (0.5, 2.0),
+    "rest": (-5.0 * PARTNER_REST_STD, 5.0 * PARTNER_REST_STD),
 }
 """Bounds of unknowns by name or by what follows the dot; others as in the parameter table."""
 _GEAR_INERTIA = "J_prime_"
 DESIGN_FACTOR = 10.0
 """Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
 small that, with the shaft's damping, one run takes as long as a whole fit."""
+RATIO_REACH = 10.0
+"""Distance from its nominal value within which a ratio is sought, in standard deviations of the
+card's number: the speeds show it far better, and far off the elements would have other signs."""
 FOLLOWER_PRIOR = {
     "level": PriorValue(1.0, PARTNER_LEVEL_STD),
     "rest": PriorValue(0.0, PARTNER_REST_STD),
@@ -134,8 +137,9 @@ def build_problem(
         values = (first["output_speed"], wheel, torque / guess["k_o"])
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
     start |= {n: guess.get(n, 0.0) for each in departures.values() for n in each}
-    lower, upper = _restrict_to_design(get_bounds(tuple(start)), tuple(start), priors)
-    point = ParameterVector(tuple(start), np.clip(list(start.values()), lower, upper))
+    begin = ParameterVector(tuple(start), np.array(list(start.values())))
+    lower, upper = _restrict_to_design(get_bounds(begin.names), begin, priors)
+    point = begin.replace_values(np.clip(begin.values, lower, upper))
     entries = {
         k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
     }
@@ -197,7 +201,7 @@ def get_bounds(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds (p,) of unknowns."""
     pairs = []
     for name in names:
-        stem = "ratio" if name.startswith(make_ratio_id("")) else name.split(".")[-1]
+        stem = name.split(".")[-1]
         if stem in BOUNDS:
             pairs.append(BOUNDS[stem])
         elif stem in SPECS:
@@ -209,10 +213,16 @@ def get_bounds(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
 
 
 def _restrict_to_design(
-    bounds: tuple[FloatArray, FloatArray], names: Sequence[str], priors: Mapping[str, PriorValue]
+    bounds: tuple[FloatArray, FloatArray], start: ParameterVector, priors: Mapping[str, PriorValue]
 ) -> tuple[FloatArray, FloatArray]:
-    """Restrict the bounds of Jo′ to a factor about its design value, if the card has one."""
+    """Restrict the bounds of Jo′ to a factor about its design value, if the card has one, and those
+    of ratios to a reach about their nominal values."""
     lower, upper = bounds
+    for k, name in enumerate(start.names):
+        if is_ratio(name):
+            reach = RATIO_REACH * priors[name].std
+            lower[k], upper[k] = start.values[k] - reach, start.values[k] + reach
+    names = start.names
     if "J_out" in names and "J_out" in priors:
         k, design = names.index("J_out"), priors["J_out"].value
         lower[k] = max(lower[k], design / DESIGN_FACTOR)
