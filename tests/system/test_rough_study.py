@@ -119,7 +119,7 @@ def test_card_is_read_with_the_digits_of_its_text() -> None:
     made, _ = make_vehicle(BARE, plan_vehicle(BARE))
     scenario = made.recorded.scenario
     text = tomllib.loads(write_card(BARE, scenario, tolerances=bool(made.card.sensors)))
-    ratios = [float(getattr(one.ratio, "value", one.ratio)) for one in made.card.gears]
+    ratios = [one.ratio.value for one in made.card.gears]
     assert ratios == [one["ratio"] for one in text["gears"]]
     exact = [scenario.get_ratio(one.element) for one in scenario.gears]
     assert ratios != exact
