@@ -20,7 +20,10 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
 )
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.parameters import is_ratio
+from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
+from tests.estimation.data.test_measured_ratios import rough_driveline
 from tests.estimation.likelihood.fixtures import bench, truth_of
 from tests.shifts.fixtures import make_card
 
@@ -93,3 +96,41 @@ def test_the_law_takes_the_step_in_its_values(mu: list[float], by_scale: float) 
 def test_without_a_change_of_v_s_the_step_is_straight() -> None:
     step = np.array([0.0, 1e-3, -2e-3, 1e-5, 0.0, 0.0])
     assert retract(ParameterVector(NAMES, START), step) == pytest.approx(START + step)
+
+
+@pytest.mark.parametrize("name", ["ratio_2", "ratio_3", "i_f", "B2.level", "B2.rest", "B3.mu_c"])
+def test_ratios_and_a_partners_friction_have_exact_derivatives(name: str) -> None:
+    """The law of B2 follows that of B3, so that the unknowns of B3 move both elements."""
+    made = bench()
+    posed, point = build_problem([made.signals], [rough_driveline()], "paper", truth_of(made))
+    part, k = posed.parts[0], point.names.index(name)
+    found = part.linearise(point)
+    assert found is not None
+    step = np.zeros(point.values.size)
+    step[k] = 1e-6 * max(abs(point[name]), 1.0)
+    runs = [part.simulate(point.replace_values(point.values + sign * step)) for sign in (1.0, -1.0)]
+    ahead, behind = (part.record.sample_run(run) for run in runs if run is not None)
+    slope = (ahead - behind) / (2.0 * step[k])
+    assert np.abs(found[1][:, k] - slope).max() < 1e-4 * np.abs(slope).max()
+
+
+def test_exactly_known_ratios_are_no_unknowns() -> None:
+    made = bench()
+    exact = rough_driveline(std=0.0)
+    _, point = build_problem([made.signals], [exact], "paper", truth_of(made))
+    assert not any(is_ratio(name) for name in point.names)
+
+
+def test_the_law_of_the_offgoing_element_is_a_level_of_its_partners() -> None:
+    made = bench()
+    posed, point = build_problem([made.signals], [made.driveline], "paper", truth_of(made))
+    values = point.values.copy()
+    values[point.names.index("B2.level")], values[point.names.index("B2.rest")] = 1.1, 0.01
+    moved = point.replace_values(values)
+    laws = {e.name: e.friction for e in posed.parts[0].structure.build_model(moved).elements}
+    own, partner = laws["B2"], laws["B3"]
+    assert isinstance(own, Stribeck)
+    assert isinstance(partner, Stribeck)
+    assert own.mu_c == pytest.approx(1.1 * partner.mu_c)
+    assert own.mu_s - own.mu_c == pytest.approx(1.1 * (partner.mu_s - partner.mu_c) + 0.01)
+    assert (own.v_s, own.mu_v) == pytest.approx((partner.v_s, 1.1 * partner.mu_v))
