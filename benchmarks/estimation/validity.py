@@ -84,9 +84,14 @@ def make_log(seed: int, effect: EffectId | None, factor: float) -> tuple[Mismatc
 
     Every second log is from a bus, every third card states tolerances.
     """
-    rates = Rates.BUS if seed % 2 else Rates.LOGGER
     size = 0.0 if effect is None else find_size(seed, effect, factor)
-    return make_mismatch_log(seed, effect, size, rates, tolerances=seed % 3 == 0), size
+    return make_sized_log(seed, effect, size), size
+
+
+def make_sized_log(seed: int, effect: EffectId | None, size: float) -> MismatchLog:
+    """Make the log of `make_log` with an effect of a size; 0 leaves all but the effect as it is."""
+    rates = Rates.BUS if seed % 2 else Rates.LOGGER
+    return make_mismatch_log(seed, effect, size, rates, tolerances=seed % 3 == 0)
 
 
 def find_size(seed: int, effect: EffectId, factor: float = 1.0) -> float:
@@ -136,7 +141,7 @@ def study_log(
             seed, name, 0.0, {}, {}, (), 0.0, False, error.what, possible or LEAST_POSSIBLE
         )
     truth = correct_delay(made.recorded.truth.parameters, effect, size)
-    moved = None if effect is None else measure_move(seed, found)
+    moved = None if effect is None else measure_move(seed, effect, found)
     return replace(judge(seed, name, size, found, truth), possible=possible, moved=moved)
 
 
@@ -146,7 +151,7 @@ def count_possible(made: MismatchLog) -> int:
     return len(made.recorded.truth.parameters) - known
 
 
-def measure_move(seed: int, found: Identification) -> float | None:
+def measure_move(seed: int, effect: EffectId, found: Identification) -> float | None:
     """Measure by how much the effect of a log moves the unknowns of a fit without effects.
 
     The same vehicle without the effect has the same noise, so that the difference of both fits is
@@ -159,7 +164,7 @@ def measure_move(seed: int, found: Identification) -> float | None:
         the plant or fails with the effect, None where the log without the effect has no fit.
     """
     try:
-        plain, _ = make_log(seed, None, 0.0)
+        plain = make_sized_log(seed, effect, 0.0)
         card = withhold(plain.card, *EFFECTS)
         other = identify(plain.log, card, detect_shifts(plain.log, card)).evidence.likelihood
     except DrivetwinError:

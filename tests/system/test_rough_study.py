@@ -31,7 +31,7 @@ from benchmarks.estimation.rough_count import (
     summarise,
 )
 from benchmarks.estimation.unlisted import UNLISTED, UnlistedId, add_unlisted, follow_with_play
-from benchmarks.estimation.validity import StudyLog, find_size, withhold
+from benchmarks.estimation.validity import StudyLog, find_size, make_log, make_sized_log, withhold
 from benchmarks.estimation.validity import summarise as summarise_validity
 from benchmarks.estimation.vehicles import draw_vehicle
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
@@ -173,6 +173,15 @@ def test_drum_grows_with_the_vehicle() -> None:
     doubled = [find_size(seed, EffectId.DRUM_INERTIA, 2.0) for seed in range(5)]
     assert len(set(sizes)) == 5
     assert doubled == pytest.approx([2.0 * one for one in sizes])
+
+
+@pytest.mark.parametrize("effect", [EffectId.BACKLASH, EffectId.INPUT_SHAFT_MODE])
+def test_log_without_its_effect_has_the_same_inputs_and_noise(effect: EffectId) -> None:
+    (made, _), plain = make_log(2, effect, 1.0), make_sized_log(2, effect, 0.0)
+    role = "engine_torque"
+    assert np.array_equal(made.log[role].values, plain.log[role].values)
+    role = "output_torque"
+    assert not np.array_equal(made.log[role].values, plain.log[role].values)
 
 
 def test_friction_is_judged_for_a_bare_gain_of_the_card() -> None:
