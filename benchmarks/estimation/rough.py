@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -30,9 +29,8 @@ from drivetwin.dyno.dyno import DynoRun
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
+from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.vehicle.effects import EffectId
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 OBEYING, LISTED, UNLISTED_GROUP, TWICE = "obeying", "listed", "unlisted", "twice as rough"
 """Groups of the count."""
@@ -151,10 +149,9 @@ def judge_products(found: Identification, recorded: DynoRun) -> dict[str, float]
     """Return the errors of the identified products of friction and gain over their deviations."""
     truth = {}
     for name, curve in found.friction.items():
-        middle = 0.5 * float(curve.slip[0] + curve.slip[-1])
         gain = recorded.scenario.get_element(name).gain
         truth[f"{MU_GAIN}{name}"] = gain * float(
-            recorded.truth.friction[name].evaluate(np.array([middle]))[0]
+            recorded.truth.friction[name].evaluate(np.array([curve.middle_slip]))[0]
         )
     return judge_values(found, truth)[Verdict.IDENTIFIED]
 
@@ -167,11 +164,11 @@ def judge_friction(found: Identification, made: MismatchLog) -> dict[str, float]
     """
     errors = {}
     for name, curve in found.friction.items():
-        if _get_verdict(curve) is not Verdict.IDENTIFIED:
+        if curve.verdict is not Verdict.IDENTIFIED:
             continue
         gain = made.recorded.scenario.get_element(name).gain
-        card, has_std = _read_gain(made.card, name)
-        scale = 1.0 if has_std else gain / card
+        card = made.card.elements[name].gain
+        scale = 1.0 if card.std > 0.0 else gain / card.value
         for place in MU_PLACES:
             slip = float(curve.slip[0] + place * (curve.slip[-1] - curve.slip[0]))
             mu, low, high = (
@@ -184,18 +181,6 @@ def judge_friction(found: Identification, made: MismatchLog) -> dict[str, float]
                 continue
             errors[f"{name} at {100.0 * place:.0f} %"] = Z95 * (mu - truth) / half
     return errors
-
-
-def _get_verdict(curve: FrictionCurve) -> Verdict:
-    """Return the verdict of a curve; one without a verdict counts as identified."""
-    verdict: Verdict = getattr(curve, "verdict", Verdict.IDENTIFIED)
-    return verdict
-
-
-def _read_gain(card: VehicleCard, element: str) -> tuple[float, bool]:
-    """Return the gain [m^3] of an element on the card and whether it has a standard deviation."""
-    gain: Any = card.elements[element].gain
-    return float(getattr(gain, "value", gain)), getattr(gain, "std", 0.0) > 0.0
 
 
 def read_results(path: Path) -> dict[int, RoughLog]:

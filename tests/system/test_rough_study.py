@@ -188,8 +188,8 @@ def test_friction_is_judged_for_a_bare_gain_of_the_card() -> None:
     """The log determines friction times gain, so that the true curve is that for the card's."""
     made, _ = make_vehicle(BARE, plan_vehicle(BARE))
     law = made.recorded.truth.friction["B3"]
-    gain: Any = made.card.elements["B3"].gain
-    scale = made.recorded.scenario.get_element("B3").gain / float(getattr(gain, "value", gain))
+    gain = made.card.elements["B3"].gain.value
+    scale = made.recorded.scenario.get_element("B3").gain / gain
     slip = np.linspace(5.0, 80.0, 60)
     mu = scale * law.evaluate(slip)
     none = np.empty(0)
