@@ -33,6 +33,26 @@ def _written(suffix: str) -> Callable[[Path], bytes]:
     return make
 
 
+def _long(_: Path) -> bytes:
+    """One row for each reading."""
+    rows = sorted(
+        (float(time), one.name, float(value), one.unit)
+        for one in channels()
+        for time, value in zip(one.time, one.values, strict=True)
+    )
+    lines = (f"{time:.4f};{name};{value:.6g};{unit}" for time, name, value, unit in rows)
+    return "\n".join(("SECONDS;PID;VALUE;UNITS", *lines)).encode()
+
+
+def _pairs(_: Path) -> bytes:
+    """A time column of its own beside each channel."""
+    table = channels()
+    lines = [",".join(f"Time_{one.name} [s],{one.name} [{one.unit}]" for one in table)]
+    for row in range(table[0].time.size):
+        lines.append(",".join(f"{one.time[row]:.4f},{one.values[row]:.6g}" for one in table))
+    return "\n".join(lines).encode()
+
+
 def _mdf3(folder: Path) -> bytes:
     import asammdf
 
@@ -169,6 +189,8 @@ def _asc_relative() -> bytes:
 
 SEEDS: dict[str, Callable[[Path], bytes]] = {
     "csv": _written(".csv"),
+    "csv-long": _long,
+    "csv-pairs": _pairs,
     "mf4": _written(".mf4"),
     "mdf3": _mdf3,
     "mf4-bus": _mf4_bus,

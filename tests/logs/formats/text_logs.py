@@ -7,13 +7,13 @@ from io import BytesIO
 
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.errors import DamagedChannelError
-from drivetwin.logs.formats.csv import CsvRecording
+from drivetwin.logs.formats.csv import read_table
 from drivetwin.logs.raw import RawLog
 
 
 def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
     """Read all columns of a text log that is in memory."""
-    recording = CsvRecording(BytesIO(data), file, time)
+    recording = read_table(BytesIO(data), file, time)
     channels, unreadable = [], {}
     for index, column in enumerate(recording.columns):
         try:

@@ -5,8 +5,8 @@ Delimiter `,` `;` `|`, tab or blanks; decimal point or comma; units in a row und
 names or in the names as `EngTrq [Nm]`; comment lines (# % //), the last of which may hold the
 names; lines of another form above the names and between the rows; byte order mark; quoted fields;
 time as a number, a duration or a clock, with the date beside it, in one column or, as numbers, in
-one before each signal or group of signals. Empty cells are ignored, so that each column keeps
-its own time base.
+one before each signal or group of signals, or one beside each signal. Empty cells are ignored, so
+that each column keeps its own time base. Tables of readings are read by `long_table`.
 
 The rows are read in passes of the native scanner: one for their form and the stamps, others for the
 channels that are asked for.
@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO
 
@@ -30,12 +29,14 @@ from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, TimeError, Where
 from drivetwin.logs.formats.logger_heads import unpack_clock
+from drivetwin.logs.formats.long_table import find_long_layout, read_long
 from drivetwin.logs.formats.table_columns import TableColumns, parse_table_columns
-from drivetwin.logs.formats.table_head import find_table_head, is_remark_name
+from drivetwin.logs.formats.table_head import TableHead, find_table_head, is_remark_name
 from drivetwin.logs.formats.table_scan import (
     Numbers,
     TableReader,
     list_contents,
+    list_texts,
     make_numbers,
     number_lines,
 )
@@ -60,19 +61,26 @@ class _Stamps:
 def open_csv(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a text log; see `CsvRecording`."""
     with path.open("rb") as source:
-        yield CsvRecording(source, str(path), options.time)
+        yield read_table(source, str(path), options.time)
+
+
+def read_table(source: BinaryIO, file: str, time: TimeColumn) -> Recording:
+    """Read a text log of either layout: one column, or one row, for each sample of a channel."""
+    text = open_text(source, file)
+    head = find_table_head(text.read_head(), time, file)
+    layout = find_long_layout(head, time, file)
+    return CsvRecording(text, head, time) if layout is None else read_long(text, head, layout, time)
 
 
 class CsvRecording:
-    """Columns of a text log; `file` names it in errors.
+    """Columns of a text log with a column for each channel.
 
     Raises FileFormatError (empty, binary, no header, ragged rows), MissingChannelError (no time
     column), MappingError (several), UnitError and TimeError (time without unit or stamps).
     """
 
-    def __init__(self, source: BinaryIO, file: str, time: TimeColumn) -> None:
-        text = open_text(source, file)
-        head = find_table_head(text.read_head(), time, file)
+    def __init__(self, text: TextFile, head: TableHead, time: TimeColumn) -> None:
+        file = text.file
         self._header = parse_table_columns(head, time, file)
         first = self._header.clocks[0]
         stamp = next((row.cells[first] for row in head.rows if _has_text(row.cells, first)), "")
@@ -179,7 +187,7 @@ class _TimeColumns:
         """Stamps from a column of clock times or durations; the day may stand beside them."""
         first = self._header.clocks[0]
         cells, dates = (
-            _list_texts(table, index, text) if index == 0 or dated else None for index in (0, 1)
+            list_texts(table, index, text) if index == 0 or dated else None for index in (0, 1)
         )
         assert cells is not None
         lines = number_lines(self._lines, np.arange(table.rows))
@@ -215,7 +223,8 @@ class _TimeColumns:
             float(one) for clock in counted for one in counted[clock][known[clock]][:1]
         )
         named = ", ".join(self._header.names[clock] for clock in self._header.clocks)
-        note = f"several time columns, each for the columns that follow it: {named}"
+        whose = "column of its name" if self._header.is_paired else "columns that follow it"
+        note = f"several time columns, each for the {whose}: {named}"
         stamps = {
             clock: _Stamps(subtract_origin(counted[clock], origin), known[clock])
             for clock in counted
@@ -245,13 +254,3 @@ class _TimeColumns:
 
 def _has_text(cells: Sequence[str], index: int) -> bool:
     return index < len(cells) and bool(cells[index])
-
-
-def _list_texts(table: ScannedTable, index: int, text: TextFile) -> list[str]:
-    """Cells of a column of texts."""
-    joined, ends = table.take_texts(index)
-    bounds = [0, *ends.tolist()]
-    if joined.isascii():
-        cells = joined.decode("ascii")
-        return [cells[a:b] for a, b in pairwise(bounds)]
-    return [text.decode(joined[a:b]) for a, b in pairwise(bounds)]

@@ -18,6 +18,7 @@ from drivetwin.channels.names import (
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.units import is_unit
 from drivetwin.logs.formats.logger_heads import Columns, apply_conventions
+from drivetwin.logs.formats.paired_columns import find_pairs
 from drivetwin.logs.formats.table_head import TableHead, is_physical_unit, is_remark_name
 
 _DATE_NAMES = frozenset(("date", "datum"))
@@ -34,6 +35,11 @@ class TableColumns:
     units: Sequence[str | None]
     times: Sequence[int]
     is_packed_clock: bool = False
+
+    @cached_property
+    def is_paired(self) -> bool:
+        """Each channel has a time column of its own name, see `find_pairs`."""
+        return len(self.clocks) > 1 and find_pairs(self.names, self.units) is not None
 
     @cached_property
     def clocks(self) -> list[int]:
@@ -94,7 +100,8 @@ def _assign_time_columns(
     """The index of the time column of each column: the one, or of several the one before it.
 
     Several count where each stands before columns of its own and is named as the others but for
-    digits, as `t1, EngTrq, t2, SpdIn`.
+    digits, as `t1, EngTrq, t2, SpdIn`. Otherwise each channel may have one of its own name, see
+    `find_pairs`.
     """
     found = find_time_indices(names, units, time)
     stems = {re.sub(r"[^a-z]", "", names[index].casefold()) for index in found}
@@ -105,6 +112,10 @@ def _assign_time_columns(
             max((one for one in found if one <= index), default=found[0])
             for index in range(len(names))
         ]
+    pairs = find_pairs(names, units) if time.source is None else None
+    if pairs is not None:
+        first = min(pairs.values())
+        return [pairs.get(index, first) for index in range(len(names))]
     return [find_time_index(names, units, time, file)] * len(names)
 
 

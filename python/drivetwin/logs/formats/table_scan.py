@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from drivetwin.logs.formats.cell_text import (
 from drivetwin.logs.formats.table_head import BLANKS, TableHead, split_line
 from drivetwin.logs.formats.text_file import EXPORT, TextFile, make_binary_error
 
-_NUMBER, _BLANK, _FIRST_TEXT, _OTHER_TEXT = 0, 1, 2, 255
+_NUMBER, _BLANK, FIRST_TEXT, OTHER_TEXT = 0, 1, 2, 255
 """Kinds of cells: a number, nothing, the first of the texts, a text beyond those kept."""
 
 
@@ -179,9 +180,9 @@ def make_numbers(values: FloatArray, kinds: NDArray[np.uint8], contents: Content
     """
     if not kinds.size:
         return Numbers(values, np.ones(values.size, np.bool_))
-    is_absent = np.zeros(_OTHER_TEXT + 1, np.bool_)
+    is_absent = np.zeros(OTHER_TEXT + 1, np.bool_)
     meanings = {
-        _FIRST_TEXT + index: classify_text(text) for index, text in enumerate(contents.texts)
+        FIRST_TEXT + index: classify_text(text) for index, text in enumerate(contents.texts)
     }
     is_absent[[kind for kind, meaning in meanings.items() if meaning is Meaning.ABSENT]] = True
     words = [kind for kind, meaning in meanings.items() if meaning is Meaning.NO_NUMBER]
@@ -191,7 +192,7 @@ def make_numbers(values: FloatArray, kinds: NDArray[np.uint8], contents: Content
     notes: tuple[str, ...] = ()
     if left := int(is_absent[kinds].sum()):
         signs = ", ".join(repr(text) for index, text in enumerate(contents.texts)
-                          if is_absent[_FIRST_TEXT + index])  # fmt: skip
+                          if is_absent[FIRST_TEXT + index])  # fmt: skip
         notes = (f"{left} cells hold {signs} for no sample",)
     is_absent[_BLANK] = True
     return Numbers(values, ~is_absent[kinds], notes)
@@ -202,3 +203,13 @@ def number_lines(lines: Sequence[tuple[int, int]], rows: NDArray[np.intp]) -> ND
     starts, numbers = np.array(lines, np.intp).T
     run = np.searchsorted(starts, rows, side="right") - 1
     return np.asarray(numbers[run] + rows - starts[run])
+
+
+def list_texts(table: ScannedTable, index: int, text: TextFile) -> list[str]:
+    """Return the cells of the column at `index` of those scanned as texts."""
+    joined, ends = table.take_texts(index)
+    bounds = [0, *ends.tolist()]
+    if joined.isascii():
+        cells = joined.decode("ascii")
+        return [cells[a:b] for a, b in pairwise(bounds)]
+    return [text.decode(joined[a:b]) for a, b in pairwise(bounds)]

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Tables with a time column of its own name beside each channel."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivetwin.channels.read_options import TimeColumn
+from drivetwin.errors import DrivetwinError, MissingChannelError
+from drivetwin.logs.formats.paired_columns import find_pairs
+from tests.logs.formats.text_logs import read_csv
+
+NAMES = ("EngTrq", "SpdIn", "p1")
+UNITS = ("Nm", "rpm", "bar")
+
+
+def render(clock: str, value: str, sep: str, decimal: str, swapped: bool = False) -> bytes:
+    """20 rows of three pairs; `clock` and `value` are the heads with {} for the name."""
+    lines = []
+    for step in range(-1, 20):
+        cells = []
+        for place, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
+            pair = [clock.format(name), value.format(name, unit)]
+            if step >= 0:
+                numbers = (0.01 * step + 0.001 * place, step + place + 0.25)
+                pair = [f"{number:.4f}".replace(".", decimal) for number in numbers]
+            cells += pair[::-1] if swapped else pair
+        lines.append(sep.join(cells))
+    return "\n".join(lines).encode()
+
+
+@pytest.mark.parametrize(("sep", "decimal", "swapped"), [
+    (",", ".", False), (";", ",", False), ("\t", ".", True),
+])  # fmt: skip
+@pytest.mark.parametrize(("clock", "value"), [
+    ("Time_{} [s]", "{} [{}]"), ("{}_time [s]", "{} [{}]"), ("Time {} (s)", "{} ({})"),
+    ("{} [s]", "{} [{}]"), ("{} Time [s]", "{} ValueY [{}]"), ("Zeit_{} [s]", "{} [{}]"),
+    ("{} Zeit [s]", "{} Wert [{}]"), ("t_{} [s]", "{} [{}]"), ("{}_t [s]", "{} [{}]"),
+    ("{}.t [s]", "{} [{}]"), ("Time{} [s]", "{} [{}]"), ("{}_timestamps [s]", "{} [{}]"),
+    ("t({}) [s]", "{} [{}]"), ("TIME_{} [s]", "{} [{}]"), ("Zeitstempel {} [s]", "{} [{}]"),
+])  # fmt: skip
+def test_each_channel_has_its_own_stamps(
+    clock: str, value: str, sep: str, decimal: str, swapped: bool
+) -> None:
+    log = read_csv(render(clock, value, sep, decimal, swapped), "x", TimeColumn())
+    assert [one.unit for one in log.channels] == list(UNITS)
+    for place, one in enumerate(log.channels):
+        assert one.name.startswith(NAMES[place])
+        assert one.time == pytest.approx(np.arange(20) * 0.01 + 0.001 * place, abs=1e-9)
+        assert one.values.tolist() == [step + place + 0.25 for step in range(20)]
+    assert any("each for the column of its name" in text for text in log.warnings)
+
+
+def test_a_channel_without_a_partner_makes_no_table_of_pairs() -> None:
+    data = render("Time_{} [s]", "{} [{}]", ",", ".").replace(b"Time_p1", b"pedal")
+    with pytest.raises(MissingChannelError, match="no time column"):
+        read_csv(data, "x", TimeColumn())
+
+
+def test_one_time_column_counts_for_all_channels() -> None:
+    """A channel whose name has the word time in it is a channel as before."""
+    assert find_pairs(["time", "shift", "shift_time"], ["s", "-", "ms"]) is None
+
+
+@given(
+    names=st.lists(st.text("abcXYZ0123456789", min_size=2, max_size=6), min_size=2, max_size=6,
+                   unique_by=str.casefold),
+    data=st.data(),
+)  # fmt: skip
+def test_any_order_of_the_columns_gives_the_same_pairs(
+    names: list[str], data: st.DataObject
+) -> None:
+    columns = [*(f"Time_{name}" for name in names), *names]
+    order = data.draw(st.permutations(columns))
+    found = find_pairs(order, [None] * len(order))
+    assert found is not None
+    for name in names:
+        assert found[order.index(name)] == order.index(f"Time_{name}")
+
+
+@given(st.integers(0, 900), st.binary(max_size=4))
+def test_damaged_pairs_give_a_typed_error_at_worst(place: int, other: bytes) -> None:
+    table = render("Time_{} [s]", "{} [{}]", ",", ".")
+    with contextlib.suppress(DrivetwinError):
+        read_csv(table[:place] + other + table[place + 3 :], "x", TimeColumn())
