@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.roles import NEEDED
 from drivetwin.channels.shiftlog import FloatArray, Quantity, ShiftLog
 from drivetwin.errors import (
@@ -22,7 +23,9 @@ from drivetwin.errors import (
     UnitError,
 )
 from drivetwin.findings import render
+from drivetwin.logs.mapping_draft import draft_mapping
 from drivetwin.logs.read import read_log, read_raw
+from drivetwin.logs.survey import survey_recording
 from drivetwin.vehicle.card import load_card
 from tests.logs.fixtures import UNITS, card, columns, write
 
@@ -164,12 +167,30 @@ def test_bad_logs(
     assert caught.value.exit_code == 2
 
 
-@pytest.mark.parametrize(("unit", "words"), [("", "names no unit"), ("Mn", "unknown unit 'Mn'")])
-def test_bad_units(tmp_path: Path, unit: str, words: str) -> None:
+@pytest.mark.parametrize(("unit", "words", "line"), [
+    ("", "names no unit", 'channels.output_torque = { source = "TrqOut", unit = "Nm" }'),
+    ("Mn", "unknown unit 'Mn'", 'unit = "..."'),
+])  # fmt: skip
+def test_bad_units(tmp_path: Path, unit: str, words: str, line: str) -> None:
     with pytest.raises(UnitError, match=words) as caught:
         read(tmp_path, units={**UNITS, "TrqOut": unit})
     assert caught.value.where.channel == "TrqOut"
-    assert 'unit = "..."' in caught.value.remedy
+    assert line in caught.value.remedy
+
+
+def test_the_refusal_proposes_the_units_of_the_written_mapping(tmp_path: Path) -> None:
+    """Speeds of 1300 to 1600 are rpm, not the first spelling of a speed."""
+    with pytest.raises(UnitError) as caught:
+        read(tmp_path, units={**dict.fromkeys(UNITS, ""), "time": "s"})
+    path = tmp_path / "log.csv"
+    survey = survey_recording(read_raw(path), str(path), card(tmp_path), Mapped({}))
+    gaps = draft_mapping(survey).units
+    assert {gaps["input_speed"].proposals[0].unit, gaps["wheel_speed"].proposals[0].unit} == {"rpm"}
+    for role, gap in gaps.items():
+        units = " or ".join(f'"{one.unit}"' for one in gap.proposals)
+        spec = survey.mapping[role]
+        line = f'channels.{role} = {{ source = "{spec.source}", unit = {units} }}'
+        assert line in caught.value.remedy
 
 
 @pytest.mark.parametrize(
@@ -279,7 +300,7 @@ def test_all_channels_without_a_unit_are_named_at_once(tmp_path: Path) -> None:
     units = {**UNITS, "EngTrq": "", "SpdIn": ""}
     with pytest.raises(UnitError, match="no unit for 'EngTrq', 'SpdIn'") as caught:
         read(tmp_path, units=units)
-    assert 'channels.input_speed = { source = "SpdIn", unit = "rad/s" }' in caught.value.remedy
+    assert 'channels.input_speed = { source = "SpdIn", unit = "rpm" }' in caught.value.remedy
 
 
 def test_seconds_that_are_told_in_ms_are_refused(tmp_path: Path) -> None:

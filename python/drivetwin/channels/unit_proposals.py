@@ -92,6 +92,22 @@ def propose_units(role: str, span: Range | None) -> tuple[Proposal, ...]:
     )
 
 
+def propose_missing_units(
+    spans: Mapping[str, Range | None],
+) -> dict[str, tuple[Proposal, ...]]:
+    """Return the proposals for all channels of a log whose unit is open, by role.
+
+    The one source of proposals: of the error that refuses the log, and of the mapping that is
+    written.
+
+    Parameters
+    ----------
+    spans : mapping of str to tuple of float or None
+        Least and largest number in the file by role; None where the channel has no number.
+    """
+    return prefer_common_units({role: propose_units(role, span) for role, span in spans.items()})
+
+
 def prefer_common_units(
     proposals: Mapping[str, tuple[Proposal, ...]],
 ) -> dict[str, tuple[Proposal, ...]]:

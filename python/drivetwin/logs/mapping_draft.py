@@ -13,7 +13,7 @@ from drivetwin.channels.recognition import find_hints
 from drivetwin.channels.roles import NEEDED, ROLES, get_quantity
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.unit_proposals import (
-    prefer_common_units,
+    propose_missing_units,
     propose_time_units,
     propose_units,
 )
@@ -90,7 +90,8 @@ def _describe_role(role: str) -> str:
 
 def _list_unit_gaps(survey: Survey) -> dict[str, UnitGap]:
     """Return the roles of the mapping whose unit the log does not name, or names unclearly."""
-    gaps: dict[str, UnitGap] = {}
+    reasons: dict[str, str] = {}
+    spans: dict[str, tuple[float, float] | None] = {}
     for role, spec in survey.mapping.items():
         column = _find_column(survey, spec)
         if column is None or spec.unit is not None:
@@ -98,9 +99,9 @@ def _list_unit_gaps(survey: Survey) -> dict[str, UnitGap]:
         try:
             resolve_channel_unit(column.unit, get_quantity(role), Where())
         except UnitError as fault:
-            gaps[role] = UnitGap(fault.what, propose_units(role, column.range))
-    proposals = prefer_common_units({role: gap.proposals for role, gap in gaps.items()})
-    return {role: UnitGap(gap.why, proposals[role]) for role, gap in gaps.items()}
+            reasons[role], spans[role] = fault.what, column.range
+    proposals = propose_missing_units(spans)
+    return {role: UnitGap(why, proposals[role]) for role, why in reasons.items()}
 
 
 def _find_column(survey: Survey, spec: ChannelSpec) -> Column | None:

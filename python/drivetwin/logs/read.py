@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +19,7 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.recall import recall_options
 from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
+from drivetwin.channels.unit_proposals import Proposal, propose_missing_units
 from drivetwin.channels.units import Unit, find_unit, list_first_spellings, resolve_channel_unit
 from drivetwin.errors import (
     DamagedChannelError,
@@ -259,32 +260,52 @@ def _refuse_unitless(
     strict: Set[str],
     file: str,
 ) -> None:
-    """Name all channels of `strict` roles without a unit at once.
+    """Name all channels of `strict` roles without a unit at once, with the units of their values.
 
     Columns without numbers are reported elsewhere.
     """
-    without = {
-        role: spec.source
+    places = {role: _load_column(recording, spec) for role, spec in channels.items()}
+    unitless = [
+        role
         for role, spec in channels.items()
         if spec.unit is None
-        and not (column := recording.columns[_load_column(recording, spec)]).empty
+        and not (column := recording.columns[places[role]]).empty
         and not (column.unit or "").strip()
         and get_quantity(role) is not Quantity.STATE
-        and role in strict
-    }
-    if len(without) < 2:
+    ]
+    refused = {role: channels[role].source for role in unitless if role in strict}
+    if not refused:
         return
-    units = {role: list_first_spellings(get_quantity(role))[0] for role in without}
-    examples = "; ".join(
-        f'channels.{role} = {{ source = "{name}", unit = "{units[role]}" }}'
-        for role, name in without.items()
+    proposals = propose_missing_units(
+        {role: _find_span(recording, places[role]) for role in unitless}
     )
+    examples = "; ".join(
+        f'channels.{role} = {{ source = "{name}", unit = {_quote_units(role, proposals[role])} }}'
+        for role, name in refused.items()
+    )
+    names = list(refused.values())
     raise UnitError(
-        f"the file names no unit for {', '.join(map(repr, without.values()))}",
+        f"the file names no unit for {', '.join(map(repr, names))}",
         "assert the units in a channel mapping (--channels; `drivetwin inspect --write-mapping` "
         f"begins one), if they are these: {examples}",
-        Where(file=file),
+        Where(file=file, channel=names[0] if len(names) == 1 else None),
     )
+
+
+def _find_span(recording: Recording, index: int) -> tuple[float, float] | None:
+    """Return least and largest number of a column; None where it cannot be read."""
+    try:
+        return recording.load(index).range
+    except DamagedChannelError:
+        return None
+
+
+def _quote_units(role: str, proposals: Sequence[Proposal]) -> str:
+    """Return the units that fit the values, of several the most frequent first; else all."""
+    units = [one.unit for one in proposals]
+    if units:
+        return " or ".join(f'"{unit}"' for unit in units)
+    return f'"..." (one of {", ".join(list_first_spellings(get_quantity(role)))})'
 
 
 def read_raw(path: Path, options: ReadOptions | None = None) -> RawLog:
