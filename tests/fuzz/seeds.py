@@ -142,6 +142,15 @@ def candump(spaced: bool) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
+def gvret() -> bytes:
+    """The frames as SavvyCAN writes them."""
+    lines = ["Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8"]
+    for time, identifier, data in frames():
+        cells = "".join(f"{byte:02X}," for byte in data)
+        lines.append(f"{round(1e6 * time)},{identifier:08X},true,Rx,0,{len(data)},{cells}")
+    return ("\n".join(lines) + "\n").encode()
+
+
 def _mf4_bus(folder: Path) -> bytes:
     """The frames in an MDF 4 file, as loggers record them raw."""
     import asammdf
@@ -201,6 +210,7 @@ SEEDS: dict[str, Callable[[Path], bytes]] = {
     "parquet": _written(".parquet"),
     "candump": lambda _: candump(spaced=True),
     "candump-L": lambda _: candump(spaced=False),
+    "gvret": lambda _: gvret(),
     "asc": _vector(".asc"),
     "asc-relative": lambda _: _asc_relative(),
     "trc": _vector(".trc"),

@@ -10,6 +10,7 @@ from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.can.open import is_bus_text, open_blf, open_bus_text
+from drivetwin.logs.formats.can.other_tools import refuse_bus_tool
 from drivetwin.logs.formats.csv import open_csv
 from drivetwin.logs.formats.guarded import open_guarded
 from drivetwin.logs.formats.mat import open_mat
@@ -89,4 +90,7 @@ def _select_opener(head: bytes, path: Path) -> Opener:
             )
     if is_version4(head):
         return open_mat
-    return open_bus_text if is_bus_text(head) else open_csv
+    if is_bus_text(head):
+        return open_bus_text
+    refuse_bus_tool(head, path)
+    return open_csv

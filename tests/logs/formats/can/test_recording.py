@@ -29,7 +29,9 @@ def by_name(path: Path, options: ReadOptions | None = None) -> dict[str, RawChan
     return {channel.name: channel for channel in read_raw(path, options).channels}
 
 
-@pytest.mark.parametrize("form", ["candump", "candump-L", "asc", "asc-relative", "trc", "blf"])
+@pytest.mark.parametrize(
+    "form", ["candump", "candump-L", "gvret", "asc", "asc-relative", "trc", "blf"]
+)
 def test_every_form_gives_the_same_signals(tmp_path: Path, form: str) -> None:
     path = tmp_path / "bus.log"
     path.write_bytes(SEEDS[form](tmp_path))

@@ -14,6 +14,7 @@ from drivetwin.logs.formats.can.blf import read_blf
 from drivetwin.logs.formats.can.candump import is_candump, read_candump
 from drivetwin.logs.formats.can.database import read_database
 from drivetwin.logs.formats.can.driveline import load_driveline_messages
+from drivetwin.logs.formats.can.gvret import is_gvret, read_gvret
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.trc import is_trc, read_trc
 from drivetwin.logs.formats.frames import Frames, Message
@@ -25,6 +26,7 @@ _HEAD = 8192
 
 _TEXT_FORMATS: tuple[tuple[Callable[[bytes], bool], Callable[[bytes, str], Frames]], ...] = (
     (is_trc, read_trc),
+    (is_gvret, read_gvret),
     (is_candump, read_candump),
     (is_asc, read_asc),
 )
