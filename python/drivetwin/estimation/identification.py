@@ -19,6 +19,7 @@ from drivetwin.estimation.result.estimate import (
     SignalFit,
     Verdict,
 )
+from drivetwin.estimation.result.friction_verdict import adopt_verdicts
 from drivetwin.estimation.result.joint import JointCovariance
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.status import ModelStatus
@@ -60,6 +61,14 @@ class Identification(DisplayMixin):
     """Channel mapping by which the log was read, of several the first."""
     actuators: Mapping[str, IdentifiedActuator] = field(default_factory=dict)
     """Hydraulics by element, of those whose command is in the log."""
+
+    def __post_init__(self) -> None:
+        """Keep the verdict of each friction curve that of its μ times gain."""
+        object.__setattr__(self, "friction", adopt_verdicts(self.friction, self.estimates))
+
+    def has_own_friction(self, element: str) -> bool:
+        """Return True if the log determines the friction of an element."""
+        return element in self.friction and not self.friction[element].is_borrowed
 
     def __repr__(self) -> str:
         known = sum(one.verdict is Verdict.IDENTIFIED for one in self.estimates.values())

@@ -26,12 +26,14 @@ from drivetwin.estimation.paper.pipeline import (
 )
 from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
+from drivetwin.estimation.result.friction_verdict import complete_friction
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.estimation.result.verdict import apply_errors
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.shifts.coverage import AFTER, BEFORE
+from drivetwin.vehicle.spec import PriorValue
 
 BEHIND_CONVERTER = (
     "the converter is open in the shifts: what drives the gearbox is its turbine, by the map on "
@@ -127,7 +129,7 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
     if method is Method.PAPER:
         paper = _identify_paper_shifts(log)
         return (
-            assess_paper_shifts(paper, log.signals, log.drivelines),
+            _complete(assess_paper_shifts(paper, log.signals, log.drivelines), log),
             method,
             StageResults(paper=paper),
         )
@@ -154,6 +156,7 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
     if method is Method.INTEGRAL:
         with scale_progress(0.9 if likely else 0.5, 0.95, "tolerances of the sensors"):
             found = add_tolerances(integral, log.signals, log.drivelines, log.design)
+    found = _complete(found, log)
     if gave_up:
         failed = report(Code.LIKELIHOOD_FAILED, why=gave_up)
         estimates = apply_errors(found.estimates, [failed])
@@ -164,6 +167,13 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
         failed = report(Code.PAPER_METHOD_FAILED, why=error.what)
         found = replace(found, findings=(*found.findings, failed))
     return found, method, evidence
+
+
+def _complete(found: EstimateSet, log: PreparedLog) -> EstimateSet:
+    """Return the estimates with μ times gain of every friction curve."""
+    couplings = log.drivelines[0].couplings
+    gains = {name: PriorValue(one.gain, one.gain_std) for name, one in couplings.items()}
+    return complete_friction(found, gains)
 
 
 def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) -> _Stage:

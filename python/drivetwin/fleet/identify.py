@@ -16,7 +16,7 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, InputError, MissingChannelError, StoreError, Where
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
-from drivetwin.estimation.result.verdict import assess
+from drivetwin.estimation.result.verdict import assess, reject_identified
 from drivetwin.fleet.mixed_model.remove_priors import remove_friction_prior
 from drivetwin.fleet.parts import convert_write_errors
 from drivetwin.fleet.rows import MU, Found, Row, RowKind
@@ -154,6 +154,7 @@ def make_result_rows(found: Identification, card: VehicleCard, mu_slip: float) -
         *(
             row
             for name, curve in found.friction.items()
+            if not curve.is_borrowed
             for row in _make_friction_rows(name, curve)
         ),
         *_make_fit_rows(found),
@@ -169,7 +170,8 @@ def make_result_rows(found: Identification, card: VehicleCard, mu_slip: float) -
 def _make_parameter_rows(found: Identification, card: VehicleCard, slip: float) -> list[Row]:
     """All estimates, with μ at one slip of every element whose curve reaches it."""
     rows = {one.id: _make_estimate_row(one) for one in found.estimates.values()}
-    for element, curve in found.friction.items():
+    own = {name: curve for name, curve in found.friction.items() if not curve.is_borrowed}
+    for element, curve in own.items():
         mu, fill = MU + element, f"P0.{element}"
         free = remove_friction_prior(found, card, element, slip)
         if curve.slip[0] <= slip <= curve.slip[-1]:
@@ -207,6 +209,8 @@ def _make_mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
         )  # fmt: skip
     std = (high - low) / (2.0 * Z95)
     one = assess(name, mu, std, curve.method_text)
+    if curve.verdict is not Verdict.IDENTIFIED:
+        one = reject_identified(one, curve.reason)
     return replace(_make_estimate_row(one), std_noise=None, at=slip)
 
 

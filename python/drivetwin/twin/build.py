@@ -12,7 +12,7 @@ from drivetwin._util.version import get_program_version
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.channel_spec import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw, Verdict
+from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.joint import JointCovariance
 from drivetwin.estimation.result.verdict import from_prior
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
@@ -151,7 +151,7 @@ def list_borrowed_friction(found: Identification) -> list[str]:
 
 def _is_borrowed(curve: FrictionCurve | None) -> bool:
     """Return True for an element whose friction the log does not determine."""
-    return curve is None or curve.verdict is Verdict.DESIGN
+    return curve is None or curve.is_borrowed
 
 
 def _build_covariance(found: Identification) -> tuple[tuple[str, ...], FloatArray | None]:

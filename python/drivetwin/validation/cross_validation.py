@@ -147,9 +147,10 @@ def _ensure_friction_law(
 
     That of the off-going element if it has one, else that of any other: facings are alike.
     """
-    if shift.oncoming in found.friction or not found.friction:
+    own = [name for name in found.friction if found.has_own_friction(name)]
+    if shift.oncoming in own or not own:
         return found, ()
-    other = shift.offgoing if shift.offgoing in found.friction else next(iter(found.friction))
+    other = shift.offgoing if shift.offgoing in own else own[0]
     friction = {**found.friction, shift.oncoming: found.friction[other]}
     finding = report(Code.FRICTION_LAW_SUBSTITUTED, element=shift.oncoming, other=other)
     return replace(found, friction=friction), (finding,)

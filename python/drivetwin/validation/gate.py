@@ -123,7 +123,7 @@ def _check_friction(found: Identification) -> Iterator[Finding]:
     low, high = GATE.friction
     for name, curve in found.friction.items():
         middle = float(np.median(curve.mu))
-        if not curve.over_eta and not low <= middle <= high:
+        if not curve.over_eta and not curve.is_borrowed and not low <= middle <= high:
             yield report(Code.FRICTION_IMPLAUSIBLE, element=name, mu=middle, low=low, high=high)
 
 

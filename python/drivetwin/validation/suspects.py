@@ -60,7 +60,7 @@ def find_undetermined_gains(found: Identification, failures: Iterable[Finding]) 
             (shift.offgoing, shift.oncoming),
             (shift.oncoming, shift.offgoing),
         )
-        if element not in found.friction and other in found.friction
+        if not found.has_own_friction(element) and found.has_own_friction(other)
     }
     return [
         report(Code.GAIN_NOT_DETERMINED, element=element, other=other)
@@ -71,7 +71,12 @@ def find_undetermined_gains(found: Identification, failures: Iterable[Finding]) 
 def _rank_gains(found: Identification, friction: tuple[float, float]) -> Iterator[Suspect]:
     for name, curve in found.friction.items():
         middle = float(np.median(curve.mu))
-        if not curve.over_eta and not friction[0] <= middle <= friction[1] and middle > 0.0:
+        if (
+            not curve.is_borrowed
+            and not curve.over_eta
+            and not friction[0] <= middle <= friction[1]
+            and middle > 0.0
+        ):
             factor = middle / TYPICAL_FRICTION
             size = abs(float(np.log(factor))) / SPREAD_OF_FRICTION
             yield size, f"gain of {name} (μ would be {middle:.3g}; {factor:.2g} times the gain)"

@@ -32,7 +32,7 @@ from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import FrictionTable, ShiftElement, Stribeck
 
 KNOTS = 12
@@ -106,7 +106,7 @@ def fit_friction_shape(
     tables = {
         name: KnotTable(_place_knots(curve))
         for name, curve in found.friction.items()
-        if curve.verdict is not Verdict.DESIGN
+        if not curve.is_borrowed
     }
     problem, start = _build_problem(base, signals, tables)
     normal = problem.update_weighting(start).normal(start)

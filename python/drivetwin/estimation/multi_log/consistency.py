@@ -38,7 +38,7 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
 )
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.estimation.result.estimate import FrictionCurve, Verdict
+from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.multi_log import Consistency, LogPull
 from drivetwin.estimation.result.verdict import compute_covariance_root
 
@@ -151,7 +151,7 @@ def _compute_rows(
         if np.any(row) and not np.any(row[own])
     }
     for element, curve in friction.items():
-        if curve.verdict is Verdict.DESIGN:
+        if curve.is_borrowed:
             continue
         index = [fit.point.names.index(f"{element}.{key}") for key in LAW]
         middle = np.array([np.mean(curve.slip[[0, -1]])])

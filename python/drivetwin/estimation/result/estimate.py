@@ -106,6 +106,11 @@ class FrictionCurve:
     reason: str = ""
 
     @property
+    def is_borrowed(self) -> bool:
+        """True for the law of a partner: the log does not determine that of the element."""
+        return self.verdict is Verdict.DESIGN
+
+    @property
     def middle_slip(self) -> float:
         """Slip [rad/s] in the middle of the curve, at which `mu_gain` holds."""
         return 0.5 * float(self.slip[0] + self.slip[-1])

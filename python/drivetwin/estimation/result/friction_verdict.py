@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
-from drivetwin.estimation.result.verdict import assess
+from drivetwin.estimation.result.estimate_set import EstimateSet
+from drivetwin.estimation.result.verdict import assess, join_reasons
 from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.parameters import OVER_ETA
+from drivetwin.vehicle.spec import PriorValue
 
 USUAL_FRICTION = (0.09, 0.15)
 """Usual μ of a paper lining in oil at a middle slip [-]; engineering estimate."""
@@ -41,6 +43,29 @@ def assess_friction(
         note = explain(Code.MU_GAIN_SLIP, slip=curve.middle_slip)
         found[name] = assess(name, value, noise, one.method, systematic, note)
     return found
+
+
+def complete_friction(found: EstimateSet, gains: Mapping[str, PriorValue]) -> EstimateSet:
+    """Return a set with μ times gain of every curve that has none yet, as an estimate.
+
+    `gains` are those of the vehicle card [m^3] by element. A curve without a band has no interval,
+    so that its value is not identified.
+    """
+    estimates, curves = dict(found.estimates), dict(found.friction)
+    for element, plain in found.friction.items():
+        name = make_gain_id(element, over_eta=plain.over_eta)
+        if plain.gain is not None or name in estimates or element not in gains:
+            continue
+        curve = plain.add_gain_spread(gains[element])
+        value, std = compute_mu_gain(curve)
+        note = explain(Code.MU_GAIN_SLIP, slip=curve.middle_slip)
+        if np.isfinite(std):
+            estimates[name] = assess(name, value, std, curve.method, None, note)
+        else:
+            reason = join_reasons(explain(Code.PAPER_NO_INTERVAL), note)
+            estimates[name] = Estimate(name, value, None, Verdict.WEAK, curve.method, reason=reason)
+        curves[element] = curve
+    return replace(found, estimates=estimates, friction=curves)
 
 
 def compute_mu_gain(curve: FrictionCurve) -> tuple[float, float]:
@@ -91,7 +116,7 @@ def report_gains(
         one = estimates.get(make_gain_id(element))
         if curve.gain is None or one is None or one.value is None or one.ci95_total is None:
             continue
-        if curve.verdict is Verdict.DESIGN:
+        if curve.is_borrowed:
             continue
         mu, half = one.value / curve.gain.value, Z95 * (one.std_total or 0.0) / curve.gain.value
         if mu - half > USUAL_FRICTION[1] or mu + half < USUAL_FRICTION[0]:

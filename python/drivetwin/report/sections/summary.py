@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin._util.display_units import format_significant
+from drivetwin._util.display_units import format_significant, format_with_unit
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
@@ -132,20 +132,31 @@ def _build_phase_table(name: str, shift: Shift) -> TableBlock:
 
 
 def build_friction_section(found: Identification) -> Section:
-    """μ over slip of every element that slipped under load."""
+    """μ over slip of every element, for the gain on the card, with its verdict."""
     blocks: list[Block] = []
     for element, curve in found.friction.items():
-        caption = f"Friction of {element}, method: {curve.method_text}. "
+        caption = f"Friction of {element}, {_describe_verdict(curve)}. "
         blocks.append(FigureBlock(plot_friction(element, curve), caption + _format_law(curve)))
     over_eta = any(curve.over_eta for curve in found.friction.values())
     return Section(
         "friction",
         "Friction over slip",
         f"{OF_SPEEDS if over_eta else OF_TORQUE} A log determines only the "
-        "product of μ and N·D·A·r: an error of the geometry scales the whole curve. Points that "
+        "product of μ and the gain N·D·A·r, the parameter μ·gain: μ is for the gain on the vehicle "
+        "card, and a wrong gain scales the whole curve. Points that "
         "scatter at one slip belong to the torque phase, in which the element transmits little.",
         blocks,
     )
+
+
+def _describe_verdict(curve: FrictionCurve) -> str:
+    """Describe method, gain and verdict of a curve."""
+    if curve.is_borrowed:
+        return f"{curve.verdict.value}: {curve.reason}"
+    gain = ""
+    if curve.gain is not None:
+        gain = f" for a gain of {format_with_unit(curve.gain.value, 'm^3', curve.gain.std)}"
+    return f"{curve.verdict.value}{gain}, method: {curve.method_text}"
 
 
 def _format_law(curve: FrictionCurve) -> str:
