@@ -192,7 +192,7 @@ $(venv)/.base: pyproject.toml | prerequisites
 
 # The tools of a developer.
 $(venv)/.dev: $(venv)/.base
-	$(pip) install --quiet --group dev
+	$(pip) install --quiet --group development
 	touch $@
 
 # The package, editable, with its run-time dependencies and its native module; new when a Rust

@@ -17,3 +17,8 @@ def test_the_group_of_the_extras_has_what_they_bring() -> None:
 
 def test_all_is_every_extra() -> None:
     assert EXTRAS["all"] == [f"drivetwin[{','.join(extra for extra in EXTRAS if extra != 'all')}]"]
+
+
+def test_no_group_is_called_dev() -> None:
+    """`maturin develop` installs a group of that name, so that a demo would take all tools."""
+    assert "dev" not in PROJECT["dependency-groups"]
