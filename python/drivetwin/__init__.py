@@ -8,6 +8,7 @@ it is first asked for, so that `import drivetwin` costs nothing.
     log = drivetwin.read_log(path, card)                          channels, SI
     log = drivetwin.read_arrays(data, card, units)                the same from memory
     shifts = drivetwin.detect_shifts(log, card)                   shifts and their phases
+    model = drivetwin.identify_validated(log, card)               both of the below, validated
     result = drivetwin.identify(log, card, shifts)                estimates with verdicts
     twin = drivetwin.build_twin(result, card)                     identified model
     run = drivetwin.simulate_shift(twin, log, shifts.shifts[0])   simulation with measured inputs
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from drivetwin.twin.build import build_twin
     from drivetwin.twin.twin import Twin
     from drivetwin.validation.simulate_log import attach_validation, simulate_shift
+    from drivetwin.validation.validated_model import identify_validated
     from drivetwin.vehicle.card import load_card
 
 register_presenter(lambda: import_module("drivetwin.report.notebook"))
@@ -57,6 +59,7 @@ _HOME = {
     "rank_experiments": ("estimation.analysis.experiment_design", "rank_experiments"),
     "detect_shifts": ("shifts.detect", "detect_shifts"),
     "identify": ("pipeline", "identify"),
+    "identify_validated": ("validation.validated_model", "identify_validated"),
     "load_card": ("vehicle.card", "load_card"),
     "load_twin": ("files.twin_conversion", "load_twin"),
     "read_arrays": ("logs.arrays", "read_arrays"),
@@ -80,6 +83,7 @@ __all__ = [
     "build_twin",
     "detect_shifts",
     "identify",
+    "identify_validated",
     "load_card",
     "load_twin",
     "rank_experiments",

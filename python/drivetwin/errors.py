@@ -5,6 +5,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+PYTHON_WORDS = {
+    "--drop-part": "Twin.drop_part()",
+    "in a channel mapping file (--channels)": "in a channel mapping file (argument `mapping`)",
+    "in a channel mapping (--channels)": "in a channel mapping (argument `mapping`)",
+    "with --shift, such as --shift 2-3": "by its gears",
+    "`drivetwin identify`": "`drivetwin.identify`",
+    "--vehicle": "the argument `card`",
+}
+"""Words of the Python interface in place of options and commands of the shell."""
 INTERRUPTED = 130
 """Exit code of a program that Ctrl-C stopped."""
 
@@ -37,8 +46,9 @@ def _quote_unprintable(text: str | None) -> str | None:
 class DrivetwinError(Exception):
     """Base of all errors raised on purpose.
 
-    `what` states the fault with its numbers, `where` its place, `remedy` what to do. Two errors are
-    never equal, and one made in another process comes back from it as it was.
+    `what` states the fault with its numbers, `where` its place, `remedy` what to do, in the words
+    of the shell. The text of an error has the words of Python; `format_for_shell` has those of the
+    shell. Two errors are never equal, and one made in another process comes back from it as it was.
     """
 
     what: str
@@ -51,6 +61,13 @@ class DrivetwinError(Exception):
         super().__init__(self.what, self.remedy, self.where)  # what copy and pickle make it of
 
     def __str__(self) -> str:
+        text = self.format_for_shell()
+        for option, words in PYTHON_WORDS.items():
+            text = text.replace(option, words)
+        return text
+
+    def format_for_shell(self) -> str:
+        """Return the text of the error with the options and commands of the shell."""
         place = str(self.where)
         head = f"{place}: {self.what}" if place else self.what
         return f"{head}\n  -> {self.remedy}" if self.remedy else head

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
@@ -28,6 +29,7 @@ from drivetwin.vehicle.locks import apply_locks, collect_locks
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
+@check_arguments
 def identify(
     log: ShiftLog,
     card: VehicleCard,
@@ -100,6 +102,7 @@ def _report_excess(
             yield report(Code.OUTSIDE_BOUNDS, name, value=Number(one.value, one.unit), **ends)
 
 
+@check_arguments
 def identify_jointly(
     logs: Sequence[ShiftLog], card: VehicleCard, shifts: Sequence[FoundShifts]
 ) -> Identification:

@@ -116,7 +116,7 @@ def test_missing_roles_are_all_named_with_columns_and_remedy() -> None:
     names = [name for name in ENGLISH if name not in ("TrqOut", "SpdIn")]
     with pytest.raises(MissingChannelError) as caught:
         resolve_roles(columns(names), {}, ELEMENTS, NEEDED, "log.csv")
-    assert str(caught.value) == (
+    assert caught.value.format_for_shell() == (
         "log.csv: no column for 'output_torque' nor 'input_speed' among EngTrq, PrsBrk2, PrsBrk3, "
         "SpdOut, SpdWhl\n"
         "  -> name its column in a channel mapping (--channels): channels.output_torque = "

@@ -323,4 +323,5 @@ def test_the_part_of_the_plant_is_kept(
     if part is not None:
         with pytest.raises(InputError, match=r"hold|also has") as error:
             found.require_dual_clutch("the export")
-        assert "--drop-part" in str(error.value)
+        assert "Twin.drop_part()" in str(error.value)
+        assert "--drop-part" in error.value.format_for_shell()

@@ -60,11 +60,9 @@ def run_identification(log: Path, how: Request) -> Outcome:
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
     from drivetwin.estimation.result.method import Method
-    from drivetwin.pipeline import identify
     from drivetwin.plausibility.check import check_card
     from drivetwin.shifts.detect import detect_shifts, refuse_without_shifts
-    from drivetwin.twin.build import build_twin
-    from drivetwin.validation.simulate_log import attach_validation
+    from drivetwin.validation.validated_model import identify_validated
 
     with show_step(f"reading {log.name}"):
         recording, card = how.load(log)
@@ -73,17 +71,14 @@ def run_identification(log: Path, how: Request) -> Outcome:
     show_findings(doubts)
     refuse_without_shifts(recording, shifts)
     with show_step(f"identifying by the {how.method} method"):
-        found = identify(recording, card, shifts, how.method)
-        twin = build_twin(found, card)
-    with show_step("simulating the shifts"):
-        found = attach_validation(found, twin, recording)
-        twin = build_twin(found, card)  # with the verdicts of the gate
+        model = identify_validated(recording, card, shifts, how.method)
+    found = model.result
     if found.method is Method.LIKELIHOOD:
         from drivetwin.estimation.analysis.experiment_design import rank_experiments
 
         with show_step("comparing experiments"):
             found = rank_experiments(found)
-    return Outcome(recording, card, found, twin)
+    return Outcome(recording, card, found, model.twin)
 
 
 def write_outcome(outcome: Outcome, folder: Path) -> tuple[Path, ...]:

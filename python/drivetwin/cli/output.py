@@ -145,7 +145,7 @@ def show_error(error: DrivetwinError, *, as_json: bool) -> None:
     if not as_json:
         from rich.text import Text
 
-        message = Text.assemble(("error: ", "bold red"), str(error))
+        message = Text.assemble(("error: ", "bold red"), error.format_for_shell())
         make_console(stderr=True).print(message, soft_wrap=True)
         return
     print_json(to_error_document(error))

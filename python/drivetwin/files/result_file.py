@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, FiniteFloat, model_validator
 
 from drivetwin._util.atomic import write_text
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
@@ -147,6 +148,7 @@ def _build_correlation(found: Identification) -> dict[str, dict[str, float]]:
     }
 
 
+@check_arguments
 def save_result(path: Path | str, identification: Identification) -> None:
     """Write `result.json`; the file appears whole or not at all."""
     write_text(path, ResultFile.from_result(identification).to_json())

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin.channels.channel_spec import RememberedChannel, RememberedMapping
 from drivetwin.channels.read_options import ReadOptions
@@ -34,6 +35,7 @@ def load_twin(path: Path | str) -> Twin:
     return restore_twin(read_twin_file(path))
 
 
+@check_arguments
 def save_twin(path: Path | str, twin: Twin) -> None:
     """Write `twin.toml` atomically."""
     write_twin_file(path, build_twin_file(twin))

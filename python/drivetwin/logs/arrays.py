@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.names import is_time_name
@@ -41,6 +42,7 @@ class Frame(Protocol):
     def __getitem__(self, column: str, /) -> ArrayLike: ...
 
 
+@check_arguments
 def read_arrays(
     data: Mapping[str, ArrayLike] | Frame | Iterable[Signal],
     card: VehicleCard | None,

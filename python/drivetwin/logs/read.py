@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
 from drivetwin.channels.filling import Filling
@@ -59,6 +60,7 @@ class Demands:
     gearing: bool = True
 
 
+@check_arguments
 def read_log(
     path: Path | str,
     card: VehicleCard | None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.findings import render
 from drivetwin.observer.ensemble import simulate_observed
@@ -22,6 +23,7 @@ FAR = 15.0
 about 25 MB, and more distant samples contain no information on the shift."""
 
 
+@check_arguments
 def estimate_torques(
     twin: Twin, log: ShiftLog, shift: Shift, by: Observer = Observer.SMOOTHER
 ) -> Observation:

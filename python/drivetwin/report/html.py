@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from drivetwin._util.atomic import write_text
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress, scale_progress
 from drivetwin._util.visible_text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
@@ -34,6 +35,7 @@ _BELOW_BUTTONS = 30
 """Room above the panels [px] where the page has the zoom buttons outside the figure."""
 
 
+@check_arguments
 def save_report(path: Path | str, found: Identification, log: ShiftLog) -> None:
     """Write the report of an identification; the file appears whole or not at all."""
     write_text(path, render_report(found, log))

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
 from drivetwin.shifts.candidate import (
@@ -38,6 +39,7 @@ class FoundShifts(NamedTuple):
     rejected: tuple[RejectedShift, ...]
 
 
+@check_arguments
 def detect_shifts(
     log: ShiftLog, card: VehicleCard, settings: ShiftSettings | None = None
 ) -> FoundShifts:

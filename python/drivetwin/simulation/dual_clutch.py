@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from drivetwin._native import sensitivities as native_sensitivities
 from drivetwin._native import simulate as native_simulate
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import InputError
 from drivetwin.simulation.serialize import as_array, as_json, as_names
 
@@ -305,6 +306,7 @@ class Sensitivities:
     event_times: Mapping[str, FloatArray]
 
 
+@check_arguments
 def simulate(
     model: DualClutch,
     engine_torque: Signal,
@@ -337,6 +339,7 @@ def simulate(
     return _build_trajectory(model, time, columns, (events, status, audited))
 
 
+@check_arguments
 def simulate_sensitivities(
     model: DualClutch,
     engine_torque: Signal,

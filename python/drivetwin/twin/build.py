@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.actuator.identify import IdentifiedActuator
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
+@check_arguments
 def build_twin(found: Identification, card: VehicleCard) -> Twin:
     """Build the twin from the estimates of an identification and the design data of the card."""
     parameters = dict(found.estimates)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, Where
@@ -65,6 +66,7 @@ class JointIdentification:
     twins: Mapping[str, Twin]
 
 
+@check_arguments
 def identify_together(
     sources: Sequence[Source], card: VehicleCard, method: Method = DEFAULT_METHOD
 ) -> JointIdentification:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
@@ -43,6 +44,7 @@ Start = tuple[float, State]
 """Time [s] and state from which a simulation starts."""
 
 
+@check_arguments
 def simulate_shift(
     twin: Twin,
     log: ShiftLog,
@@ -147,6 +149,7 @@ def attach_fit(found: Identification, validations: Sequence[Validation]) -> Iden
     )
 
 
+@check_arguments
 def attach_validation(found: Identification, twin: Twin, log: ShiftLog) -> Identification:
     """Simulate all shifts of an identification and attach the comparison with the log.
 

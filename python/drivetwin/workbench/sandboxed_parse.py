@@ -111,7 +111,7 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
                 raise
             opened = _open_without_time_unit(request.log, card, stated)
             fault = _apply_labels_to(error, _get_labels(request))
-            emit(replace(opened, fault=str(fault)))
+            emit(replace(opened, fault=fault.format_for_shell()))
             return
     try:
         with _apply_labels(_get_labels(request)):
@@ -122,7 +122,7 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
                 log = replace(log, findings=drop_card_findings(log.findings))
             found = None if card is None else detect_shifts(log, card)
     except InputError as error:
-        emit(Opened(looked, card, fault=str(error)))
+        emit(Opened(looked, card, fault=error.format_for_shell()))
         return
     doubts = () if card is None or found is None else _check_card(card, log, found)
     emit(Opened(looked, card, log, found, doubts))

@@ -256,7 +256,7 @@ class Session:
             fault, self.job = self.job.fault, None
             if fault is not None:
                 error = fault.to_error()
-                self._set(replace(self.work, ended=str(error)))
+                self._set(replace(self.work, ended=error.format_for_shell()))
                 raise error
             return True
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress, scale_progress
 from drivetwin.estimation.analysis.experiments import BaseShift, ExperimentPlan, plan_experiment
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
@@ -91,6 +92,7 @@ def _find_shifts(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
     return tuple(dict.fromkeys((last, *with_it.values())))
 
 
+@check_arguments
 def rank_experiments(found: Identification) -> Identification:
     """Attach the experiments that would identify what the log leaves open.
 

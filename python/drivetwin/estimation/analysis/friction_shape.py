@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
@@ -94,6 +95,7 @@ class ShapedFriction:
     fit: LikelihoodFit
 
 
+@check_arguments
 def fit_friction_shape(
     found: Identification, shape: FrictionShape, priors: EffectPriors
 ) -> ShapedFriction:

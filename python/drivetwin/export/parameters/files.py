@@ -9,6 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from drivetwin._util.atomic import write_text
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters.cdfx import convert_for_cdfx, format_cdfx, parse_cdfx
@@ -54,6 +55,7 @@ CODECS = {
 }
 
 
+@check_arguments
 def write_parameters(parameters: ParameterSet, path: Path, kind: ParameterFormat) -> None:
     """Write a parameter file; it appears whole or not at all.
 
@@ -62,6 +64,7 @@ def write_parameters(parameters: ParameterSet, path: Path, kind: ParameterFormat
     write_text(path, CODECS[kind].text(parameters))
 
 
+@check_arguments
 def read_parameters(path: Path, kind: ParameterFormat | None = None) -> ParameterSet:
     """Read a parameter file, by default in the format that its ending names.
 

@@ -155,7 +155,7 @@ class Page:
 def _format_fault(fault: DrivetwinError | OSError) -> str:
     """Format a typed error or an OS error as a message; files without their folders."""
     if isinstance(fault, DrivetwinError):
-        return replace_options(str(fault))
+        return replace_options(fault.format_for_shell())
     where = Where(file=None if fault.filename is None else Path(fault.filename).name)
     remedy = "see whether the file is there, its permissions and the free space"
     return str(DrivetwinError(fault.strerror or type(fault).__name__, remedy, where))

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""Identification with the simulation over the measurement, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from drivetwin._util.check_arguments import check_arguments
+from drivetwin._util.progress import scale_progress
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.pipeline import identify
+from drivetwin.shifts.detect import FoundShifts, detect_shifts
+from drivetwin.twin.build import build_twin
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import attach_validation
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+_SIMULATION = 0.95
+"""Share of the time after which the shifts are simulated [ratio]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ValidatedModel:
+    """A `result` with the verdict on the model, and the `twin` with its values and verdicts."""
+
+    result: Identification
+    twin: Twin
+
+    def __repr__(self) -> str:
+        return f"<ValidatedModel: {self.result!r}>"
+
+
+@check_arguments
+def identify_validated(
+    log: ShiftLog,
+    card: VehicleCard,
+    shifts: FoundShifts | None = None,
+    method: Method = DEFAULT_METHOD,
+    *,
+    fixed: Mapping[str, float] = MappingProxyType({}),
+    priors: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> ValidatedModel:
+    """Identify a log, simulate its shifts, and set the verdict, as the command `identify` does.
+
+    Parameters
+    ----------
+    log, card : the channels of a recording and the design data of its vehicle
+    shifts : result of `detect_shifts`; None: they are detected
+    method, fixed, priors, bounds : as in `identify`
+
+    Returns
+    -------
+    ValidatedModel
+        The validated result and its twin.
+
+    Raises
+    ------
+    DrivetwinError
+        As `identify`, and MissingParameterError where the model cannot be simulated.
+    """
+    found = detect_shifts(log, card) if shifts is None else shifts
+    with scale_progress(0.0, _SIMULATION):
+        result = identify(log, card, found, method, fixed=fixed, priors=priors, bounds=bounds)
+    with scale_progress(_SIMULATION, 1.0, "simulating the shifts"):
+        result = attach_validation(result, build_twin(result, card), log)
+    return ValidatedModel(result, build_twin(result, card))  # with the verdicts of the gate
