@@ -85,6 +85,7 @@ class Code(StrEnum):
     RESIDUAL_CORRELATED = auto()
     INPUT_NOISE_OMITTED = auto()
     SIMULATION_MISSES = auto()
+    SIMULATION_NOISY = auto()
     SIMULATION_INCOMPLETE = auto()
     SIMULATION_OUTSIDE_SPREAD = auto()
     GAIN_NOT_DETERMINED = auto()
@@ -95,12 +96,15 @@ class Code(StrEnum):
     EFFECT_FOUND = auto()
     EFFECT_IN_PLANT = auto()
     EFFECT_POSSIBLE = auto()
+    EFFECT_RESEMBLED = auto()
     EFFECT_LARGE = auto()
     EFFECT_NOT_LINEAR = auto()
     EFFECTS_OMITTED = auto()
     OTHER_LOSS_LAW = auto()
     METHODS_DIFFER = auto()
     LIKELIHOOD_FAILED = auto()
+    STARTING_VALUE = auto()
+    STARTING_VALUE_UNCHECKED = auto()
     LINEAR_METHOD_FAILED = auto()
     PAPER_METHOD_FAILED = auto()
     PAPER_BIASED = auto()
@@ -185,6 +189,8 @@ class Entry:
     text: str
     remedy: str = ""
     severity: Severity = Severity.WARNING
+    columns: tuple[tuple[str, str], ...] = ()
+    """Table of a finding with rows: head and template of each column."""
 
 
 @cache
@@ -194,7 +200,12 @@ def load_catalogue() -> dict[Code, Entry]:
 
     tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     return {
-        Code(code): Entry(**table | {"severity": Severity(table.get("severity", "warning"))})
+        Code(code): Entry(
+            table["text"],
+            table.get("remedy", ""),
+            Severity(table.get("severity", "warning")),
+            tuple((head, cell) for head, cell in table.get("columns", ())),
+        )
         for code, table in tables.items()
     }
 
@@ -222,10 +233,19 @@ Value = str | float | Number
 
 
 @dataclass(frozen=True)
+class Row:
+    """Row of the table of a finding: `names` and `numbers` (SI) fill the templates of the columns
+    of its code."""
+
+    names: Mapping[str, str]
+    numbers: Mapping[str, Number]
+
+
+@dataclass(frozen=True)
 class Finding:
     """Remark on `subject` (parameter id, channel or shift label; empty for the whole) at `place`.
 
-    `numbers` (SI) and `names` fill the texts of `code`.
+    `numbers` (SI) and `names` fill the texts of `code`, `rows` its table.
     """
 
     code: Code
@@ -233,6 +253,7 @@ class Finding:
     place: Where = field(default_factory=Where)
     numbers: Mapping[str, Number] = field(default_factory=dict, hash=False)
     names: Mapping[str, str] = field(default_factory=dict, hash=False)
+    rows: tuple[Row, ...] = field(default=(), hash=False)
 
     @property
     def severity(self) -> Severity:
@@ -261,6 +282,20 @@ class Finding:
         heads = (str(self.place), "" if told else self.subject)
         return ": ".join(part for part in (*heads, self.reason) if part)
 
+    @property
+    def heads(self) -> tuple[str, ...]:
+        """Heads of the columns of the table; empty without rows."""
+        return tuple(head for head, _ in load_catalogue()[self.code].columns) if self.rows else ()
+
+    @property
+    def cells(self) -> list[tuple[str, ...]]:
+        """Cells of the table, row by row."""
+        columns = load_catalogue()[self.code].columns
+        return [
+            tuple(template.format(**row.numbers, **row.names) for _, template in columns)
+            for row in self.rows
+        ]
+
     def set_subject(self, subject: str) -> Finding:
         """Return the finding with a subject; unchanged if it has one."""
         return self if self.subject else replace(self, subject=subject)
@@ -279,13 +314,23 @@ def report(
     code: Code, subject: str = "", place: Where | None = None, /, **values: Value
 ) -> Finding:
     """Build a finding; texts among `values` are names, all others numbers."""
+    names, numbers = _split_values(values)
+    return Finding(code, subject, place or Where(), numbers, names)
+
+
+def make_row(**values: Value) -> Row:
+    """Build a row of a table; texts among `values` are names, all others numbers."""
+    return Row(*_split_values(values))
+
+
+def _split_values(values: Mapping[str, Value]) -> tuple[dict[str, str], dict[str, Number]]:
     names = {key: one for key, one in values.items() if isinstance(one, str)}
     numbers = {
         key: one if isinstance(one, Number) else Number(float(one))
         for key, one in values.items()
         if not isinstance(one, str)
     }
-    return Finding(code, subject, place or Where(), numbers, names)
+    return names, numbers
 
 
 def explain(code: Code, subject: str = "", /, **values: Value) -> str:

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from drivetwin.shifts.shift import Shift
 
 
-NOT_VALID = 3
-"""Exit code of a model that is not valid, with --strict."""
+NOT_CONFIRMED = 3
+"""Exit code of a model that is neither valid nor valid with limits, with --strict."""
 
 
 def identify(
@@ -70,7 +70,10 @@ def identify(
         ),
     ] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Exit with code 3 if a model is not valid.")
+        bool,
+        typer.Option(
+            "--strict", help="Exit with code 3 unless every model is valid, limits included."
+        ),
     ] = False,
     as_json: JsonFlag = False,
 ) -> None:
@@ -107,13 +110,13 @@ def identify(
         print_json(results[0] if len(results) == 1 else {"results": results})
     if failed is not None:
         raise typer.Exit(failed.exit_code)
-    _exit_by_status([one.get("status", "") for one in results], strict)
+    _exit_by_status([one["status"] for one in results], strict)
 
 
 def _exit_by_status(statuses: Sequence[str], strict: bool) -> None:
-    """Exit with `NOT_VALID` if a model is not valid and `strict` is set."""
-    if strict and ModelStatus.NOT_VALID in statuses:
-        raise typer.Exit(NOT_VALID)
+    """Exit with `NOT_CONFIRMED` if a model is not confirmed by its log and `strict` is set."""
+    if strict and not all(ModelStatus(one).is_confirmed for one in statuses):
+        raise typer.Exit(NOT_CONFIRMED)
 
 
 def _identify_log(log: Path, how: Request, folder: Path | None, as_json: bool) -> dict[str, Any]:

@@ -129,9 +129,16 @@ def print_verdict(verdict: ModelVerdict) -> None:
 
 
 def print_findings(findings: Iterable[Finding]) -> None:
-    """Print findings with their severity, the gravest first, each on its own line."""
+    """Print findings with severity and table, the gravest first, each on its own line."""
+    from rich.padding import Padding
+
     for one in sort_by_severity(findings):
         print_paragraph(f"{one.severity}: {one.text}")
+        if one.rows:
+            table = make_table("", *one.heads)
+            for cells in one.cells:
+                table.add_row(*cells)
+            make_console().print(Padding(table, (0, 0, 0, 4)))
 
 
 def show_findings(findings: Iterable[Finding]) -> None:

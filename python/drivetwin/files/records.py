@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -21,7 +21,7 @@ from drivetwin.estimation.result.estimate import (
     Verdict,
 )
 from drivetwin.estimation.result.suggestion import Experiment, ExperimentRanking
-from drivetwin.findings import Code, Finding, Number, Severity
+from drivetwin.findings import Code, Finding, Number, Row, Severity
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
@@ -211,8 +211,16 @@ class NumberRecord(Record):
     half_width: OptionalFloat = None
 
 
+class RowRecord(Record):
+    """Row of the table of a finding."""
+
+    names: dict[str, str]
+    numbers: dict[str, NumberRecord]
+
+
 class FindingRecord(Record):
-    """A finding: its `text` follows from code, subject, place, numbers and names."""
+    """A finding: its `text` follows from code, subject, place, numbers and names; `rows` are its
+    table."""
 
     code: Code
     severity: Severity
@@ -220,16 +228,22 @@ class FindingRecord(Record):
     place: Where
     numbers: dict[str, NumberRecord]
     names: dict[str, str]
+    rows: list[RowRecord] = Field(default_factory=list)
     remedy: str
     text: str
 
     def to_finding(self) -> Finding:
         """Back to the finding."""
-        numbers = {
-            key: Number(math.nan if one.value is None else one.value, one.unit, one.half_width)
-            for key, one in self.numbers.items()
-        }
-        return Finding(self.code, self.subject, self.place, numbers, self.names)
+        numbers = _build_numbers(self.numbers)
+        rows = tuple(Row(one.names, _build_numbers(one.numbers)) for one in self.rows)
+        return Finding(self.code, self.subject, self.place, numbers, self.names, rows)
+
+
+def _build_numbers(records: Mapping[str, NumberRecord]) -> dict[str, Number]:
+    return {
+        key: Number(math.nan if one.value is None else one.value, one.unit, one.half_width)
+        for key, one in records.items()
+    }
 
 
 def dump_findings(findings: Iterable[Finding]) -> list[dict[str, Any]]:

@@ -80,6 +80,7 @@ class CauseRecord(Record):
     next_evidence: FiniteFloat
     is_certain: bool
     in_plant: bool = False
+    is_explained: bool = True
 
 
 class ResultFile(Record):

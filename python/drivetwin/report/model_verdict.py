@@ -22,6 +22,12 @@ _USE = (
     "Use the model within the range that the log covers, and confirm it on a log that was not "
     "fitted."
 )
+_EFFECTS = {
+    Code.EFFECT_FOUND: "shows an effect that the simulation lacks",
+    Code.EFFECT_POSSIBLE: "may show an effect that the simulation lacks",
+    Code.EFFECT_RESEMBLED: "shows something that resembles an effect, which does not explain it",
+}
+"""Findings of effects, as the begin of a sentence."""
 _LISTED = 4
 """Number of parameters that a sentence names."""
 
@@ -112,17 +118,13 @@ def _explain_limits(
 
 def _limits_use(one: Finding) -> bool:
     """Return whether a finding on the whole model limits its use."""
-    wide = (Code.EFFECT_FOUND, Code.EFFECT_POSSIBLE, Code.FRICTION_IMPLAUSIBLE)
+    wide = (*_EFFECTS, Code.FRICTION_IMPLAUSIBLE, Code.SIMULATION_NOISY)
     return one.severity is Severity.ERROR or one.code in wide
 
 
 def _name_cause(one: Finding) -> str:
-    if one.code in (Code.EFFECT_FOUND, Code.EFFECT_POSSIBLE):
-        shows = "shows" if one.code is Code.EFFECT_FOUND else "may show"
-        return (
-            f"The log {shows} an effect that the simulation lacks: {one.names['effect']} "
-            f"({one.names['size']})."
-        )
+    if one.code in _EFFECTS:
+        return f"The log {_EFFECTS[one.code]}: {one.names['effect']} ({one.names['size']})."
     return _lead(one)
 
 

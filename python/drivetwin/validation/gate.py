@@ -19,7 +19,8 @@ from drivetwin.estimation.result.spread import PredictedSpread
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.estimation.result.verdict import apply_errors
-from drivetwin.findings import Code, Finding, Severity, report
+from drivetwin.findings import Code, Finding, Row, Severity, make_row, report
+from drivetwin.validation.starting_values import withhold_starting_values
 from drivetwin.validation.suspects import find_suspects, find_undetermined_gains
 
 
@@ -28,7 +29,8 @@ class GateSettings:
     """Limits of the free-running simulation and of plausible values."""
 
     least_fit: float = 50.0
-    """Fit of a signal over the whole shift [%] below which half of what moves is not explained."""
+    """Fit of a signal over the whole shift [%] below which half of what moves is not explained. It
+    decides only where no spread is predicted."""
     largest_error: float = 5.0
     """Root mean square error of a phase over the predicted spread from which it is no chance."""
     friction: tuple[float, float] = (0.03, 0.3)
@@ -44,13 +46,18 @@ GATE = GateSettings()
 def assess_model(found: Identification) -> Identification:
     """Hold the validations of an identification against their prediction and set its status.
 
-    A likelihood that reached no plausible minimum fails too. A model that fails keeps its values,
-    none of them identified, and a finding names the entries of the card that are most likely wrong.
+    Two questions are apart. The values may be trusted if the fit explains the log and no phase of
+    the simulation leaves its predicted spread. The twin can replay the log if the simulation also
+    explains most of what moves; a poor fit within its spread is a remark. A likelihood that reached
+    no plausible minimum fails too. A model that fails keeps its values, none of them identified,
+    and a finding names the entries of the card that are most likely wrong.
     """
-    failures = [*_check_runs(found), *_check_spread(found), *_check_efficiency(found)]
-    doubts = list(_check_friction(found))
+    found = withhold_starting_values(found)
+    noisy, missing = _check_fit(found)
+    failures = [*missing, *_check_runs(found), *_check_spread(found), *_check_efficiency(found)]
+    doubts = [*noisy, *_check_friction(found)]
     estimates = apply_errors(found.estimates, failures)
-    refuted = bool(failures or found.evidence.gave_up)
+    refuted = bool(failures or found.evidence.gave_up) or _is_unexplained(found)
     suspects = find_suspects(found, friction=GATE.friction) if refuted or doubts else []
     suspects += find_undetermined_gains(found, failures)
     if refuted:
@@ -64,6 +71,11 @@ def assess_model(found: Identification) -> Identification:
     return replace(found, estimates=estimates, findings=findings, status=status)
 
 
+def _is_unexplained(found: Identification) -> bool:
+    """Return whether the residual of the fit exceeds its noise; that fails whatever is missing."""
+    return any(one.code is Code.RESIDUAL_UNEXPLAINED for one in found.findings)
+
+
 def _has_limits(found: Identification) -> bool:
     """Return whether an effect that the simulation lacks, a finding or a verdict restricts the
     use of the model."""
@@ -75,29 +87,52 @@ def _has_limits(found: Identification) -> bool:
     )
 
 
-def _check_runs(found: Identification) -> Iterator[Finding]:
-    """Find signals that the simulation does not follow over the whole shift."""
+def _check_fit(found: Identification) -> tuple[list[Finding], list[Finding]]:
+    """Find signals of which the simulation explains less than half over the whole shift.
+
+    Returns those with a predicted spread, which judges their phases, and those without one, for
+    which the fit is the only measure.
+    """
+    noisy, missing = [], []
+    spreads = found.evidence.spread
     for name, phases in found.fit.items():
         percent = phases["all"].fit_percent
-        if not percent >= GATE.least_fit and np.isfinite(phases["all"].rmse):
-            channel = name.replace("_", " ")
-            yield report(Code.SIMULATION_MISSES, channel=channel, fit=percent)
+        if percent >= GATE.least_fit or not np.isfinite(phases["all"].rmse):
+            continue
+        channel = name.replace("_", " ")
+        if spreads and all(name in one for one in spreads):
+            noisy.append(report(Code.SIMULATION_NOISY, channel=channel, fit=percent))
+        else:
+            missing.append(report(Code.SIMULATION_MISSES, channel=channel, fit=percent))
+    return noisy, missing
+
+
+def _check_runs(found: Identification) -> Iterator[Finding]:
+    """Find simulations that ended early."""
     for one in found.evidence.validation:
         if one.status != "completed":
             yield report(Code.SIMULATION_INCOMPLETE, reason=one.status)
 
 
-def _check_spread(found: Identification) -> Iterator[Finding]:
-    """Find phases in which the error exceeds its predicted spread."""
-    for one, spread in zip(found.evidence.validation, found.evidence.spread, strict=False):
-        for name, trace in one.traces.items():
-            if name in spread:
-                yield from _check_phases(one, name, trace, spread[name])
+def _check_spread(found: Identification) -> list[Finding]:
+    """Report the phases in which the error exceeds its predicted spread, all in one finding."""
+    pairs = zip(found.evidence.validation, found.evidence.spread, strict=False)
+    rows = [
+        row
+        for one, spread in pairs
+        for name, trace in one.traces.items()
+        if name in spread
+        for row in _check_phases(one, name, trace, spread[name])
+    ]
+    if not rows:
+        return []
+    worst = max(rows, key=lambda one: one.numbers["ratio"].value)
+    return [replace(report(Code.SIMULATION_OUTSIDE_SPREAD), **vars(worst), rows=tuple(rows))]
 
 
 def _check_phases(
     one: Validation, name: str, trace: SignalTrace, spread: PredictedSpread
-) -> Iterator[Finding]:
+) -> Iterator[Row]:
     factor = one.model.i_in if name == "input_speed" else 1.0
     std = np.interp(trace.time, spread.time, spread.std) / factor
     expected = np.interp(trace.time, spread.time, spread.mean) / factor
@@ -109,8 +144,7 @@ def _check_phases(
         error = float(np.sqrt(np.mean(missed[inside] ** 2)))
         usual = float(np.sqrt(np.mean(std[inside] ** 2)))
         if error > GATE.largest_error * usual:
-            yield report(
-                Code.SIMULATION_OUTSIDE_SPREAD,
+            yield make_row(
                 channel=name.replace("_", " "),
                 phase=phase,
                 ratio=error / usual,

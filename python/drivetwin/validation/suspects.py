@@ -51,7 +51,12 @@ def find_undetermined_gains(found: Identification, failures: Iterable[Finding]) 
 
     Such an element never slips under load in the log. Its torque decides when it breaks away.
     """
-    missed = {one.names["shift"] for one in failures if one.code is Code.SIMULATION_OUTSIDE_SPREAD}
+    missed = {
+        row.names["shift"]
+        for one in failures
+        if one.code is Code.SIMULATION_OUTSIDE_SPREAD
+        for row in one.rows
+    }
     pairs = {
         (element, other)
         for shift in found.shifts

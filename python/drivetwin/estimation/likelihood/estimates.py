@@ -18,7 +18,12 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     check_residuals,
     check_weighting,
 )
-from drivetwin.estimation.likelihood.effects.causes import find_cause, report_cause
+from drivetwin.estimation.likelihood.effects.causes import (
+    describe_cause,
+    find_cause,
+    get_advice,
+    report_cause,
+)
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.effects.withdrawal import compute_doubt, find_unreliable
@@ -111,8 +116,10 @@ def build_estimates(
         if estimates[one.subject].verdict is not Verdict.DESIGN
     ]
     labels = collect_shift_labels(signals)
+    cause = find_cause(corrected, fit)
+    likeliest = () if cause is None else (describe_cause(cause), get_advice(cause))
     disagreements = (
-        *check_residuals(fit, labels, corrected.residuals),
+        *check_residuals(fit, labels, corrected.residuals, *likeliest),
         *check_weighting(fit, labels),
         *(() if correction is not None else (report(Code.EFFECTS_OMITTED),)),
         *(withdrawn := find_unreliable(corrected, ids, matrix, std)),
@@ -123,7 +130,6 @@ def build_estimates(
         estimates[name] = add_systematic(estimates[name], doubt[name])
     estimates = apply_errors(estimates, (*limits, *disagreements))
     estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
-    cause = find_cause(corrected)
     curves = adopt_verdicts(curves, estimates)
     return EstimateSet(
         estimates,

@@ -29,7 +29,8 @@ class Cause:
     `evidence` is the log evidence against its absence, `size` its estimate beside the other
     effects in its unit with `std`; for a random effect `size` is its root mean square in stated
     sizes and `std` None. `equivalent` are causes that the log cannot tell from it, `next_evidence`
-    that of the best other one. `is_certain` is False where another cause comes near.
+    that of the best other one. `is_explained` is True where the fit with it explains the log by a
+    plausible size of it; else the log shows something that resembles it.
     """
 
     group: Group
@@ -40,8 +41,14 @@ class Cause:
     next_evidence: float
     in_plant: bool = False
     """True for a part that the identified plant has beside the dual clutch."""
+    is_explained: bool = True
+
+    @property
+    def is_alone(self) -> bool:
+        """True if no other cause comes near in evidence."""
+        return self.evidence - self.next_evidence >= LEAD
 
     @property
     def is_certain(self) -> bool:
-        """True if no other cause comes near in evidence."""
-        return self.evidence - self.next_evidence >= LEAD
+        """True if it explains the log and no other cause comes near."""
+        return self.is_explained and self.is_alone

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 
 from drivetwin._util.arrays import FloatArray
 
+EXPLAINED = 1.1
+"""Residual power over that of noise up to which a model explains a log. A tenth is the uncertainty
+of noise levels; beyond it something is missing from the model."""
+
 
 @dataclass(frozen=True, eq=False)
 class PredictedSpread:

@@ -13,3 +13,8 @@ class ModelStatus(StrEnum):
     LIMITED = "valid with limits"
     NOT_VALID = "not valid"
     NOT_VALIDATED = "not validated"
+
+    @property
+    def is_confirmed(self) -> bool:
+        """True if the simulation of the model follows the log."""
+        return self in (ModelStatus.VALID, ModelStatus.LIMITED)

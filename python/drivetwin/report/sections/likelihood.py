@@ -80,7 +80,8 @@ def count_consistent_residuals(fit: LikelihoodFit) -> tuple[int, int]:
     """Tests of the residuals: how many passed, of how many."""
     tests = [test for group in run_residual_tests(fit).values() for test in group]
     total = sum(1 + len(test.correlation) for test in tests)
-    return total - sum(len(test.findings) for test in tests), total
+    failed = sum(test.is_coloured + len(test.significant) for test in tests)
+    return total - failed, total
 
 
 def _list_labels(signals: Sequence[ShiftSignals]) -> list[str]:

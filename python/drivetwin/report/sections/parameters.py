@@ -16,7 +16,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.findings import Severity, render
+from drivetwin.findings import Finding, Severity, render
 from drivetwin.report.figures.validation import build_overview_panels, plot_overview
 from drivetwin.report.labels import get_parameter_label, get_parameter_name
 from drivetwin.report.model_verdict import explain_identification
@@ -29,6 +29,7 @@ from drivetwin.report.sections.blocks import (
     TableBlock,
     Tone,
     VerdictBlock,
+    make_cells,
     make_link,
 )
 
@@ -67,14 +68,21 @@ def build_result_section(found: Identification) -> Section:
 
 
 def build_findings_section(found: Identification) -> Section:
-    """Findings by severity, errors first."""
-    blocks = [
-        NotesBlock(heading, render(alike), tone)
-        for severity, heading, tone in _SEVERITIES
-        if (alike := [one for one in found.findings if one.severity is severity])
-    ]
+    """Findings by severity, errors first, each group with the tables of its findings."""
+    blocks: list[Block] = []
+    for severity, heading, tone in _SEVERITIES:
+        alike = [one for one in found.findings if one.severity is severity]
+        if alike:
+            blocks.append(NotesBlock(heading, render(alike), tone))
+        blocks += [_build_rows_table(one) for one in alike if one.rows]
     intro = "Remarks on log, vehicle card and fit, with cause and remedy."
     return Section("findings", "Findings", intro, blocks)
+
+
+def _build_rows_table(one: Finding) -> TableBlock:
+    """Build the table of a finding; its caption is the cause."""
+    rows = [make_cells(*cells) for cells in one.cells]
+    return TableBlock(one.cause, make_cells(*one.heads), rows)
 
 
 def _build_verdict_block(found: Identification) -> VerdictBlock:

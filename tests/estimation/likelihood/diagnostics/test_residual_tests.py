@@ -38,8 +38,13 @@ def test_a_residual_that_goes_with_an_input_speaks_against_every_value() -> None
         fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record)),)
     )
     wrong = replace(fit, problem=plain, normal=replace(fit.normal, residuals=(residual + missing,)))
-    channels = [(one.names["channel"], one.names["source"]) for one in _list_correlated(wrong)]
-    assert ("output torque", "engine torque") in channels
+    (one,) = _list_correlated(wrong)
+    assert ("output torque", "engine torque") in [
+        (row.names["channel"], row.names["source"]) for row in one.rows
+    ]
+    assert one.numbers["size"].value == max(abs(row.numbers["size"].value) for row in one.rows)
+    assert one.heads[1:3] == ("Residual of", "Correlated with")
+    assert ("shift 2-3", "output torque", "engine torque") in [cells[:3] for cells in one.cells]
 
 
 def test_the_drift_of_a_sensor_speaks_against_every_value() -> None:
@@ -50,8 +55,12 @@ def test_the_drift_of_a_sensor_speaks_against_every_value() -> None:
     drift = np.zeros_like(residual)
     drift[: torque.values.size] = torque.sigma * np.linspace(-1.0, 1.0, torque.values.size)
     drifted = replace(fit, normal=replace(fit.normal, residuals=(residual + drift,)))
-    assert all("sensor drift" in one.text for one in _list_correlated(drifted))
-    assert _list_correlated(drifted)
+    (one,) = _list_correlated(drifted)
+    assert "sensor drift" in one.text
+    assert "no listed effect" in one.text
+    assert (
+        "tyre slip" in check_residuals(drifted, ["2-3"], None, "tyre slip", "Slow down.")[-1].text
+    )
 
 
 def test_a_fit_that_leaves_out_the_noise_of_its_inputs_says_so() -> None:

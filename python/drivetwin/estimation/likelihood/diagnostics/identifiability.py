@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
@@ -75,8 +76,7 @@ def find_at_bounds(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -
 
     `slopes` (q, p) is the derivative of the parameters `ids` by the unknowns of the fit.
     """
-    values, near = fit.point.values, BOUND_STD * np.sqrt(np.diag(fit.covariance))
-    below, above = values <= fit.problem.lower + near, values >= fit.problem.upper - near
+    values, (below, above) = fit.point.values, locate_bounds(fit)
     found = []
     for name, row in zip(ids, slopes, strict=True):
         (acting,) = np.nonzero(row)
@@ -86,3 +86,9 @@ def find_at_bounds(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -
         limit = Number(float(values[acting[0]]), get_parameter_spec(name).unit)
         found.append(report(Code.AT_BOUND, name, limit=limit, side=side))
     return found
+
+
+def locate_bounds(fit: LikelihoodFit) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Locate the unknowns on their lower and upper bounds, both (p,)."""
+    values, near = fit.point.values, BOUND_STD * np.sqrt(np.diag(fit.covariance))
+    return values <= fit.problem.lower + near, values >= fit.problem.upper - near

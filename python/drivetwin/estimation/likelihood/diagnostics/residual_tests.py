@@ -9,7 +9,7 @@ its power in means over m samples.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from drivetwin.estimation.likelihood.coloured_noise import (
 )
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.findings import Code, Finding, Number, Row, make_row, report
 from drivetwin.simulation.dual_clutch import Signal
 
 MAX_EXCESS_POWER = 1.6
@@ -29,6 +29,11 @@ MAX_EXCESS_POWER = 1.6
 SIGNIFICANT = 5.0
 """Correlation with an input, in standard deviations of that of noise, from which it is no chance:
 a warning is due, and the model does not hold."""
+
+_ADVICE = (
+    "Compare the simulation with the measurement in the report, phase by phase, and check these "
+    "sensors for drift"
+)
 
 
 @dataclass(frozen=True)
@@ -42,24 +47,14 @@ class ResidualTest:
     correlation: dict[str, float]
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings of the test, without the label of the shift."""
-        name, found = self.output.replace("_", " "), []
-        if self.excess > MAX_EXCESS_POWER:
-            code = Code.RESIDUAL_COLOURED
-            found.append(
-                report(
-                    code, channel=name, block=Number(COLOURED_NOISE.block, "s"), power=self.excess
-                )
-            )
-        found += [
-            report(
-                Code.RESIDUAL_CORRELATED, channel=name, source=source.replace("_", " "), size=size
-            )
-            for source, size in self.correlation.items()
-            if abs(size) > SIGNIFICANT
-        ]
-        return tuple(found)
+    def is_coloured(self) -> bool:
+        """True if the block means have more power than those of white noise."""
+        return self.excess > MAX_EXCESS_POWER
+
+    @property
+    def significant(self) -> dict[str, float]:
+        """Correlations that are no chance, by input."""
+        return {name: one for name, one in self.correlation.items() if abs(one) > SIGNIFICANT}
 
 
 def compute_white_residuals(
@@ -96,22 +91,60 @@ def run_residual_tests(
 
 
 def check_residuals(
-    fit: LikelihoodFit, labels: Sequence[str], residuals: Sequence[FloatArray] | None = None
+    fit: LikelihoodFit,
+    labels: Sequence[str],
+    residuals: Sequence[FloatArray] | None = None,
+    likeliest: str = "",
+    advice: str = _ADVICE,
 ) -> list[Finding]:
-    """Return the findings of all tests; `labels` are those of the shifts, `residuals` as in
-    `compute_white_residuals`.
+    """Return at most one finding of each kind, with a table of the signals that show it.
 
     Noise is correlated with no input, unless it is as slow as the log is long. A correlated
     residual shows a missing effect or a drift, whose influence on the parameters no interval
     covers.
+
+    Parameters
+    ----------
+    labels : labels of the shifts
+    residuals : as in `compute_white_residuals`
+    likeliest, advice : cause that the log shows most, and what to do about it
     """
     tested = run_residual_tests(fit, residuals).values()
-    return [
-        finding.set_subject(label)
-        for tests, label in zip(tested, labels, strict=True)
-        for test in tests
-        for finding in test.findings
+    pairs = [(label, test) for tests, label in zip(tested, labels, strict=True) for test in tests]
+    coloured = [
+        make_row(shift=label, channel=_write_name(test.output), power=test.excess)
+        for label, test in pairs
+        if test.is_coloured
     ]
+    correlated = [
+        make_row(
+            shift=label,
+            channel=_write_name(test.output),
+            source=_write_name(source),
+            size=size,
+        )
+        for label, test in pairs
+        for source, size in test.significant.items()
+    ]
+    found = []
+    if coloured:
+        block, power = Number(COLOURED_NOISE.block, "s"), _get_largest(coloured, "power")
+        one = report(Code.RESIDUAL_COLOURED, block=block, power=power)
+        found.append(replace(one, rows=tuple(coloured)))
+    if correlated:
+        cause = f"likeliest cause: {likeliest}" if likeliest else "no listed effect explains it"
+        size = _get_largest(correlated, "size")
+        one = report(Code.RESIDUAL_CORRELATED, size=size, cause=cause, advice=advice)
+        found.append(replace(one, rows=tuple(correlated)))
+    return found
+
+
+def _get_largest(rows: Sequence[Row], key: str) -> float:
+    return max(abs(one.numbers[key].value) for one in rows)
+
+
+def _write_name(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def check_weighting(fit: LikelihoodFit, labels: Sequence[str]) -> list[Finding]:

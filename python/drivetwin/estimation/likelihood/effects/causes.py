@@ -10,14 +10,19 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
+from drivetwin.estimation.likelihood.diagnostics.identifiability import locate_bounds
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.effect import Effect
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS, describe_group
+from drivetwin.estimation.likelihood.effects.withdrawal import WITHDRAWAL, find_large_groups
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.result.cause import Cause, Group
 from drivetwin.estimation.result.estimate import Z95
+from drivetwin.estimation.result.spread import EXPLAINED
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
+from drivetwin.vehicle.effects import EffectId
 
 
 @dataclass(frozen=True)
@@ -30,15 +35,20 @@ class CauseSettings:
     equivalent: float = 0.9
     """Cosine between the fitted effects of two causes, the unknowns adjusted, from which the log
     cannot tell them apart."""
+    largest_power: float = 1.2
+    """Residual power per sample of the fit, a part of the plant included, above which no effect
+    that is only a linear correction counts as certain: it would explain more than a fifth of the
+    noise."""
 
 
 CAUSES = CauseSettings()
 
 
-def find_cause(correction: Correction) -> Cause | None:
+def find_cause(correction: Correction, fit: LikelihoodFit) -> Cause | None:
     """Find the cause with most evidence; None if none has enough.
 
-    Stated sensor tolerances are no candidates: they are expected to act.
+    Stated sensor tolerances are no candidates: they are expected to act. The cause explains the log
+    only if `fit` and its correction do, and its size is plausible.
     """
     ranked = sorted(
         ((group, one) for group, one in correction.evidence.items() if group.effect is not None),
@@ -61,7 +71,38 @@ def find_cause(correction: Correction) -> Cause | None:
         tuple(one for one, _ in ranked if one in named),
         max(rest, default=0.0),
         in_plant=not best.columns,
+        is_explained=_is_explained(correction, fit, group, (size, std)),
     )
+
+
+def _is_explained(
+    correction: Correction, fit: LikelihoodFit, group: Group, size: tuple[float, float | None]
+) -> bool:
+    """Return whether a cause explains the log by a plausible `size` with its standard deviation.
+
+    The residual with it is at the level of noise, and so is that of the fit but for a fifth: a
+    larger part would rest on the linear correction alone, to which many effects are alike. A size
+    within its interval of zero is none, however much evidence the amounts of other effects lend
+    it; a size beyond its prior, or at a bound of the search, is that of another cause.
+    """
+    if correction.step.chi2 > EXPLAINED or fit.chi2 > CAUSES.largest_power:
+        return False
+    value, std = size
+    if std is not None and abs(value) <= Z95 * std:
+        return False
+    return not (group in find_large_groups(correction) or _is_part_implausible(fit, group.effect))
+
+
+def _is_part_implausible(fit: LikelihoodFit, effect: EffectId | None) -> bool:
+    """Return whether an unknown of the part of the plant is at a bound of the search, or where its
+    prior excludes it."""
+    if fit.plant is None or fit.plant.effect is not effect:
+        return False
+    own = slice(fit.plant.index, None)  # the unknowns of the part come last, its size first
+    below, above = locate_bounds(fit)
+    prior = fit.problem.prior
+    apart = np.abs(fit.point.values - prior.mean) * np.sqrt(np.diag(prior.precision))
+    return bool(np.any((below | above | (apart > WITHDRAWAL.sizes))[own]))
 
 
 def _compute_cosine(one: GroupEvidence, other: GroupEvidence) -> float:
@@ -118,15 +159,17 @@ def report_cause(
     ]
     return report(
         _select_code(cause),
-        effect=" or ".join(describe_group(one) for one in (cause.group, *cause.equivalent)),
-        size=_format_size(cause, EFFECTS[effect].unit),
+        effect=describe_cause(cause),
+        size=_format_size(cause, EFFECTS[effect]),
         evidence=cause.evidence,
         changes=", ".join(changes) or "no value by more than its interval",
-        advice=_capitalise(EFFECTS[effect].remedy),
+        advice=get_advice(cause),
     )
 
 
 def _select_code(cause: Cause) -> Code:
+    if not cause.is_explained:
+        return Code.EFFECT_RESEMBLED
     if cause.in_plant:
         return Code.EFFECT_IN_PLANT
     return Code.EFFECT_FOUND if cause.is_certain else Code.EFFECT_POSSIBLE
@@ -137,8 +180,23 @@ def _capitalise(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _format_size(cause: Cause, unit: str) -> str:
-    """Format the size of a cause in its unit."""
+def describe_cause(cause: Cause) -> str:
+    """Describe a cause and those that the log cannot tell from it."""
+    return " or ".join(describe_group(one) for one in (cause.group, *cause.equivalent))
+
+
+def _format_size(cause: Cause, effect: Effect) -> str:
+    """Format the size of a cause in its unit, with the meaning of a negative one."""
     if cause.std is None:
         return f"{cause.size:.2g} times its usual size"
-    return f"{cause.size:.2g} ± {Z95 * cause.std:.1g} {unit}".removesuffix(" 1")
+    half = Z95 * cause.std
+    size = f"{cause.size:.2g} ± {half:.1g} {effect.unit}".removesuffix(" 1")
+    if effect.unit == "s":
+        size = format_with_unit(cause.size, effect.unit, half)
+    return f"{size}, {effect.negative}" if effect.negative and cause.size < -half else size
+
+
+def get_advice(cause: Cause) -> str:
+    """Return what to do about a cause, as a sentence without its period."""
+    assert cause.group.effect is not None, "tolerances of sensors are no candidates"
+    return _capitalise(EFFECTS[cause.group.effect].remedy)

@@ -58,6 +58,8 @@ class Effect:
     power: float = 1.0
     curved: bool = False
     signed: bool = False
+    negative: str = ""
+    """Meaning of a negative size, where its sign is not evident."""
 
     def scale_amount(self, amount: float, std: float) -> float:
         """Return the size of an `amount`, in units of the columns, of the stated size `std`."""

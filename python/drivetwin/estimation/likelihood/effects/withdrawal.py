@@ -12,6 +12,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.table import describe_group
 from drivetwin.estimation.result.cause import Group
+from drivetwin.estimation.result.spread import EXPLAINED
 from drivetwin.findings import Code, Finding, report
 from drivetwin.vehicle.effects import EffectId
 
@@ -28,7 +29,7 @@ class WithdrawalSettings:
     last_step: float = 1.5
     """Move of a value by the last step, in its standard deviations, from which the effects are
     not linear: one more step would move it again."""
-    chi2: float = 1.1
+    chi2: float = EXPLAINED
     """Residual power per sample after the correction above which something is missing from the
     model that no effect describes."""
 
