@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Status of a model: trust in its values, and replay of the log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.estimation.artifacts import StageResults
+from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import SignalFit, Verdict
+from drivetwin.estimation.result.spread import PredictedSpread
+from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.findings import Code, report
+from drivetwin.validation.gate import assess_model
+from tests.report.sample import TIME, identification, validation
+
+
+def _simulated(percent: float, std: float | None) -> Identification:
+    """Return the sample with a fit of the output torque [%], and a predicted spread [N m]."""
+    found = identification()
+    torque = {"output_torque": PredictedSpread(TIME, np.zeros(TIME.size), np.full(TIME.size, std))}
+    evidence = StageResults(validation=(validation(),), spread=() if std is None else (torque,))
+    estimates = {
+        name: one for name, one in found.estimates.items() if one.verdict is Verdict.IDENTIFIED
+    }
+    fit = {"output_torque": {"all": SignalFit(100.0, percent)}}
+    return replace(found, evidence=evidence, fit=fit, estimates=estimates)
+
+
+def test_a_poor_fit_within_its_spread_is_a_remark() -> None:
+    """The simulation of the sample misses the torque by 22 N·m."""
+    found = assess_model(_simulated(30.0, 10.0))
+    assert found.status is ModelStatus.LIMITED
+    assert found.findings[0].code is Code.SIMULATION_NOISY
+    assert found.estimates["eta"].verdict is Verdict.IDENTIFIED
+    assert assess_model(_simulated(90.0, 10.0)).status is ModelStatus.VALID
+
+
+@pytest.mark.parametrize(("percent", "std"), [(30.0, None), (90.0, 2.0), (30.0, 2.0)])
+def test_a_fit_without_spread_and_a_phase_outside_it_are_failures(
+    percent: float, std: float | None
+) -> None:
+    found = assess_model(_simulated(percent, std))
+    assert found.status is ModelStatus.NOT_VALID
+    assert found.estimates["eta"].verdict is Verdict.WEAK
+
+
+def test_the_phases_outside_their_spread_are_one_finding() -> None:
+    found = assess_model(_simulated(90.0, 2.0))
+    (one,) = [each for each in found.findings if each.code is Code.SIMULATION_OUTSIDE_SPREAD]
+    assert {row.names["phase"] for row in one.rows} == {"before", "torque", "inertia", "after"}
+    assert one.numbers["ratio"].value == max(row.numbers["ratio"].value for row in one.rows)
+
+
+def test_an_unexplained_residual_is_not_valid_whatever_is_missing() -> None:
+    bare = replace(identification(), evidence=StageResults())
+    assert assess_model(bare).status is ModelStatus.NOT_VALIDATED
+    residual = report(Code.RESIDUAL_UNEXPLAINED, chi2=2.6)
+    assert assess_model(replace(bare, findings=(residual,))).status is ModelStatus.NOT_VALID
+
+
+def test_only_a_valid_model_is_confirmed() -> None:
+    confirmed = {one for one in ModelStatus if one.is_confirmed}
+    assert confirmed == {ModelStatus.VALID, ModelStatus.LIMITED}
