@@ -11,7 +11,6 @@ PYTHON_WORDS = {
     "in a channel mapping (--channels)": "in a channel mapping (argument `mapping`)",
     "with --shift, such as --shift 2-3": "by its gears",
     "`drivetwin identify`": "`drivetwin.identify`",
-    "--vehicle": "the argument `card`",
 }
 """Words of the Python interface in place of options and commands of the shell."""
 INTERRUPTED = 130

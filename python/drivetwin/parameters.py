@@ -101,8 +101,8 @@ _SPECS = (
         "inertia of the clutch drum, which rotates at slip speed (THEORY §2)", 0.0, 1e4, "element",
     ),
     ParameterSpec(
-        "te_delay", "engine torque delay", "τ_e", "s", "engine-torque signal delay", -1.0,
-        1.0, "log",
+        "te_delay", "engine torque delay", "τ_e", "s",
+        "engine-torque signal delay: the log shows it so long after it acts", -1.0, 1.0, "log",
     ),
     ParameterSpec(
         "p_delay", "pressure delay", "τ_p", "s",

@@ -9,9 +9,17 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
+from drivetwin.export.c.write import generate_twin_source
 from drivetwin.export.fixed_step import run_fixed_step
+from drivetwin.export.fmu.variables import Role, list_variables
 from drivetwin.export.input_kind import InputKind
-from drivetwin.export.subject import build_subject, compute_steady_start
+from drivetwin.export.modelica.dual_clutch import format_modelica
+from drivetwin.export.subject import (
+    InputDelays,
+    build_note,
+    build_subject,
+    compute_steady_start,
+)
 from drivetwin.simulation.dual_clutch import RoadLoad
 from tests.export.cases import paper_model
 from tests.export.parameters.sample import twin
@@ -63,3 +71,24 @@ def test_a_steady_start_is_steady() -> None:
     run = run_fixed_step(model, start, time, inputs, InputKind.LINEAR)
     assert np.abs(run.engine_speed - 150.0).max() < 1e-9
     assert np.abs(run.shaft_torque - 2300.0).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("delays", "torque", "pressure"),
+    [
+        (InputDelays(0.0216), "advance the logged signal by 0.0216 s", ""),
+        (InputDelays(-0.003, 0.005), "delay the logged signal by 0.003 s", "by 0.005 s"),
+        (InputDelays(), "", ""),
+    ],
+)
+def test_every_form_names_the_delay_of_the_inputs_and_its_direction(
+    delays: InputDelays, torque: str, pressure: str
+) -> None:
+    subject = replace(build_subject(twin()), delays=delays, note=build_note(twin(), delays))
+    texts = {one.name: one.meaning for one in list_variables(subject) if one.role is Role.INPUT}
+    source, model = generate_twin_source(subject), format_modelica(subject)
+    assert torque in texts["engine_torque"]
+    assert pressure in texts["B3.pressure"]
+    assert torque in source
+    assert torque in model
+    assert ("inputs:" in source) is bool(torque)

@@ -15,6 +15,9 @@ from fmpy.fmi2 import FMU2Slave
 
 from drivetwin.cli import main
 from drivetwin.export.compiler import detect_platform
+from drivetwin.files.twin_conversion import load_twin
+from drivetwin.logs.read import read_log
+from drivetwin.vehicle.card import load_card
 
 ROOT = Path(__file__).resolve().parents[2]
 STIMULUS = "extra/org.fmi-standard.fmi-ls-ref/measured_shift-in.csv"
@@ -174,3 +177,26 @@ def test_a_modelica_package_holds_the_shift_of_the_log(
     assert "model Shift" in text
     assert "w_rel = 0;" in text
     assert text.count(";\n      ") > 1000
+
+
+def test_written_inputs_are_those_of_the_log_at_the_instants_they_act(
+    identified: tuple[Path, Path], tmp_path: Path
+) -> None:
+    log, twin = identified
+    to, path = tmp_path / "tcu", tmp_path / "in.csv"
+    assert main(["export", str(twin), "--to", "c", "--log", str(log), "--inputs", str(path),
+                 "-o", str(to)]) == 0  # fmt: skip
+    table = np.genfromtxt(path, delimiter=",", names=True, deletechars="")
+    assert list(table.dtype.names or ()) == ["time", *INPUTS]
+    known = load_twin(twin)
+    delay, card = known.parameters["te_delay"].value, load_card(log.with_suffix(".card.toml"))
+    assert delay is not None
+    torque = read_log(log, card)["engine_torque"].updates
+    acting = np.interp(table["time"], torque.time - delay, torque.values)
+    assert table["engine_torque"] == pytest.approx(acting, abs=1e-6 * np.abs(acting).max())
+    assert f"advance the logged signal by {delay:.5g} s" in (to / "dt_twin.c").read_text()
+
+
+def test_inputs_without_a_log_are_refused(identified: tuple[Path, Path], tmp_path: Path) -> None:
+    arguments = ["export", str(identified[1]), "--to", "c", "-o", str(tmp_path / "tcu")]
+    assert main([*arguments, "--inputs", str(tmp_path / "in.csv")]) == 2

@@ -10,7 +10,7 @@ import typer
 
 from drivetwin.cli.arguments import ChannelsFile, DropPart, TwinFile, load_plant, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, Where
 from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.names import Names
 from drivetwin.export.platforms import Platform
@@ -62,6 +62,15 @@ _Log = Annotated[
         help="For models: log with the initial state; fmu and modelica contain its shift.",
     ),
 ]
+_Inputs = Annotated[
+    Path | None,
+    typer.Option(
+        "--inputs",
+        metavar="FILE",
+        help="For models, with --log: also write the inputs of the log's shift as the model takes "
+        "them (CSV), delays removed.",
+    ),
+]
 _Platforms = Annotated[
     list[Platform] | None,
     typer.Option("--platform", help="For fmu: target platform, built by zig; repeatable."),
@@ -80,6 +89,7 @@ def export(
     template: _Template = None,
     shift: _Shift = None,
     log: _Log = None,
+    inputs: _Inputs = None,
     channels: ChannelsFile = None,
     fmi: Annotated[
         FmiVersion, typer.Option("--fmi", help="For fmu: version of the standard.")
@@ -101,18 +111,23 @@ def export(
             case Target.C:
                 from drivetwin.export.c import write_c
 
-                write_c(_load_subject(model, shift, log, channels)[0], path)
+                subject, experiment = _load_subject(model, shift, log, channels)
+                write_c(subject, path)
+                _write_inputs(subject, experiment, inputs)
                 listed: dict[str, object] = {}
             case Target.FMU:
                 from drivetwin.export.fmu.build import BuildOptions, build_fmu
 
                 subject, experiment = _load_subject(model, shift, log, channels)
                 build_fmu(subject, path, BuildOptions(fmi, tuple(platforms or ()), experiment))
+                _write_inputs(subject, experiment, inputs)
                 listed = {"fmi": fmi.value}
             case Target.MODELICA:
                 from drivetwin.export.modelica.dual_clutch import write_modelica
 
-                write_modelica(*_load_subject(model, shift, log, channels), path)
+                subject, experiment = _load_subject(model, shift, log, channels)
+                write_modelica(subject, experiment, path)
+                _write_inputs(subject, experiment, inputs)
                 listed = {}
             case _:
                 content = _collect_parameters(model, names, powertrain)
@@ -125,6 +140,19 @@ def export(
         print_json({"file": str(path), **listed})
     else:
         print_line(f"wrote {path}")
+
+
+def _write_inputs(subject: Subject, experiment: Experiment | None, path: Path | None) -> None:
+    """Write the inputs of the log's shift, if they are asked for. Raises InputError without one."""
+    if path is None:
+        return
+    if experiment is None:
+        raise InputError("--inputs needs a log", "name it with --log", Where(key="--inputs"))
+    from drivetwin._util.atomic import write_text
+    from drivetwin.export.fmu.experiment import format_inputs
+
+    write_text(path, format_inputs(subject, experiment))
+    print_line(f"wrote {path}")
 
 
 def _collect_parameters(twin: Twin, names: Names, powertrain: str | None) -> ParameterSet:

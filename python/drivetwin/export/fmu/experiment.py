@@ -139,6 +139,16 @@ _SPEEDS = ("engine_speed", "output_speed", "wheel_speed", "twist", "shaft_torque
 """Fields of a trajectory in the order of the FMU's first outputs."""
 
 
+def format_inputs(subject: Subject, experiment: Experiment) -> str:
+    """Format the inputs of a log as the exported model takes them, at the instants they act.
+
+    Columns are the time [s] and the inputs by their names in the FMU [N m, Pa]; importers of FMUs
+    and the runner of the C sources read the table.
+    """
+    inputs = [one for one in list_variables(subject) if one.role is Role.INPUT]
+    return _format_csv(inputs, experiment.time, experiment.inputs).decode()
+
+
 def _format_csv(variables: Sequence[Variable], time: FloatArray, table: FloatArray) -> bytes:
     """Rows that read back as the same doubles."""
     rows = np.column_stack((time, table)).tolist()

@@ -10,7 +10,7 @@ from drivetwin.errors import NoShiftError, Where
 from drivetwin.export.fixed_step import Stepping, get_start_state, sample_inputs
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.input_kind import DEFAULT_STEP
-from drivetwin.export.subject import Subject
+from drivetwin.export.subject import InputDelays, Subject, build_note
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import simulate_shift
@@ -37,10 +37,12 @@ def build_measured_subject(
     name = f"{wanted[0].start_gear}-{wanted[0].end_gear}"
     source = PurePath(log.source).name
     time, inputs = sample_inputs(shift, Stepping(DEFAULT_STEP))
+    delays = InputDelays.from_twin(twin)
     subject = Subject(
         name=f"{twin.name} {name}",
         model=shift.model,
         start=get_start_state(shift),
-        note=f"identified by the {twin.method} method, loss law {shift.model.loss_law}",
+        note=build_note(twin, delays),
+        delays=delays,
     )
     return subject, Experiment(f"shift {name} of {source}", time, inputs, DEFAULT_STEP)

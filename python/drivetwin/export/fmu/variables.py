@@ -11,7 +11,7 @@ from enum import StrEnum
 
 from drivetwin.export.entries import Entry, get_lock_index, list_entries, start_entries
 from drivetwin.export.parameters.spelling import make_distinct, to_ascii_line, to_one_line
-from drivetwin.export.subject import Subject
+from drivetwin.export.subject import InputDelays, Subject
 
 INPUTS, OUTPUTS, MODES, LOSS_LAW, LOCKED, START, PARAMETERS = 1, 10, 30, 40, 41, 50, 100
 INF = math.inf
@@ -75,7 +75,7 @@ def list_variables(subject: Subject) -> tuple[Variable, ...]:
     spelled = make_structured_names(elements)
     names = list(spelled.values())
     return (
-        *_list_inputs(names),
+        *_list_inputs(names, subject.delays),
         *_list_outputs(names),
         Variable(
             "loss_law",
@@ -141,14 +141,14 @@ def _build_parameter(
     )
 
 
-def _list_inputs(names: list[str]) -> list[Variable]:
+def _list_inputs(names: list[str], delays: InputDelays) -> list[Variable]:
     def of(name: str, index: int, meaning: str, unit: str) -> Variable:
         return Variable(name, INPUTS + index, Kind.REAL, Role.INPUT, meaning, unit, 0.0)
 
-    pressures = (
-        of(f"{name}.pressure", i, "gauge pressure", "Pa") for i, name in enumerate(names, 1)
-    )
-    return [of("engine_torque", 0, "indicated less friction", "N*m"), *pressures]
+    pressure = ", ".join(filter(None, ("gauge pressure", delays.describe_pressure())))
+    torque = ", ".join(filter(None, ("indicated less friction", delays.describe_torque())))
+    pressures = (of(f"{name}.pressure", i, pressure, "Pa") for i, name in enumerate(names, 1))
+    return [of("engine_torque", 0, torque, "N*m"), *pressures]
 
 
 def _list_outputs(names: list[str]) -> list[Variable]:
