@@ -31,7 +31,7 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.estimation.result.verdict import apply_errors
 from drivetwin.findings import Code, Finding, report
-from drivetwin.parameters import get_parameter_spec
+from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.vehicle.spec import PriorValue
 
@@ -48,6 +48,15 @@ NEAR = (
     f"of longer gears no more than {BEFORE:g} s before a shift and {AFTER:g} s after it count, as "
     "far as the converter is closed and all inputs are recorded"
 )
+ACCELERATION_ERROR = (
+    "J′ and η hold if the engine torque has no error in proportion to the engine acceleration: "
+    "such an error acts as an inertia"
+)
+COMMON_GAIN = (
+    "inertias, T_v/i_f, k_o, c_o and μ times gain hold if engine and output torque have no common "
+    "gain error, which scales all of them; η, delays, P0, f_d and ζ do not depend on it"
+)
+"""Degenerate errors: the log contains nothing that shows them."""
 GROWS = "grows with the square of the wheel speed and else "
 """Clause added to the assumptions if an aerodynamic load term was estimated."""
 
@@ -259,7 +268,10 @@ def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet)
         "μ is for the clutch gains on the card: the log determines μ times the gain",
         f"the load torque {grows}is constant over {'each shift' if found.loads else 'the log'}",
         "the off-going element carries no torque once its pressure is below P0",
+        ACCELERATION_ERROR,
     ]
+    if not any(name.endswith(OVER_ETA) for name in found.estimates):
+        texts.append(COMMON_GAIN)
     if method is Method.PAPER:
         texts.append("T_c = T_o/i_out in the inertia phase (eq. 16), P0 as on the card")
     else:

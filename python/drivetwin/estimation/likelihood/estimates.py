@@ -60,6 +60,7 @@ from drivetwin.estimation.result.friction_verdict import (
 from drivetwin.estimation.result.joint import JointCovariance
 from drivetwin.estimation.result.prior_conflict import report_refined
 from drivetwin.estimation.result.prior_update import PRIOR
+from drivetwin.estimation.result.spread import EXPLAINED
 from drivetwin.estimation.result.verdict import (
     add_systematic,
     apply_errors,
@@ -102,14 +103,17 @@ def build_estimates(
     slips = find_reference_slips(fit, linear)
     own = _fit_parameters(fit, corrected, signals, drivelines, slips)
     sensors = None if correction is None else correct_fit(fit, priors.drop_effects())
-    if sensors is not None:
+    if sensors is not None and sensors.step.chi2 <= EXPLAINED:
         plain = _fit_parameters(fit, sensors, signals, drivelines, slips)
         if _is_card_likelier(plain.fitted, corrected):
             corrected, own = sensors, plain
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     curves = build_friction_curves(fit, linear, corrected)
-    estimates = fitted.downgrade_conflicts(assess_friction(fitted.assess(), curves))
     ids = fitted.ids
+    withdrawn = find_unreliable(corrected, ids, matrix, std)
+    subjects = {one.subject for one in withdrawn}
+    conflicts = fitted.list_conflicts(subjects)
+    estimates = fitted.downgrade_conflicts(assess_friction(fitted.assess(), curves), conflicts)
     limits = [
         one
         for one in find_at_bounds(fit, ids, matrix)
@@ -122,10 +126,9 @@ def build_estimates(
         *check_residuals(fit, labels, corrected.residuals, *likeliest),
         *check_weighting(fit, labels),
         *(() if correction is not None else (report(Code.EFFECTS_OMITTED),)),
-        *(withdrawn := find_unreliable(corrected, ids, matrix, std)),
+        *withdrawn,
     )
     doubt = dict(zip(ids, compute_doubt(corrected, matrix).tolist(), strict=True))
-    subjects = {one.subject for one in withdrawn}
     for name in ids if "" in subjects else subjects:
         estimates[name] = add_systematic(estimates[name], doubt[name])
     estimates = apply_errors(estimates, (*limits, *disagreements))
@@ -138,7 +141,7 @@ def build_estimates(
         compute_correlation(own.covariance),
         (
             *dict.fromkeys(fitted.notes.values()),
-            *(one.finding for one in fitted.conflicts),
+            *(one.finding for one in conflicts),
             *limits,
             *(() if cause is None else (report_cause(cause, corrected, values, matrix, std),)),
             *(one for one in disagreements if one.subject not in estimates),
@@ -213,6 +216,7 @@ def _fit_parameters(
         notes=check_excitation(signals),
         method=METHOD,
         prior_method=WITH_PRIOR,
+        total=covariance,
     )
     return _ReportedParameters(fitted, values, matrix, covariance, std, joint)
 

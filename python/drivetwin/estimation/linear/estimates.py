@@ -95,7 +95,7 @@ def assess_shifts(
     estimates = fit.assess()
     estimates |= _replace_impossible(fit)
     estimates |= _select_design_values(estimates, fit)
-    estimates = fit.downgrade_conflicts(estimates)
+    estimates = fit.downgrade_conflicts(estimates, fit.conflicts)
     loads = collect_different_loads(shifts)
     for name, why in _find_misfits(shifts, signals, ids).items():
         estimates[name] = reject_identified(estimates[name], why)

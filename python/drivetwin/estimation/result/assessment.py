@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,7 +26,8 @@ class FittedParameters:
 
     `systematic` are the standard deviations from sensor tolerances and effects by id, `notes`
     findings by id. `method` names the estimator, `prior_method` that of parameters whose design
-    value took part.
+    value took part. `total` (q, q) is the covariance with tolerances and effects; None where only
+    their standard deviations are known.
     """
 
     ids: tuple[str, ...]
@@ -38,6 +39,7 @@ class FittedParameters:
     notes: Mapping[str, Finding]
     method: str
     prior_method: str
+    total: FloatArray | None = None
 
     @cached_property
     def priors(self) -> dict[str, PriorValue]:
@@ -47,7 +49,9 @@ class FittedParameters:
 
     @cached_property
     def conflicts(self) -> tuple[Contradiction, ...]:
-        """Design values that the log contradicts."""
+        """Design values that the log contradicts, by all that is uncertain."""
+        if self.total is not None:
+            return find_contradictions(self.ids, self.values, self.total, self.priors, {})
         return find_contradictions(
             self.ids, self.values, self.covariance, self.priors, self.systematic
         )
@@ -57,9 +61,19 @@ class FittedParameters:
         rows = zip(self.ids, self.values.tolist(), self.std.tolist(), strict=True)
         return {name: self._assess_parameter(name, value, std) for name, value, std in rows}
 
-    def downgrade_conflicts(self, estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    def list_conflicts(self, withdrawn: Collection[str]) -> tuple[Contradiction, ...]:
+        """List the contradicted design values whose own estimates are not `withdrawn`.
+
+        An empty id withdraws all: a model that does not explain the log accuses no entry.
+        """
+        kept = () if "" in withdrawn else self.conflicts
+        return tuple(one for one in kept if one.id not in withdrawn)
+
+    def downgrade_conflicts(
+        self, estimates: Mapping[str, Estimate], conflicts: Sequence[Contradiction]
+    ) -> dict[str, Estimate]:
         """Return the estimates, none identified that a contradicted design value decides."""
-        return apply_contradictions(estimates, self.conflicts, self.prior_method)
+        return apply_contradictions(estimates, conflicts, self.prior_method)
 
     def _assess_parameter(self, name: str, value: float, std: float) -> Estimate:
         prior, systematic = self.priors.get(name), self.systematic.get(name)

@@ -27,4 +27,5 @@ EFFECT = Effect(
     build,
     curved=True,
     signed=True,
+    negative="negative: the output torque is early",
 )

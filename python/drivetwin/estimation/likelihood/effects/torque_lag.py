@@ -56,4 +56,5 @@ EFFECT = Effect(
     power=2.0,
     curved=True,
     signed=True,
+    negative="negative: the logged engine torque lags the acting one",
 )
