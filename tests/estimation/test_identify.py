@@ -15,7 +15,7 @@ from drivetwin.errors import IdentificationError, NoShiftError
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.prepare import build_driveline
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.identify import ALL_BEFORE_LOSS
+from drivetwin.estimation.identify import ACCELERATION_ERROR, ALL_BEFORE_LOSS, COMMON_GAIN
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import WITH_ETA, build_estimates
 from drivetwin.estimation.linear.pipeline import IntegralShift
@@ -253,6 +253,7 @@ def test_the_law_that_could_tell_the_gearbox_side_apart_says_that_it_is_not() ->
     log, card, shifts = recording("truck_a")
     other = identify(log, replace(card, loss_law="dissipative"), shifts, Method.INTEGRAL)
     assert ALL_BEFORE_LOSS in other.assumptions
+    assert {ACCELERATION_ERROR, COMMON_GAIN} <= set(other.assumptions)
     assert ALL_BEFORE_LOSS not in identified("truck_a", Method.INTEGRAL).assumptions
 
 

@@ -76,7 +76,9 @@ def test_an_estimate_that_is_off_the_card_although_it_is_as_wide_is_told() -> No
     values, covariance = np.array([29.9]), np.array([[0.2**2]])
     assert remove_prior(values, covariance, 0, design) is None
     (found,) = find_contradictions(("J_out",), values, covariance, {"J_out": design}, {})
-    assert found.apart == pytest.approx((29.9 - 1.35) / 0.135)
+    assert found.apart == pytest.approx((29.9 - 1.35) / 0.2)
+    wide = np.array([[20.0**2]])
+    assert find_contradictions(("J_out",), values, wide, {"J_out": design}, {}) == ()
     estimates = {"J_out": from_prior("J_out", PriorValue(29.9, 0.2), Code.CARD_DOMINATES)}
     told = apply_contradictions(estimates, [found], "integral")["J_out"]
     assert (told.verdict, told.value, told.method) == (Verdict.WEAK, 29.9, "integral")

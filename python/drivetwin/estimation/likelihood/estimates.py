@@ -26,6 +26,7 @@ from drivetwin.estimation.likelihood.effects.causes import (
 )
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
+from drivetwin.estimation.likelihood.effects.rival_causes import widen_by_rivals
 from drivetwin.estimation.likelihood.effects.withdrawal import compute_doubt, find_unreliable
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.selection.loss_law import check_other_law
@@ -100,13 +101,17 @@ def build_estimates(
     """
     correction = correct_fit(fit, priors)
     corrected = correction or keep_fit(fit)
+    cause = find_cause(corrected, fit)
+    predicted = corrected
+    corrected = widen_by_rivals(corrected, fit, cause)
     slips = find_reference_slips(fit, linear)
     own = _fit_parameters(fit, corrected, signals, drivelines, slips)
     sensors = None if correction is None else correct_fit(fit, priors.drop_effects())
     if sensors is not None and sensors.step.chi2 <= EXPLAINED:
         plain = _fit_parameters(fit, sensors, signals, drivelines, slips)
         if _is_card_likelier(plain.fitted, corrected):
-            corrected, own = sensors, plain
+            corrected, own, predicted = sensors, plain, sensors
+            cause = find_cause(corrected, fit)
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     curves = build_friction_curves(fit, linear, corrected)
     ids = fitted.ids
@@ -120,7 +125,6 @@ def build_estimates(
         if estimates[one.subject].verdict is not Verdict.DESIGN
     ]
     labels = collect_shift_labels(signals)
-    cause = find_cause(corrected, fit)
     likeliest = () if cause is None else (describe_cause(cause), get_advice(cause))
     disagreements = (
         *check_residuals(fit, labels, corrected.residuals, *likeliest),
@@ -154,7 +158,7 @@ def build_estimates(
         ),
         _build_load_law(fit, corrected),
         collect_loads(fit),
-        predict_spread(fit, corrected),
+        predict_spread(fit, predicted),
         cause,
         own.joint,
     )

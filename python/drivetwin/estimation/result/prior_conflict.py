@@ -77,7 +77,7 @@ def find_contradictions(
         freed = remove_prior(values, covariance, k, design)
         log = PriorValue(float(values[k]), float(np.sqrt(covariance[k, k])))
         without: dict[str, float] = {}
-        spread = float(np.hypot(design.std, sensors))
+        spread = float(max(np.hypot(design.std, sensors), log.std))
         if freed is not None:
             log = PriorValue(float(freed[0][k]), float(np.sqrt(freed[1][k, k])))
             without = dict(zip(ids, freed[0].tolist(), strict=True))

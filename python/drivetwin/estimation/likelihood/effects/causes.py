@@ -101,8 +101,8 @@ def _is_part_implausible(fit: LikelihoodFit, effect: EffectId | None) -> bool:
     own = slice(fit.plant.index, None)  # the unknowns of the part come last, its size first
     below, above = locate_bounds(fit)
     prior = fit.problem.prior
-    apart = np.abs(fit.point.values - prior.mean) * np.sqrt(np.diag(prior.precision))
-    return bool(np.any((below | above | (apart > WITHDRAWAL.sizes))[own]))
+    apart = np.abs(fit.point.values - prior.mean)[own] * np.sqrt(np.diag(prior.precision))[own]
+    return bool(np.any((below | above)[own] | (apart > WITHDRAWAL.sizes)))
 
 
 def _compute_cosine(one: GroupEvidence, other: GroupEvidence) -> float:
