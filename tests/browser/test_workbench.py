@@ -234,7 +234,9 @@ def test_a_claim_of_two_gigabytes_is_refused_at_once(bench: Bench, refusing: Pag
     connection.putrequest("POST", "/upload/log?name=log.mf4")
     connection.putheader("Content-Length", str(2 * 10**9))
     connection.putheader("X-Drivetwin-Session", key)
-    connection.putheader("Cookie", place.query.replace("token=", "drivetwin-token="))
+    (cookie,) = refusing.context.cookies()
+    connection.putheader("Cookie", f"{cookie['name']}={cookie['value']}")
+    connection.putheader("X-Drivetwin-Key", refusing.evaluate("localStorage['drivetwin-key']"))
     connection.endheaders(b"MDF     ")
     answer = connection.getresponse()
     assert answer.status == 400

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from flask.testing import FlaskClient
 
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
@@ -52,3 +54,11 @@ def finish(session: Session) -> None:
     while session.job is not None:
         session.collect_job_results()
         time.sleep(0.02)
+
+
+def enter(client: FlaskClient, token: str, base_url: str = "http://127.0.0.1:8050") -> None:
+    """Open the link as a browser does: keep the cookie, and send the key with every request."""
+    answer = client.get(f"/?token={token}", base_url=base_url)
+    found = re.search(r"#key=([\w-]+)", answer.text)
+    assert found, answer.text
+    client.environ_base["HTTP_X_DRIVETWIN_KEY"] = found.group(1)

@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from flask.testing import FlaskClient
 
-from drivetwin.workbench.access_control import Access, is_loopback, is_own_host
+from drivetwin.workbench.access_control import KEY_HEADER, Access, is_loopback, is_own_host
 from drivetwin.workbench.server import build_server
 from drivetwin.workbench.views.page import Start
 from drivetwin.workbench.workspace_folder import Folder
+from tests.workbench.conftest import enter
 
 HERE = "http://127.0.0.1:8050"
 ROUTES = (
@@ -40,7 +42,7 @@ def test_own_names_on_loopback(named: str) -> None:
 @pytest.mark.parametrize(
     "named",
     ["evil.example", "evil.example:8050", "localhost.evil.example", "192.168.1.5:8050", "",
-     "127.0.0.1.nip.io", "0.0.0.0:8050", "[", "[::1", "127.0.0.1@evil.example", "user@evil:1"],
+     "127.0.0.1.nip.io", "0.0.0.0:8050", "127.0.0.1:x", "127.0.0.1:99999", "[", "[::1", "127.0.0.1@evil.example", "user@evil:1"],
 )  # fmt: skip
 def test_foreign_names_on_loopback(named: str) -> None:
     assert not is_own_host(named, "127.0.0.1")
@@ -78,11 +80,13 @@ def test_no_route_answers_without_the_token(client: FlaskClient, route: str, met
     assert "Set-Cookie" not in answer.headers
 
 
+@pytest.mark.parametrize("name", ["drivetwin-token", "drivetwin-8050"])
 @pytest.mark.parametrize(
-    "cookie", ["", "wrong", "right ", "RIGHT", "rightright", "\u00e9", "x" * 9999]
+    "cookie", ["", "right", "wrong", "right ", "RIGHT", "rightright", "\u00e9", "x" * 9999]
 )
-def test_another_cookie_is_refused(client: FlaskClient, cookie: str) -> None:
-    headers = {"Cookie": f"drivetwin-token={cookie}"}
+def test_another_cookie_is_refused(client: FlaskClient, cookie: str, name: str) -> None:
+    enter(client.application.test_client(), "right")
+    headers = {"Cookie": f"{name}={cookie}"}
     assert client.get("/", base_url=HERE, headers=headers).status_code == 403
 
 
@@ -91,12 +95,80 @@ def test_another_cookie_is_refused(client: FlaskClient, cookie: str) -> None:
 )
 def test_the_link_opens_the_page(client: FlaskClient, headers: dict[str, str]) -> None:
     answer = client.get("/?token=right", base_url=HERE, headers=headers)
-    assert answer.status_code == 302
-    assert answer.headers["Location"] == "/"
-    assert "HttpOnly" in answer.headers["Set-Cookie"]
+    assert answer.status_code == 200
+    assert answer.headers["Cache-Control"] == "no-store"
+    set_cookie = answer.headers["Set-Cookie"]
+    assert set_cookie.startswith("drivetwin-8050=")
+    assert "HttpOnly" in set_cookie
+    assert "SameSite=Strict" in set_cookie
     for route in ("/", "/assets/controls.js", "/_dash-layout"):
         with client.get(route, base_url=HERE) as page:
             assert page.status_code == 200
+
+
+def test_neither_cookie_nor_key_is_the_token_and_each_browser_has_its_own(
+    client: FlaskClient,
+) -> None:
+    secrets: list[str] = []
+    for _ in range(2):
+        answer = client.get("/?token=right", base_url=HERE)
+        assert "right" not in str(answer.headers) + answer.text
+        secrets += re.findall(r"#key=([\w-]+)\"><", answer.text)
+        secrets += re.findall(r"drivetwin-8050=([\w-]+)", answer.headers["Set-Cookie"])
+    assert len(set(secrets)) == 4
+    assert min(map(len, secrets)) >= 43
+
+
+def test_the_cookie_alone_reads_no_data(client: FlaskClient) -> None:
+    """A program on another port receives the cookie, yet no page of it has the key."""
+    enter(client, "right")
+    key = client.environ_base.pop("HTTP_X_DRIVETWIN_KEY")
+    for route in ("/upload/log", "/_dash-update-component"):
+        for given in ({}, {KEY_HEADER: ""}, {KEY_HEADER: "right"}, {KEY_HEADER: "\u00e9"}):
+            answer = client.post(route, base_url=HERE, headers=given, json={})
+            assert answer.status_code == 403
+        answer = client.post(route, base_url=HERE, headers={KEY_HEADER: key}, json={})
+        assert answer.status_code != 403
+    client.delete_cookie("drivetwin-8050", domain="127.0.0.1")
+    answer = client.post("/upload/log", base_url=HERE, headers={KEY_HEADER: key})
+    assert answer.status_code == 403
+
+
+def test_get_serves_no_data(client: FlaskClient) -> None:
+    """The cookie alone is enough for these routes: files of the program and the empty page."""
+    rules = client.application.url_map.iter_rules()
+    assert {str(rule) for rule in rules if "GET" in (rule.methods or ())} == {
+        "/", "/<path:path>", "/_dash-layout", "/_dash-dependencies", "/_reload-hash",
+        "/_favicon.ico", "/assets/<path:filename>", "/static/<path:filename>",
+        "/_dash-component-suites/<string:package_name>/<path:fingerprinted_path>",
+    }  # fmt: skip
+
+
+def test_two_workbenches_in_one_browser(client: FlaskClient, place: Path) -> None:
+    """Cookies of a host go to all its ports; each workbench finds its own and no other counts."""
+    there = "http://127.0.0.1:8051"
+    app, sessions = build_server(Folder.from_path(place), Start(), Access(token="other"))
+    second = app.server.test_client()
+    enter(client, "right")
+    enter(second, "other", there)
+    first_cookie = client.get_cookie("drivetwin-8050", domain="127.0.0.1")
+    second_cookie = second.get_cookie("drivetwin-8051", domain="127.0.0.1")
+    assert first_cookie is not None
+    assert second_cookie is not None
+    client.set_cookie("drivetwin-8051", second_cookie.value, domain="127.0.0.1")
+    second.set_cookie("drivetwin-8050", first_cookie.value, domain="127.0.0.1")
+    assert client.get("/", base_url=HERE).status_code == 200
+    assert second.get("/", base_url=there).status_code == 200
+    second.set_cookie("drivetwin-8051", first_cookie.value, domain="127.0.0.1")
+    assert second.get("/", base_url=there).status_code == 403
+    sessions.close()
+
+
+@pytest.mark.parametrize("site", ["same-site", "cross-site"])
+def test_a_page_of_another_port_loads_nothing(client: FlaskClient, site: str) -> None:
+    enter(client, "right")
+    headers = {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": "no-cors"}
+    assert client.get("/_dash-layout", base_url=HERE, headers=headers).status_code == 403
 
 
 def test_the_token_is_new_each_time_and_in_no_log() -> None:

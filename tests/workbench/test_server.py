@@ -21,7 +21,7 @@ from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.page import Start
 from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.bad_files import TABLE, bad_files
-from tests.workbench.conftest import CARD
+from tests.workbench.conftest import CARD, enter
 
 BAD = bad_files()
 TOKEN = "secret"
@@ -57,7 +57,7 @@ class Bench:
 def bench(place: Path) -> Iterator[Bench]:
     app, sessions = build_server(Folder.from_path(place), Start(), Access(token=TOKEN))
     client = app.server.test_client()
-    client.set_cookie("drivetwin-token", TOKEN, domain="127.0.0.1")
+    enter(client, TOKEN)
     yield Bench(client, sessions, sessions.create())
     sessions.close()
 

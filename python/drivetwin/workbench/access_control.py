@@ -5,28 +5,39 @@ A page of another site can make a browser send requests here, under a name that 
 this machine (DNS rebinding). Such a request carries that name as its host and is refused.
 
 Other users of the machine, and other machines, can reach the port. The link that the program prints
-contains a random token; the page that it opens gets a cookie with the token. A request without the
-cookie is refused, whatever it asks for.
+contains a random token. A browser that opens it gets two secrets of its own in exchange: one in a
+cookie, one (the key) in the fragment of an address, which the page moves into the storage of its
+origin. Browsers send the cookies of a host to all its ports, so that a program of another user on
+another port can receive the cookie. The storage belongs to one port. Therefore the cookie alone
+opens the empty page; every request that reads or changes data needs the key as well.
 """
 
 from __future__ import annotations
 
+import hashlib
 import hmac
 import ipaddress
 import json
 import secrets
 from dataclasses import dataclass, field
-from typing import cast
 from urllib.parse import urlsplit
 
-from flask import Flask, Response, redirect, request
+from flask import Flask, Response, request
 from werkzeug.exceptions import HTTPException
 
 MAX_REQUEST = 4 * 2**20
 """Bytes of a request that is no upload."""
 LOCAL = "localhost"
-_COOKIE = "drivetwin-token"
+KEY_HEADER = "X-Drivetwin-Key"
+_COOKIE = "drivetwin-{port}"
+"""Name of the cookie by the port that the browser asked: two workbenches have two cookies."""
 _TOKEN_FIELD = "token"
+_ENTRANCE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>drivetwin</title>
+<meta http-equiv="refresh" content="0; url=/#key={0}"></head><body><a href="/#key={0}">workbench</a>
+</body></html>
+"""
+"""Page that leads on from the link. A redirect would be part of a navigation from elsewhere, to which
+browsers add no SameSite=Strict cookie."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +66,34 @@ class Access:
         return hmac.compare_digest((given or "").encode(errors="replace"), self.token.encode())
 
 
+@dataclass(frozen=True)
+class _Browsers:
+    """Digests of the secrets of the browsers that opened the link.
+
+    A browser that opens the link twice has two pairs for a moment, hence no pairing.
+    """
+
+    cookies: set[bytes] = field(default_factory=set)
+    keys: set[bytes] = field(default_factory=set)
+
+    def admit(self) -> tuple[str, str]:
+        """Return cookie and key of one more browser."""
+        cookie, key = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
+        self.cookies.add(_digest(cookie))
+        self.keys.add(_digest(key))
+        return cookie, key
+
+
+def _digest(secret: str) -> bytes:
+    return hashlib.sha256(secret.encode(errors="replace")).digest()
+
+
 def protect(server: Flask, access: Access, script_hashes: list[str]) -> None:
     """Refuse strangers, bound requests, and let pages load nothing from outside.
 
-    Strangers are foreign hosts and origins, and requests without the token.
+    Strangers are foreign hosts and origins, and requests without cookie and key.
     """
+    browsers = _Browsers()
     server.config["MAX_CONTENT_LENGTH"] = MAX_REQUEST
     policy = _build_policy(script_hashes)
 
@@ -69,7 +103,7 @@ def protect(server: Flask, access: Access, script_hashes: list[str]) -> None:
             return make_refusal(421, f"this server does not answer to the name {request.host!r}")
         if _is_cross_site():
             return make_refusal(403, "this request comes from another site")
-        return _admit(access)
+        return _admit(access, browsers)
 
     @server.after_request
     def close_in(response: Response) -> Response:
@@ -83,7 +117,10 @@ def protect(server: Flask, access: Access, script_hashes: list[str]) -> None:
 
 
 def _is_cross_site() -> bool:
-    """Return True if a page of another site made the request; links to the page may be anywhere."""
+    """Return True if a page of another site or port made the request.
+
+    Links to the page may be anywhere. To browsers another port of the same host is the same site.
+    """
     origin = request.headers.get("Origin")
     if origin is not None:
         try:
@@ -92,20 +129,33 @@ def _is_cross_site() -> bool:
             return True
     if request.method == "GET" and request.headers.get("Sec-Fetch-Mode") == "navigate":
         return False
-    return request.headers.get("Sec-Fetch-Site") == "cross-site"
+    return request.headers.get("Sec-Fetch-Site") in ("cross-site", "same-site")
 
 
-def _admit(access: Access) -> Response | None:
-    """Return None for holders of the cookie, the cookie for holders of the link, else a refusal."""
+def _admit(access: Access, browsers: _Browsers) -> Response | None:
+    """Return None for a known browser, the page with its secrets for the link, else a refusal.
+
+    GET and HEAD serve the files of the page only, for which the cookie is enough.
+    """
+    name = _COOKIE.format(port=_get_port(request.host))
     if request.path == "/" and access.is_token(request.args.get(_TOKEN_FIELD)):
-        response = redirect("/")  # the token leaves the address bar
-        response.set_cookie(_COOKIE, access.token, httponly=True, samesite="Lax")
-        return cast(Response, response)
-    if access.is_token(request.cookies.get(_COOKIE)):
+        cookie, key = browsers.admit()
+        response = Response(_ENTRANCE.format(key), mimetype="text/html")
+        response.headers["Cache-Control"] = "no-store"
+        response.set_cookie(name, cookie, httponly=True, samesite="Strict")
+        return response
+    reads = request.method in ("GET", "HEAD")
+    has_key = reads or _digest(request.headers.get(KEY_HEADER, "")) in browsers.keys
+    if has_key and _digest(request.cookies.get(name, "")) in browsers.cookies:
         return None
     return make_refusal(
         403, "no access without the link -> open the link that `drivetwin app` printed when started"
     )
+
+
+def _get_port(host: str) -> int:
+    """Return the port of a checked host header."""
+    return urlsplit(f"//{host}").port or 80
 
 
 def is_own_host(named: str, host: str) -> bool:
@@ -115,7 +165,8 @@ def is_own_host(named: str, host: str) -> bool:
     If the server listens on this machine alone, the address must be one of this machine.
     """
     try:
-        name = urlsplit(f"//{named}").hostname or ""
+        parts = urlsplit(f"//{named}")
+        name, _ = parts.hostname or "", parts.port  # a port that is no number raises ValueError
     except ValueError:
         return False
     if name in (LOCAL, host.lower()):

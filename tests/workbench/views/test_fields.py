@@ -15,7 +15,7 @@ from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import build_server
 from drivetwin.workbench.views.page import Start
 from drivetwin.workbench.workspace_folder import Folder
-from tests.workbench.conftest import CARD, LOG
+from tests.workbench.conftest import CARD, LOG, enter
 
 HERE = "http://127.0.0.1:8050"
 VALUES: tuple[Any, ...] = (
@@ -37,7 +37,7 @@ class Bench:
             Folder.from_path(place), Start(), Access(token="right")
         )
         self.client = self.app.server.test_client()
-        self.client.set_cookie("drivetwin-token", "right", domain="127.0.0.1")
+        enter(self.client, "right")
         self.client.get("/_dash-dependencies", base_url=HERE)
         self.key = self.sessions.create()
         session = self.sessions.get(self.key)

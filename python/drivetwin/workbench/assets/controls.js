@@ -57,13 +57,23 @@
     document.getElementById(`nav-${view}`)?.click();
   });
 
+  /* The key of this browser comes in the fragment of the first address. The storage of the origin
+     keeps it, so that no page of another port has it; a request without it is refused. */
+  const KEY = "drivetwin-key";
+  if (location.hash.startsWith("#key=")) {
+    localStorage.setItem(KEY, location.hash.slice(5));
+    history.replaceState(null, "", location.pathname);
+  }
+
   /* All that the page asks passes here: without an answer it would stand still without a word. */
   const ask = window.fetch;
-  window.fetch = async (...request) => {
+  window.fetch = async (where, options = {}) => {
     try {
-      const answer = await ask(...request);
+      const headers = new Headers(options.headers);
+      headers.set("X-Drivetwin-Key", localStorage.getItem(KEY) ?? "");
+      const answer = await ask(where, { ...options, headers });
       if (answer.status === 403) {
-        say("the workbench was restarted -> open the new link from its terminal", true);
+        say("this browser has no access -> open the link from the terminal of the workbench", true);
       } else if (answer.status >= 500) {
         say("internal error of the workbench -> its terminal has the details", true);
       }
