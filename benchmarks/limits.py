@@ -99,7 +99,7 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.scenario_file import load_scenario
     from drivetwin.estimation.result.method import Method
-    from drivetwin.workbench.session import Sessions
+    from drivetwin.workbench.sessions import Sessions
     from drivetwin.workbench.workspace_folder import Folder
 
     with tempfile.TemporaryDirectory() as name:
@@ -122,7 +122,7 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
 
         median = statistics.median(timeit.repeat(slide_once, number=1, repeat=30))
         yield Figure("move of a slider", 1e3 * median, 100.0, "ms")
-        session.close()
+        sessions.close()
 
 
 def measure_mdf(gigabytes: str) -> Iterator[Figure]:

@@ -15,7 +15,8 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.result.method import Method
-from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.workspace_folder import Folder
 
 LOG, CARD = "bench.csv", "bench.card.toml"

@@ -42,7 +42,8 @@ def test_own_names_on_loopback(named: str) -> None:
 @pytest.mark.parametrize(
     "named",
     ["evil.example", "evil.example:8050", "localhost.evil.example", "192.168.1.5:8050", "",
-     "127.0.0.1.nip.io", "0.0.0.0:8050", "127.0.0.1:x", "127.0.0.1:99999", "[", "[::1", "127.0.0.1@evil.example", "user@evil:1"],
+     "127.0.0.1.nip.io", "0.0.0.0:8050", "127.0.0.1:x", "127.0.0.1:99999",
+     "[", "[::1", "127.0.0.1@evil.example", "user@evil:1"],
 )  # fmt: skip
 def test_foreign_names_on_loopback(named: str) -> None:
     assert not is_own_host(named, "127.0.0.1")

@@ -14,7 +14,8 @@ from drivetwin.authoring.answers import Key
 from drivetwin.errors import CardError, InputError, RefusedError
 from drivetwin.vehicle.card import load_card
 from drivetwin.workbench.card_form import CardForm
-from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import LOG
 

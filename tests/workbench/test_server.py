@@ -16,7 +16,8 @@ from flask.testing import FlaskClient
 from drivetwin.errors import DrivetwinError
 from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import SESSION_HEADER, build_server
-from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.page import Start
 from drivetwin.workbench.workspace_folder import Folder

@@ -17,8 +17,7 @@ from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
 from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.phases import Boundary, get_boundary_times
-from drivetwin.workbench.session import MOST_SESSIONS, MOST_UPLOADS, Session, Sessions
-from drivetwin.workbench.workspace_folder import Folder
+from drivetwin.workbench.session import MOST_UPLOADS, Session
 from tests.workbench.conftest import CARD, LOG, finish
 
 
@@ -209,28 +208,6 @@ def test_nothing_is_done_before_a_log_is_open(session: Session) -> None:
     ):
         with pytest.raises(InputError):
             action()
-
-
-def test_sessions_do_not_mix(place: Path) -> None:
-    sessions = Sessions(Folder.from_path(place))
-    one, other = (sessions.get(sessions.create()) for _ in range(2))
-    _open(one)
-    assert other.work.opened is None
-    assert one.scratch != other.scratch
-    sessions.close()
-    assert not one.scratch.exists()
-
-
-def test_unknown_keys_are_no_session_and_idle_ones_go(place: Path) -> None:
-    sessions = Sessions(Folder.from_path(place))
-    for key in (None, "", "x"):
-        with pytest.raises(RefusedError):
-            sessions.get(key)
-    keys = [sessions.create() for _ in range(MOST_SESSIONS + 1)]
-    assert keys[0] not in sessions
-    assert all(key in sessions for key in keys[1:])
-    assert len(set(keys)) == len(keys)
-    sessions.close()
 
 
 def test_old_uploads_are_removed(session: Session) -> None:

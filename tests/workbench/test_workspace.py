@@ -17,7 +17,8 @@ from drivetwin.errors import RefusedError
 from drivetwin.estimation.result.method import Method
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.phases import Boundary, get_boundary_times
-from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.workspace import load_workspace
 from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Signals that end a program: SIGTERM acts as Ctrl-C, and both wait where files are replaced."""
+"""Signals that end a program: all act as Ctrl-C, and wait where files are replaced."""
 
 from __future__ import annotations
 
@@ -8,19 +8,32 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_ENDING = (signal.SIGINT, signal.SIGTERM)
+ENDING = tuple(
+    signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+"""Signals that end a program: Ctrl-C, a request, a terminal that is closed."""
 _raised: list[int] = []
 """Signals for which `_interrupt` raised KeyboardInterrupt."""
 
 
 def interrupt_on_signals() -> None:
-    """Let SIGTERM raise KeyboardInterrupt as Ctrl-C does, and remember both.
+    """Let all signals of `ENDING` raise KeyboardInterrupt as Ctrl-C does, and remember them.
 
-    A SIGINT that the caller of the program ignores, as for jobs in the background, stays ignored.
+    A signal that the caller of the program ignores stays ignored: SIGINT of jobs in the background,
+    SIGHUP below nohup. SIGTERM is never ignored.
     """
-    signal.signal(signal.SIGTERM, _interrupt)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupt)
+    for one in ENDING:
+        if one is signal.SIGTERM or signal.getsignal(one) is not signal.SIG_IGN:
+            signal.signal(one, _interrupt)
+
+
+def ignore_interrupts() -> None:
+    """Ignore all signals of `ENDING` while the program cleans up.
+
+    A terminal that is closed sends more than one.
+    """
+    for one in ENDING:
+        signal.signal(one, signal.SIG_IGN)
 
 
 def was_interrupted() -> bool:
@@ -38,7 +51,7 @@ def defer_interrupts() -> Iterator[None]:
         yield
         return
     came: list[int] = []
-    before = {one: signal.signal(one, lambda number, _: came.append(number)) for one in _ENDING}
+    before = {one: signal.signal(one, lambda number, _: came.append(number)) for one in ENDING}
     try:
         yield
     finally:

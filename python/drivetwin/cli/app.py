@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Annotated, Any
 
 import typer
@@ -110,6 +111,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         code = stop.code if isinstance(stop.code, int) else 0
         if code == INTERRUPTED:
-            sys.stderr.write("interrupted; no file is half-written\n")
+            with suppress(OSError):  # the terminal may be closed
+                sys.stderr.write("interrupted; no file is half-written\n")
         return code
     return 0

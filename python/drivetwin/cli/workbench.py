@@ -3,17 +3,19 @@
 
 from __future__ import annotations
 
-import signal
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from drivetwin._util.interrupts import ignore_interrupts
 from drivetwin.cli.output import print_line, print_paragraph
 from drivetwin.errors import MissingExtraError
 
 if TYPE_CHECKING:
+    from werkzeug.serving import BaseWSGIServer
+
+    from drivetwin.workbench.access_control import Access
     from drivetwin.workbench.views.page import Start
     from drivetwin.workbench.workspace_folder import Folder
 
@@ -53,31 +55,44 @@ def workbench(
     --host.
     """
     _require_dash()
-    from drivetwin.workbench.access_control import Access, is_loopback
+    from drivetwin.workbench.access_control import Access
+    from drivetwin.workbench.jobs import end_all
+    from drivetwin.workbench.run_folder import remove_dead_folders
     from drivetwin.workbench.server import build_server, start_server
     from drivetwin.workbench.workspace_folder import Folder
 
     place = Folder.from_path(folder)
     access = Access(host)
+    remove_dead_folders()
     app, sessions = build_server(place, _make_start(place, log, vehicle, channels), access)
-    server = start_server(app, host, port)
+    try:
+        _serve(start_server(app, host, port), access, place, sessions.place.path, browser=browser)
+    except KeyboardInterrupt:
+        pass  # the way to end the program
+    finally:
+        ignore_interrupts()
+        end_all()
+        sessions.close()
+
+
+def _serve(
+    server: BaseWSGIServer, access: Access, place: Folder, private: Path, *, browser: bool
+) -> None:
+    """Print the link and answer requests until the program is ended."""
+    from drivetwin.workbench.access_control import is_loopback
+
     link = access.make_link(server.port)
     print_line(f"workbench at {link} , files of {place.root}; Ctrl-C ends it")
     print_line(access.describe())
-    if not is_loopback(host):
+    if not is_loopback(access.host):
         print_paragraph(
             "warning: the connection is not encrypted. Whoever reads the network traffic gets the "
             "link, and can read and write files of this folder"
         )
-    signal.signal(signal.SIGTERM, _stop_on_signal)
-    with tempfile.TemporaryDirectory(prefix="drivetwin-link-") as private:
-        try:
-            if browser:
-                _launch_browser(link, Path(private))
-            server.serve_forever()
-        finally:
-            server.server_close()
-            sessions.close()
+    with server:
+        if browser:
+            _launch_browser(link, private)
+        server.serve_forever()
 
 
 def _launch_browser(link: str, private: Path) -> None:
@@ -88,11 +103,6 @@ def _launch_browser(link: str, private: Path) -> None:
     page = private / "workbench.html"
     page.write_text(_LINK_PAGE.format(link), encoding="utf-8")
     typer.launch(page.as_uri())
-
-
-def _stop_on_signal(*_: object) -> None:
-    """End as after Ctrl-C: jobs stopped, temporary files removed."""
-    raise SystemExit(0)
 
 
 def _require_dash() -> None:

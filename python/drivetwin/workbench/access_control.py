@@ -36,8 +36,11 @@ _ENTRANCE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title
 <meta http-equiv="refresh" content="0; url=/#key={0}"></head><body><a href="/#key={0}">workbench</a>
 </body></html>
 """
-"""Page that leads on from the link. A redirect would be part of a navigation from elsewhere, to which
-browsers add no SameSite=Strict cookie."""
+"""Page that leads on from the link.
+
+A redirect would be part of a navigation from elsewhere, to which browsers add no SameSite=Strict
+cookie.
+"""
 
 
 @dataclass(frozen=True)

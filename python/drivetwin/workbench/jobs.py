@@ -8,7 +8,9 @@ parent and child; bytes of a user's file never take that way.
 from __future__ import annotations
 
 import multiprocessing
+import os
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable
@@ -73,7 +75,7 @@ class _Done:
     """The last message of a job that came to its end."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Job:
     """A running process. `share` and `text` are its progress, `fault` the cause of an early end."""
 
@@ -142,12 +144,17 @@ class Job:
         self._end()
 
     def _end(self) -> None:
+        _live.discard(self)
         self.finished = True
         self.pipe.close()
         self.process.join(_PATIENCE)
         if self.process.is_alive():
             self.process.kill()
             self.process.join()
+
+
+_live: set[Job] = set()
+"""Jobs whose process may run."""
 
 
 def start(work: Work, *arguments: object) -> Job:
@@ -159,12 +166,25 @@ def start(work: Work, *arguments: object) -> Job:
     )
     process.start()
     theirs.close()
-    return Job(process, ours)
+    job = Job(process, ours)
+    _live.add(job)
+    return job
 
 
 def call(work: Work, *arguments: object, limit: float) -> Any:
     """Run `work` in a separate process; return its only result. Raises InputError on failure."""
     return start(work, *arguments).collect_results(limit)[-1]
+
+
+def end_all() -> None:
+    """End the processes of all jobs; whoever waits for one gets its error."""
+    processes = [job.process for job in _live.copy()]
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        process.join(_PATIENCE)
+        if process.is_alive():
+            process.kill()
 
 
 def warm_up() -> None:
@@ -185,7 +205,16 @@ def _get_context() -> BaseContext:
     return context
 
 
+def _end_with_parent() -> None:
+    """End this process when the server is gone, also if that was killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
 def _run_child(pipe: Connection, work: Work, arguments: tuple[Any, ...]) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     last = 0.0
 
     def tell(share: float, text: str) -> None:

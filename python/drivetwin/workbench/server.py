@@ -16,7 +16,7 @@ from werkzeug.serving import BaseWSGIServer, make_server
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.workbench import jobs
 from drivetwin.workbench.access_control import Access, make_refusal, protect
-from drivetwin.workbench.session import Sessions
+from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_callback_requests, escape_callback_responses
 from drivetwin.workbench.views.page import Start, build_page
@@ -73,8 +73,8 @@ def _register_uploads(app: Dash, sessions: Sessions) -> None:
         request.max_content_length = sys.maxsize  # counted while it is received
         name = request.args.get("name", "")
         try:
-            session = sessions.get(request.headers.get(SESSION_HEADER))
-            key = session.store_upload(request.stream, name, request.content_length, limit)
+            with sessions.use(request.headers.get(SESSION_HEADER)) as session:
+                key = session.store_upload(request.stream, name, request.content_length, limit)
         except RefusedError as error:
             return make_refusal(400, str(error))
         return Response(json.dumps({"key": key, "name": name}), mimetype="application/json")

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""One session: its work, its running job, its own scratch folder. Sessions share nothing."""
+"""One session: its work, its running job, its own scratch folder."""
 
 from __future__ import annotations
 
+import pickle
 import secrets
 import shutil
-import tempfile
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any
 
-from drivetwin._util.atomic import write_text
+from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.channels.mapping_file import find_project_mapping
@@ -36,13 +37,16 @@ from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.workspace_folder import Folder
 from drivetwin.workbench.zoom import View
 
-MOST_SESSIONS = 16
-"""Maximum number of sessions; opening another closes the one that was idle longest."""
 MOST_UPLOADS = 8
 """Maximum number of uploads of a session; the oldest one that is not open is deleted.
 
 Above `MOST_LOGS`, as all logs and the card may be uploads.
 """
+
+
+_STORED = "session.pickle"
+_KEPT = ("work", "gearbox", "uploads", "form", "view")
+"""Attributes of a session that are stored; all else is computed again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +73,8 @@ class Session:
     preview: tuple[ColumnKey, Preview] | None = None
     view: View | None = None
     used: float = field(default_factory=time.monotonic)
+    users: int = 0
+    """Number of requests that act on the session at present."""
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     def store_upload(self, stream: IO[bytes], name: str, claimed: int | None, limit: int) -> str:
@@ -357,6 +363,30 @@ class Session:
             self.cancel()
             self._set(work)
 
+    def is_idle(self) -> bool:
+        """Return True if no request acts on the session and no job of it runs."""
+        if self.users:
+            return False
+        with suppress(InputError):  # the reason stays in the work
+            self.collect_job_results()
+        return self.job is None
+
+    def store(self) -> None:
+        """Write the session to its scratch folder, which only this user can read.
+
+        Raises OSError, and then the session is as it was.
+        """
+        content = pickle.dumps({name: getattr(self, name) for name in _KEPT})
+        write_bytes(self.scratch / _STORED, content)
+
+    @classmethod
+    def restore(cls, folder: Folder, scratch: Path) -> Session:
+        """Read a session that `store` wrote during this run of the program. Raises OSError."""
+        path = scratch / _STORED
+        kept = pickle.loads(path.read_bytes())
+        path.unlink()
+        return cls(folder, scratch, **kept)
+
     def close(self) -> None:
         """Stop what runs and remove the scratch folder."""
         self.cancel()
@@ -401,41 +431,3 @@ def _make_request(
         mapping=mapping or project,
         corrections=corrections,
     )
-
-
-@dataclass(eq=False)
-class Sessions:
-    """All sessions of a server by an unguessable key."""
-
-    folder: Folder
-    _held: dict[str, Session] = field(default_factory=dict)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
-
-    def create(self) -> str:
-        """Open a session and return its key."""
-        key = secrets.token_urlsafe(24)
-        scratch = Path(tempfile.mkdtemp(prefix="drivetwin-app-"))
-        with self._lock:
-            while len(self._held) >= MOST_SESSIONS:
-                idle = min(self._held, key=lambda one: self._held[one].used)
-                self._held.pop(idle).close()
-            self._held[key] = Session(self.folder, scratch)
-        return key
-
-    def __contains__(self, key: object) -> bool:
-        return isinstance(key, str) and key in self._held
-
-    def get(self, key: object) -> Session:
-        """A session by its key. Raises RefusedError for one that is not held."""
-        session = self._held.get(key) if isinstance(key, str) else None
-        if session is None:
-            raise RefusedError("this session has ended", "load the page again")
-        session.used = time.monotonic()
-        return session
-
-    def close(self) -> None:
-        """End all sessions."""
-        with self._lock:
-            for session in self._held.values():
-                session.close()
-            self._held.clear()

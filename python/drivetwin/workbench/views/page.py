@@ -12,7 +12,8 @@ from dash.development.base_component import Component
 from drivetwin.report.html import read_template
 from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.open_log import Source
-from drivetwin.workbench.session import Session, Sessions
+from drivetwin.workbench.session import Session
+from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.steps import Step
 from drivetwin.workbench.views import (
     card,
@@ -178,7 +179,8 @@ def _register_entry(app: Dash, sessions: Sessions, start: Start) -> None:
             return no_update
         fresh = sessions.create()
         if start.log is not None:
-            _open_first(sessions.get(fresh), start)
+            with sessions.use(fresh) as session:
+                _open_first(session, start)
         return fresh
 
 

@@ -9,8 +9,8 @@ from typing import Any
 from dash import Dash, Input, Output, State, html
 from dash.development.base_component import Component
 
-from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.session_state import SessionState
+from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.steps import Status, Step, StepState, assess_steps
 from drivetwin.workbench.views.widgets import Topic, make_attributes, make_topic_id
 

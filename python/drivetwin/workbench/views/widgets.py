@@ -23,7 +23,7 @@ from drivetwin.errors import DrivetwinError, Where
 from drivetwin.report.figure import Figure
 from drivetwin.workbench.open_log import OpenLog
 from drivetwin.workbench.page_words import replace_options
-from drivetwin.workbench.session import Sessions
+from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_fields
 
@@ -139,7 +139,8 @@ class Page:
         def register(callback: Callable[..., R]) -> Callable[..., R]:
             def act(*values: Any) -> R:
                 *given, key = values
-                return callback(self.sessions.get(key), *check_fields(callback, given))
+                with self.sessions.use(key) as session:
+                    return callback(session, *check_fields(callback, given))
 
             self.app.callback(
                 *arguments,

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""The end of the program: no child process and no temporary folder is left, whatever ends it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="children are listed in /proc")
+
+_BUSY = """
+import sys, threading, time
+from drivetwin.workbench import jobs, server
+from tests.workbench.test_ending import sleep_long
+begin = server.start_server
+
+def start(*given):
+    made = begin(*given)
+    jobs.start(sleep_long)
+    # A request that waits for a job, as one that opens a log does.
+    threading.Thread(target=jobs.call, args=(sleep_long,), kwargs={"limit": 300.0}).start()
+    return made
+
+server.start_server = start
+sys.argv = ["drivetwin", "app", "--port", "0", "--no-browser"]
+from drivetwin.__main__ import main
+sys.exit(main())
+"""
+
+
+def sleep_long(_: object) -> None:
+    """A job that does not end by itself."""
+    time.sleep(300.0)
+
+
+def _start(folder: Path) -> subprocess.Popen[str]:
+    environment = {
+        **os.environ,
+        "TMPDIR": str(folder),
+        "PYTHONPATH": os.pathsep.join(one for one in sys.path if one),
+    }
+    process = subprocess.Popen(
+        [sys.executable, "-c", _BUSY], cwd=folder, env=environment, text=True,
+        stdout=subprocess.PIPE, start_new_session=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert "token" in process.stdout.readline()
+    time.sleep(1.0)
+    assert len(_list_session(process.pid)) >= 3
+    return process
+
+
+def _list_session(leader: int) -> set[int]:
+    """Living processes of the session that a process leads."""
+    found = set()
+    for one in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, session = one.read_text().rpartition(")")[2].split()[:4]
+        except OSError:
+            continue
+        if int(session) == leader and state != "Z":
+            found.add(int(one.parent.name))
+    return found
+
+
+def _wait_for_none(leader: int) -> set[int]:
+    end = time.monotonic() + 20.0
+    while (left := _list_session(leader)) and time.monotonic() < end:
+        time.sleep(0.1)
+    return left
+
+
+@pytest.mark.parametrize("sent", ["SIGHUP", "SIGTERM", "SIGINT", "SIGKILL"])
+def test_nothing_is_left(tmp_path: Path, sent: str) -> None:
+    process = _start(tmp_path)
+    process.send_signal(signal.Signals[sent])
+    process.communicate(timeout=30.0)
+    assert _wait_for_none(process.pid) == set()
+    if sent != "SIGKILL":
+        assert process.returncode == 0
+        assert list(tmp_path.glob("drivetwin-*")) == []
+
+
+def test_a_closed_terminal_signals_the_group_twice(tmp_path: Path) -> None:
+    process = _start(tmp_path)
+    for _ in range(2):
+        os.killpg(process.pid, signal.SIGHUP)
+    process.communicate(timeout=30.0)
+    assert _wait_for_none(process.pid) == set()
+    assert list(tmp_path.glob("drivetwin-*")) == []
+
+
+def test_the_next_start_removes_what_a_killed_run_left(tmp_path: Path) -> None:
+    killed = _start(tmp_path)
+    killed.kill()
+    killed.communicate()
+    (left,) = tmp_path.glob("drivetwin-app-*")
+    following = _start(tmp_path)
+    assert not left.exists()
+    following.send_signal(signal.SIGHUP)
+    following.communicate(timeout=30.0)
+    assert list(tmp_path.glob("drivetwin-*")) == []
