@@ -7,6 +7,7 @@ import errno
 import os
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -60,6 +61,7 @@ def test_forty_tabs_lose_no_result(sessions: Sessions, identified: Session) -> N
     with sessions.use(key) as session:
         session.work = identified.work
         session.begin_card()
+        assert session.form is not None
         session.open_gearbox(list_builtin_gearboxes()[0])
         upload = session.store_upload(BytesIO(b"x"), "a.csv", 1, 10)
         session.apply_sliders({"k_o": 1.7e5})
@@ -72,9 +74,12 @@ def test_forty_tabs_lose_no_result(sessions: Sessions, identified: Session) -> N
         assert list(again.work.results) == list(identified.work.results)
         found = again.work.require_outcome().found
         assert found is not None
-        assert found.estimates == identified.work.require_outcome().found.estimates
+        before = identified.work.require_outcome().found
+        assert before is not None
+        assert found.estimates == before.estimates
         assert again.work.changes == {"k_o": 1.7e5}
         assert again.form is not None
+        assert len(again.form.entries) == len(session.form.entries) > 3
         assert again.gearbox is not None
         assert again.get_uploaded(upload).path.read_bytes() == b"x"
         assert again.get_simulation().present.status == "completed"
@@ -107,7 +112,6 @@ def test_a_job_that_ended_unseen_keeps_its_result(sessions: Sessions) -> None:
     assert job is not None
     while not job.pipe.poll(0.1):
         pass
-    job.process.join(30.0)
     _open_tabs(sessions, MOST_SESSIONS)
     assert key not in sessions._held
     assert list(sessions.get(key).work.results) == [Method.PAPER]
@@ -134,7 +138,7 @@ def test_requests_of_many_tabs_at_once_lose_nothing(sessions: Sessions) -> None:
             for _ in range(20):
                 with sessions.use(keys[number]) as session, session.lock:
                     changes = {**session.work.changes, f"n{len(session.work.changes)}": 1.0}
-                    session.work = session_module.replace(session.work, changes=changes)
+                    session.work = replace(session.work, changes=changes)
         except BaseException as fault:
             faults.append(fault)
 

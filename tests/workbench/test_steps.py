@@ -9,6 +9,9 @@ from typing import Any
 import pytest
 
 from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.report.sections.blocks import Tone
+from drivetwin.report.sections.parameters import STATUS_TONES
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
@@ -95,3 +98,18 @@ def test_model_and_export_are_done_when_they_were_used(
     work = replace(identified.work, has_viewed=viewed, has_exported=exported)
     assert (_get(work, Step.MODEL).status is DONE) == viewed
     assert (_get(work, Step.EXPORT).status is DONE) == exported
+
+
+@pytest.mark.parametrize(("status", "tone"), list(STATUS_TONES.items()))
+def test_the_head_has_the_colour_of_the_verdict(
+    identified: Session, status: ModelStatus, tone: Tone
+) -> None:
+    outcome = identified.work.require_outcome()
+    assert outcome.found is not None
+    found = replace(outcome.found, status=status)
+    work = identified.work.add_result(Outcome(Method.LIKELIHOOD, outcome.twins, found))
+    state = _get(work, Step.IDENTIFY)
+    assert (state.status, state.tone) == (DONE, tone)
+    assert state.text.startswith(f"Model {status.value}: ")
+    reopened = work.add_result(Outcome(Method.LIKELIHOOD, outcome.twins))
+    assert _get(reopened, Step.IDENTIFY).tone is Tone.UNKNOWN

@@ -7,6 +7,7 @@ import secrets
 import tempfile
 import threading
 import time
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -97,7 +98,8 @@ class Sessions:
                 continue
             try:
                 session.store()
-            except OSError:
-                return  # it stays in memory
+            except Exception as fault:  # whatever it is, the session stays in memory
+                traceback.print_exception(fault)
+                return
             self._stored[key] = self._held.pop(key).scratch
             excess -= 1

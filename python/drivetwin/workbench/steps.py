@@ -8,8 +8,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from drivetwin.channels.roles import NEEDED
+from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import DEFAULT_METHOD
+from drivetwin.report.sections.blocks import Tone
+from drivetwin.report.sections.parameters import STATUS_TONES
 from drivetwin.shifts.shift import make_shift_labels
+from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.session_state import SessionState
 
 
@@ -45,6 +49,8 @@ class StepState:
     remedy: Step | None = None
     has_content: bool = False
     """True where the view of a blocked step shows the reasons."""
+    tone: Tone | None = None
+    """Colour of the verdict on the model, for a step that has one."""
 
 
 def assess_steps(work: SessionState, *, running: bool = False) -> list[StepState]:
@@ -140,10 +146,23 @@ def _assess_identification(work: SessionState, running: bool) -> StepState:
         text = "Every shift is held out."
         return StepState(Step.IDENTIFY, Status.BLOCKED, text, Step.SHIFTS)
     if work.verdict_outcome is not None:
-        return StepState(Step.IDENTIFY, Status.DONE, "The model is identified.")
+        return _assess_outcome(work.verdict_outcome)
     if DEFAULT_METHOD in work.refusals or work.ended:
         return StepState(Step.IDENTIFY, Status.OPEN, "The identification failed.")
     return StepState(Step.IDENTIFY, Status.OPEN, "Press Identify.")
+
+
+def _assess_outcome(outcome: Outcome) -> StepState:
+    """Return the state of a finished identification, with the verdict on the model."""
+    verdicts = [one.verdict for one in outcome.twin.parameters.values()]
+    identified = verdicts.count(Verdict.IDENTIFIED)
+    count = f"{identified} of {len(verdicts)} parameters identified"
+    if outcome.found is None:
+        text = f"Twin of a workspace, without the evidence for a verdict: {count}."
+        return StepState(Step.IDENTIFY, Status.DONE, text, tone=Tone.UNKNOWN)
+    status = outcome.found.status
+    text = f"Model {status.value}: {count}."
+    return StepState(Step.IDENTIFY, Status.DONE, text, tone=STATUS_TONES[status])
 
 
 def _assess_use(work: SessionState, running: bool) -> Iterator[StepState]:

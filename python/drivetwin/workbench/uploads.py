@@ -7,6 +7,7 @@ content is parsed in a process of its own (see `sandboxed_parse.py`).
 
 from __future__ import annotations
 
+import mmap
 import re
 import unicodedata
 from dataclasses import dataclass
@@ -14,6 +15,8 @@ from pathlib import Path
 from typing import IO
 
 from drivetwin.errors import RefusedError, Where
+from drivetwin.logs.formats.parser_limits import compute_parser_limits
+from drivetwin.workbench import jobs
 
 LIMITS = {
     "log": 200 * 2**20,  # ten minutes of 40 channels at 1 kHz; larger ones are opened by path
@@ -24,13 +27,13 @@ LIMITS = {
 """Bytes that an upload may have, by what it is for."""
 _CHUNK = 2**18
 _LONGEST_NAME = 200
-_FORMULA = re.compile(rb"""(?:^|[,;\t])[ ]*"?(?:[=@]|[+-](?=[A-Za-z(]|[^,;\t\r\n"]*[|!(]))""")
+_SIGN = rb"""[+-](?!(?i:nan|inf|infinity)\b)(?=[A-Za-z(]|[^,;\t\r\n"]*[|!(])"""
+_FORMULA = re.compile(rb"""(?:^|[,;\t])[ ]*"?(?:[=@]|""" + _SIGN + rb")", re.MULTILINE)
 """A cell that a spreadsheet would compute: it begins with =, @, or a sign before no number.
 
-An apostrophe in front makes it a text.
+An apostrophe in front makes it a text. The time of a search is proportional to the size of the
+file: no part goes beyond its cell.
 """
-_SIGNED_WORD = re.compile(rb"[+-](?:nan|inf|infinity)\b", re.IGNORECASE)
-_BINARY = re.compile(rb"\x00")
 _HEAD = 4096
 
 
@@ -63,7 +66,7 @@ def store_stream(
     """Write at most `limit` bytes of `stream` to `target`; delete the file if it is refused.
 
     `claimed` is the length that the browser states, None where it states none.
-    Raises RefusedError for a bad name, too many bytes, claimed or sent, and none at all.
+    Raises RefusedError for a bad name, too many bytes, claimed or sent, none at all, and formulas.
     """
     label = make_label(name)
     if claimed is not None and claimed > limit:
@@ -89,21 +92,26 @@ def store_stream(
 def refuse_formulas(path: Path, label: str) -> None:
     """Refuse a text file with cells that a spreadsheet would compute: no logger writes them.
 
-    They would run where a name or a value of the log is later opened as a table.
+    They would run where a name or a value of the log is later opened as a table. The search runs in
+    a separate process, because the server could not answer other requests meanwhile.
     """
     with path.open("rb") as file:
-        if _BINARY.search(file.read(_HEAD)):
+        if b"\0" in file.read(_HEAD):
             return
-        file.seek(0)
-        for number, line in enumerate(file, start=1):
-            for match in _FORMULA.finditer(line):
-                if _SIGNED_WORD.match(line, match.end() - 1):
-                    continue
-                raise RefusedError(
-                    f"line {number} holds a cell that is a formula",
-                    "export the log as plain numbers, without formulas",
-                    Where(file=label),
-                )
+    number = jobs.call(find_formula, path, limit=compute_parser_limits(path).seconds)
+    if number is not None:
+        raise RefusedError(
+            f"line {number} holds a cell that is a formula",
+            "export the log as plain numbers, without formulas",
+            Where(file=label),
+        )
+
+
+def find_formula(emit: jobs.Emit, path: Path) -> None:
+    """Emit the number of the first line with a formula in a file that is not empty, or None."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        found = _FORMULA.search(content)
+        emit(None if found is None else 1 + content[: found.end()].count(b"\n"))
 
 
 def _copy(stream: IO[bytes], file: IO[bytes], limit: int) -> int:

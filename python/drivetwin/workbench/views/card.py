@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
-from dash import Input, Output, State, dcc, html
+from dash import ALL, Input, Output, State, dcc, html
 from dash.development.base_component import Component
 
 from drivetwin.findings import render
@@ -16,10 +18,17 @@ from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import card_form
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.fields import UploadField
-from drivetwin.workbench.views.sources import format_source, get_source
+from drivetwin.workbench.views.fields import UploadField, get_triggered_part
+from drivetwin.workbench.views.sources import build_file_buttons, format_source, get_source
 
 _CARDS = (".toml",)
+_HEAD = 64 * 2**10
+"""Bytes of a file that are searched for the tables of a vehicle card."""
+_TABLES = tuple(
+    re.compile(rb"^[ \t]*" + one, re.MULTILINE)
+    for one in (rb"(?:\[\[[ \t]*gears\b|gears[ \t]*=)", rb"(?:\[[ \t]*inertia\b|inertia[ \t]*[.=])")
+)
+"""Tables that a vehicle card has, and a gearbox card, a mapping or a twin has not."""
 
 
 def layout() -> list[Component]:
@@ -39,6 +48,7 @@ def layout() -> list[Component]:
         ),
         html.Datalist(id="card-names"),
         dcc.Store(id="card-upload"),
+        html.Div(id="card-files"),
         html.Div(id="card-content"),
         *card_form.layout(),
     ]
@@ -53,14 +63,18 @@ def register(page: ui.Page) -> None:
         Output("card-content", "children"),
         Output("card-path", "value"),
         Output("card-names", "children"),
+        Output("card-files", "children"),
         Input(ui.make_due_id("card"), "data"),
     )
     def show(session: Session, _: str) -> tuple[Any, ...]:
-        """Render the open card."""
+        """Render the open card and the cards of the folder."""
         work = session.work
         content = [] if work.opened is None else _build_content(work.opened)
-        names = [html.Option(value=name) for name in session.folder.list_names(_CARDS)]
-        return content, format_source(work.card), names
+        names = session.folder.list_names(_CARDS)
+        options = [html.Option(value=name) for name in names]
+        cards = [name for name in names if is_card(session.folder.root / name)]
+        files = build_file_buttons("card-file", "vehicle card", cards)
+        return content, format_source(work.card), options, files
 
 
 def _register_opening(page: ui.Page) -> None:
@@ -83,12 +97,28 @@ def _register_opening(page: ui.Page) -> None:
         """Open the card of the field."""
         open_card(session, get_source(session, card, upload))
 
+    @page.callback(Input({"card-file": ALL}, "n_clicks"))
+    def open_file(session: Session, clicks: list[int | None]) -> None:
+        """Open a listed card of the folder."""
+        if any(clicks):
+            open_card(session, session.get_folder_source(get_triggered_part("card-file")))
+
 
 def open_card(session: Session, source: Source) -> None:
     """Open a card for the log of the session, and show what came of it."""
     session.open_card(source)
     ui.notify_topic(ui.Topic.LOG)
     ui.notify_opened_log(f"{source.name} is open", session.work.require_open_log())
+
+
+def is_card(path: Path) -> bool:
+    """Return True for a file that has the tables of a vehicle card; it may still have faults."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError:
+        return False
+    return all(one.search(head) for one in _TABLES)
 
 
 def _build_content(opened: Opened) -> list[Component]:

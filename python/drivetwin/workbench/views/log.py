@@ -17,10 +17,7 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import UploadField, get_triggered_part
-from drivetwin.workbench.views.sources import format_source, get_source
-
-_LISTED = 30
-"""Files of the folder with a button; all others are offered while a name is typed."""
+from drivetwin.workbench.views.sources import build_file_buttons, format_source, get_source
 
 
 def layout() -> list[Component]:
@@ -64,7 +61,7 @@ def register(page: ui.Page) -> None:
         content = [] if work.opened is None else [*_list_logs(work), *_build_content(work.opened)]
         names = session.folder.list_names(SUFFIXES)
         options = [html.Option(value=name) for name in names]
-        return content, format_source(work.log), options, _build_files(names)
+        return content, format_source(work.log), options, build_file_buttons("file", "log", names)
 
 
 def _register_opening(page: ui.Page) -> None:
@@ -128,16 +125,6 @@ def _open(session: Session, source: Source) -> None:
     session.open_log(source)
     ui.notify_topic(ui.Topic.LOG)
     ui.notify_opened_log(f"{source.name} is open", session.work.logs[0])
-
-
-def _build_files(names: list[str]) -> list[Component]:
-    """Build a button for each log of the folder."""
-    if not names:
-        return [ui.make_hint("The folder of the workbench has no log.")]
-    buttons = [html.Button(name, id={"file": name}, type="button") for name in names[:_LISTED]]
-    more = len(names) - len(buttons)
-    hint = [ui.make_hint(f"{more} more: type the name.")] if more > 0 else []
-    return [html.H3("Logs of the folder"), html.Div(buttons, className="row files"), *hint]
 
 
 def _list_logs(work: SessionState) -> list[Component]:

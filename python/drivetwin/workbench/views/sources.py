@@ -3,11 +3,17 @@
 
 from __future__ import annotations
 
+from dash import html
+from dash.development.base_component import Component
+
 from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.session import Session
+from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import UploadField
 
 _UPLOADED = "uploaded: "
+_LISTED = 30
+"""Files of the folder with a button; all others are offered while a name is typed."""
 
 
 def get_source(session: Session, typed: str | None, upload: UploadField | None) -> Source:
@@ -22,3 +28,14 @@ def format_source(source: Source | None) -> str:
     if source is None:
         return ""
     return _UPLOADED + source.name if source.uploaded else source.name
+
+
+def build_file_buttons(key: str, kind: str, names: list[str]) -> list[Component]:
+    """Build a button for each file of a `kind` in the folder; its id has the name below `key`."""
+    if not names:
+        return [ui.make_hint(f"The folder of the workbench has no {kind}.")]
+    buttons = [html.Button(name, id={key: name}, type="button") for name in names[:_LISTED]]
+    more = len(names) - len(buttons)
+    hint = [ui.make_hint(f"{more} more: type the name.")] if more > 0 else []
+    title = f"{kind[0].upper()}{kind[1:]}s of the folder"
+    return [html.H3(title), html.Div(buttons, className="row files"), *hint]

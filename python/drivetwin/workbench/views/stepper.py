@@ -77,7 +77,7 @@ def register_states(app: Dash, sessions: Sessions) -> None:
         following = [*found[1:], None]
         return [
             *(one.status.value for one in found),
-            *(f"state {one.status}" for one in found),
+            *(f"state {_get_colour(one)}" for one in found),
             *(_build_head(one, after) for one, after in zip(found, following, strict=True)),
             *(one.status is Status.BLOCKED and not one.has_content for one in found),
         ]
@@ -92,10 +92,15 @@ def _build_button(name: str, title: list[str], *, state: bool) -> Component:
     )
 
 
+def _get_colour(one: StepState) -> str:
+    """Return the colour class of a step: that of its verdict, else of its status."""
+    return one.tone or one.status
+
+
 def _build_head(one: StepState, after: StepState | None) -> list[Component]:
     """Build the state of a step: what was done or is missing, and the way on."""
     text = f"Blocked: {one.text}" if one.status is Status.BLOCKED else one.text
-    parts: list[Component] = [html.P(text, className=f"head {one.status}")]
+    parts: list[Component] = [html.P(text, className=f"head {_get_colour(one)}")]
     if one.remedy is not None:
         parts.append(build_go_button(f"Go to {TITLES[one.remedy]}", one.remedy))
     elif one.status is Status.DONE and after is not None and after.status is not Status.BLOCKED:
