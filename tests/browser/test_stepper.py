@@ -131,7 +131,22 @@ def test_each_view_is_accessible_wide_and_narrow_in_light_and_dark(
                 only = () if scheme == "light" else ("color-contrast",)
                 findings[width, scheme, name] = grave_findings(page, *only)
                 assert page.evaluate("document.body.scrollWidth <= window.innerWidth"), name
+        show_view(page, "model")
+        _expect_sliders_beside_the_plot(page)
     assert {place: found for place, found in findings.items() if found} == {}
+
+
+def _expect_sliders_beside_the_plot(page: Page) -> None:
+    """Each slider ends before the plot begins, and when it is in the window the plot is too."""
+    for slider in page.locator(".slider").all():
+        slider.scroll_into_view_if_needed()
+        assert slider.evaluate("(one) => one.scrollWidth <= one.clientWidth"), slider.inner_text()
+        box, plot = slider.bounding_box(), page.locator(".bench > :last-child").bounding_box()
+        assert box is not None
+        assert plot is not None
+        assert box["x"] + box["width"] <= plot["x"]
+        shown = min(plot["y"] + plot["height"], 1000.0) - max(plot["y"], 0.0)
+        assert shown > 350.0, "the plot is outside the window"
 
 
 def test_a_card_by_the_form(shown: Page, pictures: Path) -> None:

@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 import http.client
+import http.server
 import json
 import re
+import threading
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, Route, expect
+from playwright.sync_api import Browser, BrowserContext, Error, Page, Route, expect
 
 from tests.browser.bench import (
     PATIENCE,
@@ -20,6 +23,7 @@ from tests.browser.bench import (
     expect_message,
     identify,
     open_files,
+    serve_folder,
     show_view,
 )
 from tests.browser.watch import Watch
@@ -199,6 +203,75 @@ def test_a_typed_time_of_any_detail_counts(shown: Page, bench: Bench) -> None:
     expect(field).to_have_value(f"{float(typed):.4f}")
     about = page.locator("#phases-content .notes")
     expect(about).to_contain_text("Boundary 3 inertia phase starts is set by hand")
+
+
+def test_two_workbenches_in_one_browser(
+    context: BrowserContext, bench: Bench, tmp_path: Path
+) -> None:
+    """Both go on, and neither link is in a cookie, which browsers send to all ports of a host."""
+    first = bench.shown(context.new_page())
+    with serve_folder(tmp_path) as address:
+        second = context.new_page()
+        second.goto(address)
+        expect(second.locator("#status")).to_contain_text("no log is open")
+        for page in (first, second, first):
+            page.reload()
+            page.get_by_role("button", name="Open the sample").click()
+            expect_message(page, "The sample is open with its card")
+        names = {cookie["name"] for cookie in context.cookies()}
+        assert {f"drivetwin-{urlsplit(one).port}" for one in (bench.address, address)} <= names
+        told = str(context.cookies()) + first.url + second.url
+        assert not any(urlsplit(one).query[6:] in told for one in (bench.address, address))
+        assert first.evaluate("localStorage['drivetwin-key']") != second.evaluate(
+            "localStorage['drivetwin-key']"
+        )
+        again = context.new_page()
+        again.goto(address.partition("?")[0])
+        expect(again.locator("#status")).to_contain_text("no log is open")
+
+
+def test_another_port_gets_a_cookie_that_reads_nothing(
+    context: BrowserContext, bench: Bench
+) -> None:
+    bench.shown(context.new_page())
+    got: list[str] = []
+
+    class Listener(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            got.append(self.headers.get("Cookie", ""))
+            self.send_response(204)
+            self.end_headers()
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    place = urlsplit(bench.address)
+    with http.server.HTTPServer(("127.0.0.1", 0), Listener) as listener:
+        threading.Thread(target=listener.handle_request).start()
+        with suppress(Error):  # no content
+            context.new_page().goto(f"http://127.0.0.1:{listener.server_port}/")
+    assert f"drivetwin-{place.port}=" in got[0]
+    assert place.query.removeprefix("token=") not in got[0]
+    for path in ("/_dash-update-component", "/upload/log?name=a.csv"):
+        connection = http.client.HTTPConnection(place.netloc, timeout=30.0)
+        connection.request("POST", path, "{}", {"Cookie": got[0]})
+        assert connection.getresponse().status == 403
+        connection.close()
+
+
+def test_forty_more_tabs_keep_the_work_of_the_first(
+    context: BrowserContext, shown: Page, bench: Bench
+) -> None:
+    shown.get_by_role("button", name="Open the sample").click()
+    expect_message(shown, "The sample is open with its card")
+    identify(shown)
+    for _ in range(40):
+        bench.shown(tab := context.new_page())
+        tab.close()
+    show_view(shown, "model")
+    shown.wait_for_selector("#model-plot .js-plotly-plot")
+    shown.reload()
+    expect(shown.locator("#status")).to_contain_text("identified: likelihood")
 
 
 @pytest.mark.parametrize(("answer", "text"), [(None, "does not answer"), (500, "internal error")])
