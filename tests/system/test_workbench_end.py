@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="children are li
 _BUSY = """
 import sys, threading, time
 from drivetwin.workbench import jobs, server
-from tests.workbench.test_ending import sleep_long
+from tests.system.test_workbench_end import sleep_long
 begin = server.start_server
 
 def start(*given):
