@@ -41,7 +41,7 @@ _PHRASES = (
         r"channel mapping(?: file)? \(--channels[^)]*\)(?: or in \[channels\] of the card)?",
         r"correct \g<thing> in the step Channels",
     ),
-    (r"map (?P<thing>.*) with --channels", r"give \g<thing> a role in the step Channels"),
+    (r"map (?P<thing>.{1,400}) with --channels", r"give \g<thing> a role in the step Channels"),
     (
         r'assert it in the channel mapping[^:,]*[:,] time = \{ unit = "\w+" \}(?: \(or [^)]*\))?',
         "state the unit of the time column in the step Channels",
