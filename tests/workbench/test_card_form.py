@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -32,7 +33,7 @@ ANSWERS: dict[Key, str] = {
 
 
 @pytest.fixture
-def begun(session: Session, tmp_path: Path) -> Session:
+def begun(session: Session, tmp_path: Path) -> Iterator[Session]:
     """A session in a folder of its own that has begun a card."""
     log = tmp_path / LOG
     log.write_bytes(session.get_folder_source(LOG).path.read_bytes())
@@ -40,7 +41,8 @@ def begun(session: Session, tmp_path: Path) -> Session:
     begun = sessions.get(sessions.create())
     begun.open(begun.get_folder_source(LOG))
     begun.begin_card()
-    return begun
+    yield begun
+    sessions.close()
 
 
 def _get_form(session: Session) -> CardForm:
