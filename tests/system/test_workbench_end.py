@@ -8,14 +8,20 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="children are listed in /proc")
 
+Started = Callable[[], subprocess.Popen[str]]
+
 _BUSY = """
-import sys, threading, time
+import signal, sys, threading, time
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may ignore both
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from drivetwin.workbench import jobs, server
 from tests.system.test_workbench_end import sleep_long
 begin = server.start_server
@@ -39,6 +45,22 @@ def sleep_long(_: object) -> None:
     time.sleep(300.0)
 
 
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Started]:
+    """Start of the program with two jobs; all that a failed test leaves is killed."""
+    processes: list[subprocess.Popen[str]] = []
+
+    def start() -> subprocess.Popen[str]:
+        processes.append(_start(tmp_path))
+        assert len(_wait_for(processes[-1].pid, 3)) >= 3
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
 def _start(folder: Path) -> subprocess.Popen[str]:
     environment = {
         **os.environ,
@@ -51,9 +73,15 @@ def _start(folder: Path) -> subprocess.Popen[str]:
     )  # fmt: skip
     assert process.stdout is not None
     assert "token" in process.stdout.readline()
-    time.sleep(1.0)
-    assert len(_list_session(process.pid)) >= 3
     return process
+
+
+def _wait_for(leader: int, count: int) -> set[int]:
+    """Wait until a session has at least `count` processes."""
+    end = time.monotonic() + 20.0
+    while len(found := _list_session(leader)) < count and time.monotonic() < end:
+        time.sleep(0.1)
+    return found
 
 
 def _list_session(leader: int) -> set[int]:
@@ -77,8 +105,8 @@ def _wait_for_none(leader: int) -> set[int]:
 
 
 @pytest.mark.parametrize("sent", ["SIGHUP", "SIGTERM", "SIGINT", "SIGKILL"])
-def test_nothing_is_left(tmp_path: Path, sent: str) -> None:
-    process = _start(tmp_path)
+def test_nothing_is_left(tmp_path: Path, started: Started, sent: str) -> None:
+    process = started()
     process.send_signal(signal.Signals[sent])
     process.communicate(timeout=30.0)
     assert _wait_for_none(process.pid) == set()
@@ -87,8 +115,8 @@ def test_nothing_is_left(tmp_path: Path, sent: str) -> None:
         assert list(tmp_path.glob("drivetwin-*")) == []
 
 
-def test_a_closed_terminal_signals_the_group_twice(tmp_path: Path) -> None:
-    process = _start(tmp_path)
+def test_a_closed_terminal_signals_the_group_twice(tmp_path: Path, started: Started) -> None:
+    process = started()
     for _ in range(2):
         os.killpg(process.pid, signal.SIGHUP)
     process.communicate(timeout=30.0)
@@ -96,12 +124,12 @@ def test_a_closed_terminal_signals_the_group_twice(tmp_path: Path) -> None:
     assert list(tmp_path.glob("drivetwin-*")) == []
 
 
-def test_the_next_start_removes_what_a_killed_run_left(tmp_path: Path) -> None:
-    killed = _start(tmp_path)
+def test_the_next_start_removes_what_a_killed_run_left(tmp_path: Path, started: Started) -> None:
+    killed = started()
     killed.kill()
     killed.communicate()
     (left,) = tmp_path.glob("drivetwin-app-*")
-    following = _start(tmp_path)
+    following = started()
     assert not left.exists()
     following.send_signal(signal.SIGHUP)
     following.communicate(timeout=30.0)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import os
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from io import BytesIO
@@ -108,11 +109,10 @@ def test_a_job_that_ended_unseen_keeps_its_result(sessions: Sessions) -> None:
     with sessions.use(key) as session:
         _open(session)
         session.identify([Method.PAPER])
-        job = session.job
-    assert job is not None
-    while not job.pipe.poll(0.1):
-        pass
-    _open_tabs(sessions, MOST_SESSIONS)
+    end = time.monotonic() + 60.0
+    while key in sessions._held and time.monotonic() < end:
+        _open_tabs(sessions, MOST_SESSIONS)
+        time.sleep(0.5)
     assert key not in sessions._held
     assert list(sessions.get(key).work.results) == [Method.PAPER]
 
