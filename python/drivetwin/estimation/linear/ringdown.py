@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh, expm, solve_banded
+from scipy.linalg import eigh, expm, solve_banded, svd
 from scipy.optimize import least_squares
 
 from drivetwin._util.arrays import FloatArray
@@ -85,9 +85,9 @@ def estimate_variances(left: FitResidual) -> tuple[float, FloatArray]:
     being as likely beforehand: the most likely one alone is often zero, and then too little.
     """
     q, _ = np.linalg.qr(left.explained)
-    basis, strength, mixture = np.linalg.svd(
-        left.response - q @ (q.T @ left.response), full_matrices=False
-    )
+    unexplained = left.response - q @ (q.T @ left.response)
+    # NumPy's divide and conquer fails for some finite matrices; this driver does not.
+    basis, strength, mixture = svd(unexplained, full_matrices=False, lapack_driver="gesvd")
     kept = strength > RING_DOWN.min_response * strength[0]
     basis, seen = basis[:, kept], (strength[:, None] * mixture)[kept]
     shown = basis.T @ left.residual
