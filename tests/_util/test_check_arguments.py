@@ -59,3 +59,16 @@ def test_the_method_of_an_identification_is_refused_before_it_begins() -> None:
     shifts = FoundShifts((), ())
     with pytest.raises(InputError, match="method is 'ml'"):
         drivetwin.identify(make_log({}), card(), shifts, "ml")  # type: ignore[arg-type]
+
+
+Signal = tuple[float, float]
+"""An alias with the name of a class that is checked elsewhere."""
+
+
+@check_arguments
+def take_pair(pair: Signal) -> Signal:
+    return pair
+
+
+def test_an_alias_of_the_same_name_is_not_taken_for_the_class() -> None:
+    assert take_pair((1.0, 2.0)) == (1.0, 2.0)

@@ -73,12 +73,17 @@ def _check(name: str, value: Any, options: tuple[str, ...], names: Mapping[str, 
         if typing.get_origin(known) is typing.Literal:
             return _require_member(name, value, typing.get_args(known))
     wanted = [option for option in options if option != "None"]
-    if not all(option in SOURCES for option in wanted):
+    # A module may have an alias of its own of such a name; a type-only import has no object.
+    if not all(option in SOURCES and _is_class(names.get(option)) for option in wanted):
         return value
     raise InputError(
         f"{name} is a {type(value).__name__}, not a {' or '.join(wanted)}",
         f"{name}: {SOURCES[wanted[0]]}",
     )
+
+
+def _is_class(known: Any) -> bool:
+    return known is None or isinstance(known, type)
 
 
 def _coerce(name: str, value: Any, known: type[Enum]) -> Enum:
