@@ -8,7 +8,7 @@ import gzip
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -36,6 +36,7 @@ def unpacked(store: Store) -> list[FloatArray]:
     return found
 
 
+@example(np.array([5e-324, 0.0, 0.0, 0.0]))
 @given(
     arrays(
         np.float64,

@@ -107,7 +107,7 @@ def _choose_value_step(values: FloatArray) -> float:
     """Rounding that is small against the noise of the samples, and never below what float32 has."""
     known = values[np.isfinite(values)]
     span = float(np.ptp(known)) if known.size else 0.0
-    if known.size < 4 or span == 0.0:
+    if known.size < 4 or span / SPAN_PARTS == 0.0:  # of subnormal numbers the quotient is zero too
         return max(span / SPAN_PARTS, 1e-12)
     noise = float(np.median(np.abs(np.diff(known, 2)))) / (0.6745 * np.sqrt(6.0))
     return float(max(noise / NOISE_PARTS, span / SPAN_PARTS))
