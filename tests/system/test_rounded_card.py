@@ -11,6 +11,7 @@ import pytest
 
 import drivetwin
 from benchmarks.estimation.validity import identify_validated
+from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Code
@@ -64,3 +65,16 @@ def test_the_values_are_true_with_rounded_ratios(card: str) -> None:
     assert curve.verdict is Verdict.IDENTIFIED
     refined = {one.subject for one in found.findings if one.code is Code.RATIO_REFINED}
     assert refined == {"ratio_1", "ratio_2", "i_f"}
+
+
+def test_the_check_of_the_card_names_what_the_log_knows_better(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    files = [str(CASE / name) for name in ("card2.toml", "Schaltung_23.csv")]
+    assert main(["card", "check", *files, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["findings"]
+    told = {one["subject"]: one["numbers"] for one in found if one["code"] == "ratio_refined"}
+    truth = load_truth()
+    assert set(told) == {"ratio_1", "ratio_2", "i_f"}
+    for name, numbers in told.items():
+        assert numbers["log"]["value"] == pytest.approx(truth[name], rel=5e-5)

@@ -77,6 +77,8 @@ def _compare(
     vehicle: VehicleCard, log: Path | None, channels: Path | None
 ) -> tuple[tuple[Finding, ...], DrivetwinError | None]:
     """Check a card with its log; return the findings, and the error of a log that is unusable."""
+    from drivetwin.estimation.data.prepare import prepare_shift
+    from drivetwin.estimation.result.ratio_check import compare_ratios
     from drivetwin.logs.read import read_log
     from drivetwin.plausibility.check import check_card, select_card_findings
     from drivetwin.shifts.detect import detect_shifts
@@ -95,6 +97,7 @@ def _compare(
         if not shifts:
             why = "no shift of the card's gears was found, so torques and friction are unchecked"
             remarks.append(report(Code.CARD_NOT_COMPARED, why=why))
+        remarks += compare_ratios([prepare_shift(recording, vehicle, one) for one in shifts])
     except DrivetwinError as error:
         shifts = ()
         remarks.append(report(Code.CARD_NOT_COMPARED, why=error.what))

@@ -31,7 +31,7 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.estimation.result.verdict import apply_errors
 from drivetwin.findings import Code, Finding, report
-from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.parameters import OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.vehicle.spec import PriorValue
 
@@ -80,7 +80,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
     findings = (
         *log.findings,
         *_report_unfitted(log),
-        *collect_shift_findings(log.signals),
+        *_drop_refined(collect_shift_findings(log.signals), found),
         *found.findings,
         *gains,
         *_check_card(found, log, method),
@@ -111,6 +111,16 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         load=found.load,
         mapping=log.mapping,
     )
+
+
+def _drop_refined(findings: Sequence[Finding], found: EstimateSet) -> list[Finding]:
+    """Return the findings of the shifts without measured ratios that the fit estimates."""
+    return [
+        one
+        for one in findings
+        if one.code is not Code.RATIO_DEVIATES
+        or make_ratio_id(str(one.names["gear"])) not in found.estimates
+    ]
 
 
 def _check_card(found: EstimateSet, log: PreparedLog, method: Method) -> tuple[Finding, ...]:
