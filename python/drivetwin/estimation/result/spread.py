@@ -16,8 +16,9 @@ of noise levels; beyond it something is missing from the model."""
 class PredictedSpread:
     """Distribution at `time` (n,) [s] of a measured less a simulated signal if the model is right.
 
-    `mean` (n,) is the action of the effects that the log shows and the simulation lacks, `std`
-    (n,) the standard deviation; SI, speeds of the engine side those of the engine.
+    `mean` (n,) is the action of the effects that the log shows and the simulation lacks, and of
+    samples that are means over their period; `std` (n,) the standard deviation. Both are SI, speeds
+    of the engine side those of the engine.
     """
 
     time: FloatArray

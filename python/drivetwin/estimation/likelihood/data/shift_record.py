@@ -172,6 +172,11 @@ class ShiftRecord:
         columns = get_columns(run)
         return np.concatenate([out.sample(run.time, columns[out.name]) for out in self.outputs])
 
+    def sample_stamps(self, run: Trajectory) -> FloatArray:
+        """Return a trajectory at the measured stamps whatever the samples are; shape (size,)."""
+        columns = get_columns(run)
+        return np.concatenate([columns[out.name][out.place] for out in self.outputs])
+
     @property
     def kinds(self) -> frozenset[str]:
         """Names of the outputs interpreted as means over their period, and `TORQUE` if the

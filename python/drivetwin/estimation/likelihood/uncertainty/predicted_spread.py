@@ -26,7 +26,8 @@ def predict_spread(
     """Predict the distribution of measured less simulated signals, for each shift by signal.
 
     The simulation is that of the chosen plant with the corrected unknowns and none of the other
-    effects. A shift that cannot be simulated with them has no prediction.
+    effects; it is compared at the stamps of the samples, also where these are means over their
+    period. A shift that cannot be simulated with them has no prediction.
     """
     found: list[dict[str, PredictedSpread]] = []
     joint = corrected.joint_covariance
@@ -42,7 +43,8 @@ def predict_spread(
         if run is None:
             found.append({})
             continue
-        mean = part.compute_residual(run) - residual
+        averaged = part.record.sample_run(run) - part.record.sample_stamps(run)
+        mean = part.compute_residual(run) - residual + averaged
         rows = np.column_stack([slopes, z])
         variance = part.record.sigma**2 + np.einsum("np,pq,nq->n", rows, joint, rows)
         if part.weighting.path is not None:
