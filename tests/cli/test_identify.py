@@ -12,8 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.cli import identify as identify_command
 from drivetwin.cli import main
 from drivetwin.errors import IdentificationError
+from drivetwin.estimation.result.status import ModelStatus
 from tests.cli.conftest import Files
 
 
@@ -164,3 +166,16 @@ def test_a_bad_card_is_told_once_for_all_logs(
     card.write_text("nothing = 1")
     assert main(["identify", *map(str, logs), "--vehicle", str(card)]) == 2
     assert capsys.readouterr().err.count("error: ") == 1
+
+
+@pytest.mark.parametrize("status", list(ModelStatus))
+def test_strict_passes_a_confirmed_model_only(
+    bench_files: Files, monkeypatch: pytest.MonkeyPatch, status: ModelStatus
+) -> None:
+    monkeypatch.setattr(identify_command, "_identify_log", lambda *_: {"status": status.value})
+    monkeypatch.setattr(identify_command, "_identify_joint", lambda *_: status)
+    arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
+    expected = 0 if status in (ModelStatus.VALID, ModelStatus.LIMITED) else 3
+    assert main([*arguments, "--strict"]) == expected
+    assert main([*arguments, "--together", "--strict"]) == expected
+    assert main(arguments) == 0

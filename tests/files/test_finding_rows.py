@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""Table of a finding: as data in result files, as cells on screen and page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from drivetwin.cli.output import print_findings
+from drivetwin.files.records import FindingRecord
+from drivetwin.findings import Code, make_row, report
+from drivetwin.report.sections.blocks import TableBlock
+from drivetwin.report.sections.parameters import build_findings_section
+from tests.report.sample import identification
+
+ROWS = (
+    make_row(shift="2-3", channel="output torque", source="engine torque", size=7.4),
+    make_row(shift="2-3", channel="output speed", source="pressure of B3", size=-5.6),
+)
+FOUND = replace(
+    report(
+        Code.RESIDUAL_CORRELATED, size=7.4, cause="likeliest cause: tyre slip", advice="Slow down"
+    ),
+    rows=ROWS,
+)
+
+
+def test_rows_survive_a_result_file() -> None:
+    record = FindingRecord.from_result(FOUND)
+    read = FindingRecord.model_validate_json(record.model_dump_json())
+    assert read.to_finding() == FOUND
+    assert read.to_finding().rows == ROWS
+    assert read.rows[1].numbers["size"].value == -5.6
+
+
+def test_the_cells_are_formatted_numbers() -> None:
+    assert len(FOUND.heads) == len(FOUND.cells[0]) == 4
+    assert FOUND.cells[1] == ("2-3", "output speed", "pressure of B3", "-6")
+    assert replace(FOUND, rows=()).heads == ()
+
+
+def test_terminal_and_report_show_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    print_findings([FOUND])
+    printed = capsys.readouterr().out
+    assert "pressure of B3" in printed
+    assert max(map(len, printed.splitlines())) <= 80
+    section = build_findings_section(replace(identification(), findings=(FOUND,)))
+    (table,) = [one for one in section.blocks if isinstance(one, TableBlock)]
+    assert "likeliest cause: tyre slip" in table.caption
+    assert [cell.text for cell in table.rows[0]][1] == "output torque"
