@@ -45,12 +45,19 @@ LEAST_SAMPLES = 20
 
 @dataclass(frozen=True)
 class LogGear:
-    """A gear that a log holds: its ratio, name where the log contains it, pressures [Pa]."""
+    """A gear that a log holds: its ratio, name where the log contains it, pressures [Pa], and the
+    standard deviation of the ratio."""
 
     ratio: float
     time: float
     name: str | None
     pressures: Mapping[str, float]
+    std: float = 0.0
+
+    @property
+    def measured(self) -> tuple[float, float]:
+        """Ratio and its standard deviation, in the digits that it has."""
+        return round_to_std(self.ratio, self.std)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +79,14 @@ class LogSurvey:
     input_gear: float | None = None
     has_input_slip: bool = False
     remark: str = ""
+
+    @property
+    def measured_ratios(self) -> dict[float, float]:
+        """Standard deviations of the ratios that the log shows, by the value as it is proposed."""
+        found = dict(gear.measured for gear in self.gears)
+        return (
+            found if self.final_drive is None else found | dict([round_to_std(*self.final_drive)])
+        )
 
     @property
     def name(self) -> str:
@@ -96,6 +111,14 @@ class LogSurvey:
             ]
             != [self.specs[label]]
         }
+
+
+def round_to_std(value: float, std: float) -> tuple[float, float]:
+    """Round a value to a tenth of its standard deviation, and that to two digits."""
+    if std <= 0.0:
+        return value, 0.0
+    digits = 1 - int(np.floor(np.log10(std)))
+    return round(value, digits), round(std, digits)
 
 
 def survey_log(path: Path, mapping: Path | None) -> LogSurvey:
@@ -232,7 +255,8 @@ def _find_gears(log: ShiftLog, speeds: GearboxSpeeds, labels: Sequence[str]) -> 
             for label in labels
             if np.isfinite(mean := _compute_median(log, make_pressure_role(label), time))
         }
-        gears.append(LogGear(held.ratio, held.time, _find_name(log, time), pressures))
+        name = _find_name(log, time)
+        gears.append(LogGear(held.ratio, held.time, name, pressures, held.std))
     return gears
 
 

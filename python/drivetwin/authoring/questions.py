@@ -17,7 +17,7 @@ from drivetwin.authoring.gearboxes import (
     refuse_irreducible,
 )
 from drivetwin.authoring.log_estimates import LogEstimates
-from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
+from drivetwin.authoring.log_survey import LogSurvey, assign_pressures, round_to_std
 from drivetwin.authoring.parsing import (
     Parser,
     make_choice_parser,
@@ -78,7 +78,7 @@ def iterate_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
 
 def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
     survey = sources.survey
-    held = () if survey is None else tuple(round(gear.ratio, 3) for gear in survey.gears)
+    held = () if survey is None else tuple(gear.measured[0] for gear in survey.gears)
     fits = match_gearboxes(held) if len(held) > 1 else []
     known = list_builtin_gearboxes()
     fitting = "".join(
@@ -236,9 +236,8 @@ def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
     )  # fmt: skip
     final = None
     if survey is not None and survey.final_drive is not None:
-        ratio, std = survey.final_drive
-        note = f"output over wheel speed in {survey.name}, ± {std:.2g}"
-        final = Answer(float(f"{ratio:.4g}"), Origin.GUESS, note)
+        ratio, _ = round_to_std(*survey.final_drive)
+        final = Answer(ratio, Origin.GUESS, f"output over wheel speed in {survey.name}")
     yield Question(
         ("final_drive",), "--final-drive RATIO", "Ratio of the final drive",
         "Output speed over wheel speed, hub reduction included; 1 where the gear ratios include it "

@@ -23,10 +23,12 @@ WIDTH = 0.1
 
 @dataclass(frozen=True)
 class HeldRatio:
-    """A ratio of input and output speed and the time [s] for which it is held in all."""
+    """A ratio of input and output speed, the time [s] for which it is held in all, and its standard
+    deviation by the scatter of blocks."""
 
     ratio: float
     time: float
+    std: float
 
 
 def find_held_ratios(speeds: GearboxSpeeds) -> list[HeldRatio]:
@@ -53,7 +55,9 @@ def find_held_ratios(speeds: GearboxSpeeds) -> list[HeldRatio]:
             continue
         run = ratio[start:stop]
         if run.size * period >= usual.hold and np.isfinite(run).all() and run[0] > 0.0:
-            found.append(HeldRatio(float(np.median(run)), run.size * period))
+            # The median of normal values scatters by √(π/2) times their mean.
+            std = float(np.sqrt(0.5 * np.pi) * np.std(run, ddof=1) / np.sqrt(run.size))
+            found.append(HeldRatio(float(np.median(run)), run.size * period, std))
         start = stop
     return _merge_equal(found)
 
@@ -64,8 +68,12 @@ def _merge_equal(found: Sequence[HeldRatio]) -> list[HeldRatio]:
         last = merged[-1] if merged else None
         if last is not None and last.ratio / one.ratio - 1 < PLAUSIBILITY.ratio_tolerance:
             time = last.time + one.time
-            ratio = (last.ratio * last.time + one.ratio * one.time) / time
-            merged[-1] = HeldRatio(ratio, time)
+            shares = (last.time / time, one.time / time)
+            ratio = shares[0] * last.ratio + shares[1] * one.ratio
+            # What both runs differ by beyond noise, as with late speeds, stays in the mean.
+            apart = shares[0] * shares[1] * abs(last.ratio - one.ratio)
+            noise = np.hypot(shares[0] * last.std, shares[1] * one.std)
+            merged[-1] = HeldRatio(ratio, time, float(max(noise, apart)))
         else:
             merged.append(one)
     return merged
