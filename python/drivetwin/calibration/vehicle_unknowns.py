@@ -18,6 +18,7 @@ from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
+from drivetwin.twin.distribution import collect_covariance
 from drivetwin.twin.twin import PRESSURE_DELAY, SIMULATED, Twin
 
 METHOD = "logs of a calibration"
@@ -133,7 +134,7 @@ def build_unknowns(twin: Twin, shift: Shift, spread: Spread) -> VehicleUnknowns:
     )
     own = [twin.get_value(name, 0.0) for name in ids]
     mean = np.concatenate([own, *(one.mean for one in friction)])
-    known = _collect_covariance(twin, ids)
+    known = collect_covariance(twin, ids)
     if PRESSURE_DELAY not in twin.covariance_ids:
         known[-1, -1] = DELAY.std**2
     _add_spread(known, dict(zip(ids, own, strict=True)), spread)
@@ -143,17 +144,6 @@ def build_unknowns(twin: Twin, shift: Shift, spread: Spread) -> VehicleUnknowns:
     kept = variances > _LEAST * variances[-1]
     root = scale[:, None] * axes[:, kept] * np.sqrt(variances[kept])
     return VehicleUnknowns(twin, shift, ids, friction, mean, np.asarray(root))
-
-
-def _collect_covariance(twin: Twin, ids: tuple[str, ...]) -> FloatArray:
-    """Total covariance (n, n) of ids; zero where the twin has none."""
-    found = np.zeros((len(ids), len(ids)))
-    if twin.covariance is None:
-        return found
-    known = [k for k, name in enumerate(ids) if name in twin.covariance_ids]
-    places = [twin.covariance_ids.index(ids[k]) for k in known]
-    found[np.ix_(known, known)] = twin.covariance[np.ix_(places, places)]
-    return found
 
 
 def _add_spread(covariance: FloatArray, mean: Mapping[str, float], spread: Spread) -> None:

@@ -120,7 +120,7 @@ def describe_model(
     model = twin.build_dual_clutch(shift)
     fallback = {f"P0.{one.name}": one.P0 for one in model.elements}
     values = np.array([twin.get_value(name, fallback.get(name, 0.0)) for name in ids])
-    covariance = _collect_covariance(twin, ids)
+    covariance = collect_covariance(twin, ids)
     for k, name in enumerate(ids):
         estimate = twin.parameters.get(name)
         if covariance[k, k] == 0.0 and estimate is not None and estimate.std_total is not None:
@@ -147,7 +147,7 @@ def _add_laws(
         eta = twin.get_value("eta", 1.0) if twin.over_eta else 1.0
         factor = np.array([eta, eta, eta, 1.0] * len(laws))
         scale = np.concatenate([np.ones(len(known.ids)), factor])
-        covariance = np.outer(scale, scale) * _collect_covariance(twin, ids)
+        covariance = np.outer(scale, scale) * collect_covariance(twin, ids)
         size = len(known.ids)
         covariance[:size, :size] = known.covariance
     else:
@@ -166,7 +166,7 @@ def _describe_law(one: ShiftElement, curves: Mapping[str, FrictionCurve]) -> Flo
     return np.zeros((4, 4)) if covariance is None else covariance
 
 
-def _collect_covariance(twin: Twin, ids: Sequence[str]) -> FloatArray:
+def collect_covariance(twin: Twin, ids: Sequence[str]) -> FloatArray:
     """Total covariance (n, n) of ids; zero where the twin has none."""
     found = np.zeros((len(ids), len(ids)))
     if twin.covariance is None:

@@ -25,17 +25,12 @@ FILL_PRESSURE_STD = 0.1 * BAR
 """Standard deviation of a P0 without a stated one [Pa]; engineering estimate."""
 INERTIA_STD = 0.10
 """Standard deviation of an inertia without a stated one [ratio]; engineering estimate."""
-RADIUS_STD = 0.02
-"""Standard deviation of a wheel radius without a stated one [ratio]; engineering estimate: load
-and wear change the rolling radius by about as much."""
 PARTNER_LEVEL_STD = 0.07
 """Standard deviation of the friction of an element that the log does not determine, over that of
 its partner [ratio]; engineering estimate for two clutches with the same lining and oil."""
 PARTNER_REST_STD = 0.015
 """Standard deviation of the rise of friction to zero slip of such an element beyond that of its
 partner [-]; engineering estimate."""
-MASS_STD = 0.05
-"""Standard deviation of a mass without a stated one [ratio]; engineering estimate."""
 
 TEETH = re.compile(r"\s*\d{1,6}\s*/\s*\d{1,6}\s*(\*\s*\d{1,6}\s*/\s*\d{1,6}\s*)*")
 """A ratio as tooth counts, `49/33` or `49/33 * 41/20`."""

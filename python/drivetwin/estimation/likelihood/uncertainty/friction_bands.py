@@ -37,7 +37,7 @@ def find_reference_slips(
 
 
 def build_friction_curves(
-    fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], told: Correction
+    fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], correction: Correction
 ) -> dict[str, FrictionCurve]:
     """Compute the curves of all elements, for the gains of the vehicle card.
 
@@ -50,15 +50,15 @@ def build_friction_curves(
     found: dict[str, FrictionCurve] = {}
     for name in _list_free_laws(fit):
         base = _find_base(fit, linear, name)
-        curve = _build_curve(fit, told, name, base)
-        slopes = evaluate_stribeck(_get_law(fit, told, name)[0], base.slip)[1]
-        change, variance = _add_shapes(fit, told, name, base.slip, slopes)
+        curve = _build_curve(fit, correction, name, base)
+        slopes = evaluate_stribeck(_get_law(fit, correction, name)[0], base.slip)[1]
+        change, variance = _add_shapes(fit, correction, name, base.slip, slopes)
         found[name] = _set_band(curve, curve.mu + change, np.sqrt(variance))
     for name, partner in fit.problem.parts[0].structure.partners.items():
         if partner in found:
             empty = np.empty(0)
             base = replace(found[partner], points_slip=empty, points_mu=empty)
-            curve = _build_curve(fit, told, name, base)
+            curve = _build_curve(fit, correction, name, base)
             found[name] = replace(
                 curve,
                 verdict=Verdict.DESIGN,
@@ -82,7 +82,9 @@ def _get_gain(fit: LikelihoodFit, name: str) -> PriorValue:
     return PriorValue(one.gain, one.gain_std)
 
 
-def _get_law(fit: LikelihoodFit, told: Correction, name: str) -> tuple[FloatArray, FloatArray]:
+def _get_law(
+    fit: LikelihoodFit, correction: Correction, name: str
+) -> tuple[FloatArray, FloatArray]:
     """Return the coefficients `LAW` (4,) of an element and their derivatives (4, p) by the
     unknowns."""
     structure = next(
@@ -92,17 +94,17 @@ def _get_law(fit: LikelihoodFit, told: Correction, name: str) -> tuple[FloatArra
     )
     std = np.sqrt(np.diag(fit.covariance))
     rows = differentiate(
-        lambda at: dict(zip(LAW, structure.get_law(at, name), strict=True)), told.mean, std
+        lambda at: dict(zip(LAW, structure.get_law(at, name), strict=True)), correction.mean, std
     )
-    return np.array(structure.get_law(told.mean, name)), rows
+    return np.array(structure.get_law(correction.mean, name)), rows
 
 
 def _build_curve(
-    fit: LikelihoodFit, told: Correction, name: str, base: FrictionCurve
+    fit: LikelihoodFit, correction: Correction, name: str, base: FrictionCurve
 ) -> FrictionCurve:
     """Build the curve of the friction law of an element over the slips of `base`."""
-    theta, rows = _get_law(fit, told, name)
-    covariance = rows @ told.covariance @ rows.T
+    theta, rows = _get_law(fit, correction, name)
+    covariance = rows @ correction.covariance @ rows.T
     mu, slopes = evaluate_stribeck(theta, base.slip)
     mu_c, drop, mu_v, ln_v_s = (float(v) for v in theta)
     to_law = build_law_derivatives(float(np.exp(ln_v_s)))
@@ -122,28 +124,28 @@ def _set_band(curve: FrictionCurve, mu: FloatArray, std: FloatArray) -> Friction
 
 
 def _add_shapes(
-    fit: LikelihoodFit, told: Correction, name: str, slip: FloatArray, slopes: FloatArray
+    fit: LikelihoodFit, correction: Correction, name: str, slip: FloatArray, slopes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Compute the change of μ (n,) by the shapes beside the law, and the variance (n,) of both."""
     size, group = fit.point.values.size, Group(EffectId.FRICTION_SHAPE, name)
     index = [fit.point.names.index(f"{name}.{key}") for key in LAW]
-    columns = told.step.columns.find_columns(group)
+    columns = correction.step.columns.find_columns(group)
     if not columns:
-        total = told.covariance[np.ix_(index, index)]
+        total = correction.covariance[np.ix_(index, index)]
         return np.zeros(slip.size), np.einsum("pn,pq,qn->n", slopes, total, slopes)
     law = fit.point.values[index]
     largest = max(
         float(np.max(find_loaded_slips(part, fit.point, name), initial=1.0))
         for part in fit.problem.parts
     )
-    scale = EFFECTS[EffectId.FRICTION_SHAPE].std * told.step.columns.scale[columns]
+    scale = EFFECTS[EffectId.FRICTION_SHAPE].std * correction.step.columns.scale[columns]
     shapes = FrictionShapes(law, largest).evaluate(np.abs(slip)) * scale
     both = [*index, *(size + k for k in columns)]
     rows = np.vstack([slopes, shapes.T])
-    total = told.joint_covariance[np.ix_(both, both)]
-    change = shapes @ told.step.amounts[columns]
+    total = correction.joint_covariance[np.ix_(both, both)]
+    change = shapes @ correction.step.amounts[columns]
     variance = np.einsum("pn,pq,qn->n", rows, total, rows)
-    if told.evidence[group].nats > SHOWN:
+    if correction.evidence[group].nats > SHOWN:
         return change, variance
     return np.zeros(slip.size), variance + change**2
 
