@@ -63,7 +63,7 @@ def test_tooth_counts_are_exact() -> None:
     assert parse_teeth("49/33") == 49 / 33
     assert parse_teeth(" 49 / 33 * 41/20") == pytest.approx(49 / 33 * 41 / 20)
     for text in ("49:33", "49/0", "a/b", "49/33*"):
-        with pytest.raises(ValueError, match="49|without teeth|no ratio"):
+        with pytest.raises(ValueError, match=r"49|without teeth|no ratio"):
             parse_teeth(text)
 
 
