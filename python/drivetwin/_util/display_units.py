@@ -40,6 +40,9 @@ _BY_SI = {
     "Hz": Display("Hz"),
     "Pa": BAR,
     "rad/s": RPM,
+    "m/s^2": Display("m/s²"),
+    "m/s^3": Display("m/s³"),
+    "m/s^1.75": Display("m/s¹·⁷⁵"),
     "rad/s^2": Display("rad/s²"),
     "rad/s^3": Display("rad/s³"),
     "rad/s^1.75": Display("rad/s¹·⁷⁵"),
@@ -109,5 +112,6 @@ def format_significant(value: float, digits: int = 4) -> str:
 
 
 def _format_digits(value: float, digits: int) -> str:
-    text = f"{round(value, digits):,.{max(0, digits)}f}"
+    # Zero is added so that a negative zero loses its sign.
+    text = f"{round(value, digits) + 0.0:,.{max(0, digits)}f}"
     return text.replace(",", "\u202f").replace("-", "−")

@@ -77,7 +77,7 @@ def render_fleet(
     files = _count(store, "SELECT count(*) FROM files")
     units = _count(store, "SELECT count(DISTINCT unit) FROM files")
     return render_page(
-        f"Fleet of {units} units",
+        f"Fleet of {units} {'unit' if units == 1 else 'units'}",
         f"{files:,} logs in {store.folder.name}",
         [section for section in sections if section.blocks],
         library,
