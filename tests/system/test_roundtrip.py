@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +30,14 @@ WITHIN_HALF_A_PERCENT = (
 def _identified(
     folder: Path, scenario: ScenarioName, method: Method, noise: float
 ) -> tuple[Identification, Truth]:
+    """Identify a run by the card of its scenario; the card of the paper's method has exact P0."""
     bench = dyno.run(load_scenario(scenario), seed=11, noise=noise)
     log, card, _ = write_run(folder / "run.csv", bench)
+    if method is Method.PAPER:
+        exact = re.sub(
+            r"P0_bar = ([\d.]+)", r"P0_bar = { value = \1, std = 0.0 }", card.read_text()
+        )
+        card.write_text(exact)
     return run_identification(log, Request(card, None, method)).found, bench.truth
 
 

@@ -235,7 +235,7 @@ def _identify_paper_shifts(log: PreparedLog) -> tuple[PaperShift, ...]:
     design = log.design
     return tuple(
         identify_paper_shift(
-            one.signals, one.driveline, design.J_prime_range, design.J_vehicle_range
+            one.signals, one.driveline.by_card, design.J_prime_range, design.J_vehicle_range
         )
         for one in log.shifts
     )

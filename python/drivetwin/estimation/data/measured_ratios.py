@@ -7,15 +7,12 @@ ratio of the mean speeds is used: the noise of single samples would bias a regre
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from drivetwin._util.arrays import Span
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
     MeasuredSignal,
-    ShiftElementKinematics,
     ShiftSignals,
 )
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
@@ -53,19 +50,7 @@ def refine_ratios(driveline: KnownDriveline, signals: ShiftSignals) -> KnownDriv
     measured, priors = measure_ratios(signals, driveline), driveline.ratio_priors
     values = {name: _combine(priors[name], measured.get(name)) for name in priors}
 
-    def refine(one: ShiftElementKinematics) -> ShiftElementKinematics:
-        name = make_ratio_id(one.gear)
-        known = priors.get(name)
-        return one if known is None or known.std == 0.0 else one.replace_ratio(values[name])
-
-    own = {one.name: refine(one) for one in (driveline.offgoing, driveline.oncoming)}
-    return replace(
-        driveline,
-        i_f=values.get(FINAL_DRIVE, driveline.i_f),
-        offgoing=own[driveline.offgoing.name],
-        oncoming=own[driveline.oncoming.name],
-        couplings={**driveline.couplings, **own},
-    )
+    return driveline.replace_ratios(values)
 
 
 def _combine(prior: PriorValue, measured: PriorValue | None) -> float:

@@ -159,6 +159,28 @@ class KnownDriveline:
         return {**nominal, FINAL_DRIVE: self.i_f}
 
     @property
+    def by_card(self) -> KnownDriveline:
+        """The driveline with the ratios as the card states them."""
+        return self.replace_ratios({name: one.value for name, one in self.ratio_priors.items()})
+
+    def replace_ratios(self, values: Mapping[str, float]) -> KnownDriveline:
+        """Return the driveline with other nominal ratios, by parameter id; exact ones stay."""
+        priors = self.ratio_priors
+
+        def change(one: ShiftElementKinematics) -> ShiftElementKinematics:
+            known = priors.get(name := make_ratio_id(one.gear))
+            return one if known is None or known.std == 0.0 else one.replace_ratio(values[name])
+
+        own = {one.name: change(one) for one in (self.offgoing, self.oncoming)}
+        return replace(
+            self,
+            i_f=values.get(FINAL_DRIVE, self.i_f),
+            offgoing=own[self.offgoing.name],
+            oncoming=own[self.oncoming.name],
+            couplings={**self.couplings, **own},
+        )
+
+    @property
     def i_before(self) -> float:
         """Overall ratio of the gear that is left."""
         return self.offgoing.ratio
