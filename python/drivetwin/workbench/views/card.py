@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from dash import ALL, Input, Output, State, dcc, html
+from dash import ALL, Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.findings import render
@@ -74,7 +74,9 @@ def register(page: ui.Page) -> None:
         options = [html.Option(value=name) for name in names]
         cards = [name for name in names if is_card(session.folder.root / name)]
         files = build_file_buttons("card-file", "vehicle card", cards)
-        return content, format_source(work.card), options, files
+        # Without an open card the field keeps the text that was typed while the page loaded.
+        path = no_update if work.card is None else format_source(work.card)
+        return content, path, options, files
 
 
 def _register_opening(page: ui.Page) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dash import ALL, Input, Output, State, dcc, html
+from dash import ALL, Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.findings import render
@@ -61,7 +61,9 @@ def register(page: ui.Page) -> None:
         content = [] if work.opened is None else [*_list_logs(work), *_build_content(work.opened)]
         names = session.folder.list_names(SUFFIXES)
         options = [html.Option(value=name) for name in names]
-        return content, format_source(work.log), options, build_file_buttons("file", "log", names)
+        # Without an open log the field keeps the text that was typed while the page loaded.
+        path = no_update if work.log is None else format_source(work.log)
+        return content, path, options, build_file_buttons("file", "log", names)
 
 
 def _register_opening(page: ui.Page) -> None:

@@ -23,10 +23,8 @@ def get_source(session: Session, typed: str | None, upload: UploadField | None) 
     return session.get_folder_source(typed or "")
 
 
-def format_source(source: Source | None) -> str:
-    """Return the text of a field for a file; empty without one."""
-    if source is None:
-        return ""
+def format_source(source: Source) -> str:
+    """Return the text of a field for a file."""
     return _UPLOADED + source.name if source.uploaded else source.name
 
 
