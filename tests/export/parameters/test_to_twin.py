@@ -56,6 +56,37 @@ def test_edited_values_reach_the_simulation(kind: ParameterFormat) -> None:
     assert update_twin(twin(), _edited(eta=0.9)).twin.covariance is None
 
 
+@pytest.mark.parametrize("kind", ParameterFormat)
+def test_an_estimated_ratio_is_written_once_and_read_back(kind: ParameterFormat) -> None:
+    given = replace(twin(), i_in=1.2)
+    gear = given.get_gear("3").ratio / 1.2
+    ratios = {
+        name: Estimate(name, value, 1e-4, Verdict.IDENTIFIED, "likelihood")
+        for name, value in (("ratio_3", gear), ("i_f", given.final_drive))
+    }
+    given = replace(given, parameters={**given.parameters, **ratios})
+    written = collect_parameters(given)
+    codec = CODECS[kind]
+    assert update_twin(given, codec.parse(codec.text(written), "file")).changed == ()
+    scalars = tuple(
+        replace(one, value=1.1 * one.value) if one.name in ratios else one
+        for one in written.scalars
+    )
+    edited = replace(written, scalars=scalars)
+    update = update_twin(given, codec.parse(codec.text(edited), "file"))
+    assert set(update.changed) == set(ratios)
+    assert update.twin.get_gear("3").ratio == pytest.approx(1.1 * gear * 1.2, rel=1e-12)
+    assert update.twin.parameters["ratio_3"].value == pytest.approx(1.1 * gear, rel=1e-12)
+    assert update.twin.final_drive == update.twin.parameters["i_f"].value
+
+
+def test_another_input_gear_keeps_the_ratios_behind_it() -> None:
+    given = twin()
+    twice = ParameterSet("t", (Scalar("i_in", 2.0 * given.i_in),))
+    update = update_twin(given, twice)
+    assert update.twin.get_gear("3").ratio == pytest.approx(2.0 * given.get_gear("3").ratio)
+
+
 @pytest.mark.parametrize("told", [False, True])
 def test_every_name_that_is_told_as_changed_acts(told: bool) -> None:
     given = replace(twin(), load_law=LoadLaw(aero=7.0, std=0.5, mean_speed=14.0))

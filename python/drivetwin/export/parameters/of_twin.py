@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.spelling import to_one_line
-from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.twin.twin import build_friction_law
 
 if TYPE_CHECKING:
@@ -103,6 +103,10 @@ def _collect_estimates(twin: Twin) -> Iterator[Scalar]:
             )
 
 
+def _list_estimated(twin: Twin) -> set[str]:
+    return {one.id for one in twin.parameters.values() if one.value is not None}
+
+
 def _describe_estimate(estimate: Estimate) -> str:
     """Meaning, verdict and interval; that of a value of the card has no width and is left out."""
     text = f"{get_parameter_spec(estimate.id).meaning}; {estimate.verdict.value}"
@@ -122,11 +126,15 @@ def _collect_load_terms(twin: Twin) -> Iterator[Scalar]:
 
 
 def _collect_gearing(twin: Twin) -> Iterator[Scalar]:
+    """Input gear, and the ratios without an estimate; an estimated one is among the estimates."""
+    told = _list_estimated(twin)
     yield Scalar("i_in", twin.i_in, text="input gear")
-    yield Scalar("i_f", twin.final_drive, text="final drive")
+    if FINAL_DRIVE not in told:
+        yield Scalar(FINAL_DRIVE, twin.final_drive, text="final drive; design value")
     for name, gear in twin.gears.items():
-        text = to_one_line(f"overall ratio of gear {name}, held by {gear.element}")
-        yield Scalar(f"ratio_{name}", gear.ratio, text=text)
+        text = f"ratio of gear {name} without the input gear, held by {gear.element}; design value"
+        if (key := make_ratio_id(name)) not in told:
+            yield Scalar(key, gear.ratio / twin.i_in, text=to_one_line(text))
 
 
 def _collect_elements(twin: Twin) -> Iterator[Scalar]:
@@ -135,7 +143,7 @@ def _collect_elements(twin: Twin) -> Iterator[Scalar]:
 
 
 def _build_design_scalar(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
-    told = {one.id for one in twin.parameters.values() if one.value is not None}
+    told = _list_estimated(twin)
     for field, (unit, text) in DESIGN_FIELDS.items():
         key = f"{field}.{name}"
         if not told & {key, key + OVER_ETA}:

@@ -14,7 +14,7 @@ from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, collect_parameters
 from drivetwin.export.parameters.spelling import to_dotted_name, to_flat_name
 from drivetwin.export.parameters.units import is_same_unit
-from drivetwin.parameters import get_parameter_spec
+from drivetwin.parameters import FINAL_DRIVE, get_parameter_spec, is_ratio, make_ratio_id
 from drivetwin.twin.twin import SIMULATED
 
 if TYPE_CHECKING:
@@ -132,12 +132,11 @@ def _set_number(twin: Twin, name: str, value: float) -> Twin:
     """The twin with one number changed."""
     field, _, element = name.partition(".")
     if name == "i_in":
-        return replace(twin, i_in=value)
-    if name == "i_f":
-        return replace(twin, final_drive=value)
-    if name.startswith("ratio_"):
-        gear = name.removeprefix("ratio_")
-        return replace(twin, gears={**twin.gears, gear: replace(twin.gears[gear], ratio=value)})
+        return _set_input_gear(twin, value)
+    if is_ratio(name):
+        twin = _set_ratio(twin, name, value)
+        if name not in twin.parameters:
+            return twin
     if field == "load" and twin.load_law is not None:
         changes: dict[str, Any] = {element: value}
         return replace(twin, load_law=replace(twin.load_law, **changes))
@@ -149,6 +148,22 @@ def _set_number(twin: Twin, name: str, value: float) -> Twin:
         return replace(twin, elements={**twin.elements, element: design})
     told = Estimate(name, value, None, Verdict.DESIGN, METHOD, reason="given by a parameter file")
     return replace(twin, parameters={**twin.parameters, name: told})
+
+
+def _set_input_gear(twin: Twin, value: float) -> Twin:
+    """The twin with another input gear; the ratios behind it stay."""
+    scale = value / twin.i_in
+    gears = {name: replace(one, ratio=scale * one.ratio) for name, one in twin.gears.items()}
+    return replace(twin, i_in=value, gears=gears)
+
+
+def _set_ratio(twin: Twin, name: str, value: float) -> Twin:
+    """The twin with another ratio of a gear, given without the input gear, or final drive."""
+    if name == FINAL_DRIVE:
+        return replace(twin, final_drive=value)
+    gear = name.removeprefix(make_ratio_id(""))
+    changed = replace(twin.gears[gear], ratio=twin.i_in * value)
+    return replace(twin, gears={**twin.gears, gear: changed})
 
 
 def _set_law_field(twin: Twin, element: str, field: str, value: float) -> Twin:
