@@ -172,6 +172,7 @@ class Code(StrEnum):
     CARD_NOT_COMPARED = auto()
     NO_SENSOR_TOLERANCES = auto()
     MAPPED_COLUMN_ABSENT = auto()
+    MAPPING_NOT_APPLIED = auto()
     IGNORED_COLUMN_ABSENT = auto()
     UNITS_REMEMBERED = auto()
     CONVERSION_NOT_USED = auto()

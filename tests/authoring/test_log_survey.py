@@ -14,6 +14,7 @@ from drivetwin.authoring.answers import Origin, get_value
 from drivetwin.authoring.card_text import format_card
 from drivetwin.authoring.log_survey import (
     LogGear,
+    LogSurvey,
     assign_pressures,
     find_pressure_columns,
     label_pressure,
@@ -23,6 +24,7 @@ from drivetwin.authoring.options import CardOptions, parse_options
 from drivetwin.authoring.questions import Sources
 from drivetwin.authoring.session import Session
 from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import Column
 from drivetwin.vehicle.card import load_card
 from tests.plausibility.fixtures import Synthetic, make_log
@@ -36,7 +38,10 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return make_log(request.param, tmp_path_factory.mktemp("survey"))
 
 
-read = cache(survey_log)
+@cache
+def read(log: Path, mapping: Path | None) -> LogSurvey:
+    """Survey a log once for all tests."""
+    return survey_log(log, Mapped({}) if mapping is None else read_mapping(mapping))
 
 
 def draft(log: Path, options: CardOptions | None = None, mapping: Path | None = None) -> Session:
@@ -164,7 +169,7 @@ def test_a_log_without_units_needs_a_mapping(tmp_path: Path) -> None:
     log = LOGS / "truck_c.mat"
     if not log.is_file():
         pytest.skip("no truck_c.mat beside the project")
-    assert "names no unit" in survey_log(log, None).remark
+    assert "names no unit" in survey_log(log, Mapped({})).remark
     mapping = tmp_path / "channels.toml"
     mapping.write_text(
         "".join(

@@ -13,7 +13,6 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped, make_spec, select_free
-from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.name_table import load_name_table, normalise_name
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column
@@ -22,7 +21,7 @@ from drivetwin.channels.shiftlog import Quantity, ShiftLog
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import MissingChannelError, TimeError
 from drivetwin.findings import Code
-from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.open_mapped import open_stated
 from drivetwin.logs.quality.time_alignment import estimate_speed_ratio
 from drivetwin.logs.raw import Remembered
 from drivetwin.logs.read import Demands, read_recording
@@ -121,13 +120,12 @@ def round_to_std(value: float, std: float) -> tuple[float, float]:
     return round(value, digits), round(std, digits)
 
 
-def survey_log(path: Path, mapping: Path | None) -> LogSurvey:
+def survey_log(path: Path, stated: Mapped) -> LogSurvey:
     """Read a log without a card and find the ratios and pressures that it holds.
 
     Raises the typed errors of `read_log` where the log cannot be read at all.
     """
-    stated = Mapped({}) if mapping is None else read_mapping(mapping)
-    with open_recording(path, stated.options) as opened:
+    with open_stated(path, stated) as (opened, stated):
         recording = Remembered(opened)
         specs = find_pressure_columns(recording.columns, stated)
         blank, named = name_pressures(specs, stated)

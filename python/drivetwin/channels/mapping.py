@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
@@ -26,7 +27,8 @@ class Mapped:
     """Channel specs by role, how to read the file, and what was left out on purpose.
 
     `names` by role are the user's, by which columns are recognised beside the built-in names.
-    `absent` are the columns by role that an earlier log had and this one has not.
+    `absent` are the columns by role that an earlier log had and this one has not. `file` is the
+    mapping file, `beside` True if it was found beside the log instead of given.
     """
 
     channels: Mapping[str, ChannelSpec]
@@ -34,6 +36,8 @@ class Mapped:
     findings: tuple[Finding, ...] = ()
     names: Mapping[str, Sequence[str]] = field(default_factory=dict)
     absent: Mapping[str, str] = field(default_factory=dict)
+    file: Path | None = None
+    beside: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Generic, Literal, TypeVar
 
@@ -114,6 +115,26 @@ def find_project_mapping(log: Path) -> Path | None:
     return beside if beside.is_file() else None
 
 
+def read_project_mapping(log: Path) -> Mapped:
+    """Read the mapping of a project folder, empty without one.
+
+    Raises the errors of `read_mapping`, which name the file and the way to go on without it.
+    """
+    path = find_project_mapping(log)
+    if path is None:
+        return Mapped({})
+    try:
+        return replace(read_mapping(path), beside=True)
+    except MappingError as fault:
+        fault.remedy += f"; {describe_way_on(path)}"
+        raise
+
+
+def describe_way_on(path: Path) -> str:
+    """Describe how to go on without the mapping file `path` that was found beside a log."""
+    return f"to go on without {path}, rename it or give another mapping (--channels)"
+
+
 def read_mapping(path: Path) -> Mapped:
     """Read a channel mapping file; raises MappingError naming every fault by its key."""
     document = read_toml(path, MappingError)
@@ -131,7 +152,8 @@ def read_mapping(path: Path) -> Mapped:
     time = TimeColumn(file.time.source, file.time.unit, file.time.simultaneous)
     names = dict(file.names.iterate_roles())
     _refuse_blank_names(names, path)
-    return Mapped(channels, ReadOptions(time, bus, tuple(file.columns.ignored)), names=names)
+    options = ReadOptions(time, bus, tuple(file.columns.ignored))
+    return Mapped(channels, options, names=names, file=path)
 
 
 def _refuse_blank_names(names: Mapping[str, list[str]], path: Path) -> None:

@@ -12,6 +12,7 @@ import typer
 from drivetwin.errors import ResultFileError, Where
 
 if TYPE_CHECKING:
+    from drivetwin.channels.mapping import Mapped
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.twin.twin import Twin
     from drivetwin.vehicle.card import VehicleCard
@@ -116,11 +117,11 @@ ChannelsFile = Annotated[
 ]
 
 
-def find_mapping(channels: Path | None, log: Path) -> Path | None:
-    """Return the mapping file that was given, else `channels.toml` beside the log, else None."""
-    from drivetwin.channels.mapping_file import find_project_mapping
+def find_mapping(channels: Path | None, log: Path) -> Mapped:
+    """Read the mapping file that was given, else `channels.toml` beside the log, if any."""
+    from drivetwin.channels.mapping_file import read_mapping, read_project_mapping
 
-    return channels if channels is not None else find_project_mapping(log)
+    return read_project_mapping(log) if channels is None else read_mapping(channels)
 
 
 def load_plant(path: Path, *, drop_part: bool) -> Twin:

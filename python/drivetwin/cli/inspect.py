@@ -65,8 +65,6 @@ def inspect(
     Also list the warnings of `shifts` and `identify`, and their reason if they refuse the log.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.channels.mapping import Mapped
-    from drivetwin.channels.mapping_file import read_mapping
     from drivetwin.channels.mapping_text import format_mapping
     from drivetwin.files.records import dump_findings
     from drivetwin.logs.formats.can.database import list_databases
@@ -76,8 +74,7 @@ def inspect(
     if accept_proposals and write_mapping is None:
         raise InputError("--accept-proposals needs a mapping file", "add --write-mapping MAP")
     card = None if vehicle is None else load_card(vehicle)
-    mapping = find_mapping(channels, log)
-    stated = Mapped({}) if mapping is None else read_mapping(mapping)
+    stated = find_mapping(channels, log)
     with show_step(f"reading {log.name}"):
         try:
             seen = _look_at(log, card, stated)
@@ -126,31 +123,37 @@ class _Seen:
 
 def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
     """Survey a log and read it as for use; a log without a unit of time is surveyed in seconds."""
-    from drivetwin.logs.formats.detect import open_recording
+    from drivetwin.channels.mapping import Mapped
+    from drivetwin.channels.read_options import ReadOptions, TimeColumn
+    from drivetwin.logs.open_mapped import open_stated
     from drivetwin.logs.raw import Remembered
     from drivetwin.logs.survey import find_shortest_step
     from drivetwin.plausibility.check import drop_card_findings
 
     try:
-        with open_recording(log, stated.options) as opened:
+        with open_stated(log, stated) as (opened, used):
             recording = Remembered(opened)
-            found, names, stated = _survey(recording, log, card, stated)
+            found, names, used = _survey(recording, log, card, used)
             findings, refusal, refused_by = _read_as_mapped_log(
-                recording, log, names, stated, gearing=card is not None
+                recording, log, names, used, gearing=card is not None
             )
             if card is None:
                 findings = drop_card_findings(findings)
             return _Seen(found, findings, refusal, refused_by)
-    except UnitError as fault:
-        if stated.options.time.unit is not None:
+    except DrivetwinError as fault:
+        names_unit = stated.options.time.unit is not None or not isinstance(fault, UnitError)
+        if names_unit and not stated.beside:
             raise
         refusal = fault
-    seconds = replace(stated.options, time=replace(stated.options.time, unit="s"))
-    with open_recording(log, seconds) as opened:
+    time = stated.options.time
+    seconds = replace(stated, options=replace(stated.options, time=replace(time, unit="s")))
+    bare = Mapped({}, ReadOptions(TimeColumn(unit="s")))
+    with open_stated(log, seconds if time.unit is None else stated, bare) as (opened, used):
         recording = Remembered(opened)
-        found, _, _ = _survey(recording, log, card, stated)
+        options = stated.options if used.file == stated.file else ReadOptions()
+        found, _, _ = _survey(recording, log, card, replace(used, options=options))
         step = find_shortest_step(recording)
-    return _Seen(found, (), refusal, "shifts and identify refuse", step)
+    return _Seen(found, used.findings, refusal, "shifts and identify refuse", step)
 
 
 def _survey(

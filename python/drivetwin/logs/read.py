@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.recall import recall_options
 from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
 from drivetwin.channels.unit_proposals import Proposal, propose_missing_units
@@ -32,6 +30,7 @@ from drivetwin.errors import (
 )
 from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.open_mapped import name_project_mapping, open_as_mapped
 from drivetwin.logs.quality.channel_checks import Checked, check_channel
 from drivetwin.logs.quality.consistency_checks import (
     check_common_span,
@@ -64,7 +63,7 @@ class Demands:
 def read_log(
     path: Path | str,
     card: VehicleCard | None,
-    mapping: Path | str | None = None,
+    mapping: Path | str | Mapped | None = None,
     needed: Iterable[str] = FOR_SHIFTS,
     window: Window | None = None,
     sound: Iterable[str] | None = None,
@@ -73,8 +72,8 @@ def read_log(
 ) -> ShiftLog:
     """Read a shift log: every mapped channel on its own time base, SI inside.
 
-    Columns come from the `mapping` file, else from the card's [channels], else from the log of the
-    twin that the card is of, else by name. `needed`
+    Columns come from the `mapping` (a file, or one that was read), else from the card's [channels],
+    else from the log of the twin that the card is of, else by name. `needed`
     are the roles that must exist (or their stand-in: engine for input speed, wheel for output
     speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
     last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
@@ -90,36 +89,13 @@ def read_log(
     TimeError, DamagedChannelError, PlausibilityError; each contains a remedy.
     """
     path = Path(path)
-    stated = read_mapping(Path(mapping)) if mapping is not None else Mapped({})
+    stated = mapping or Mapped({})
+    if not isinstance(stated, Mapped):
+        stated = read_mapping(Path(stated))
     with open_as_mapped(path, stated, card) as (recording, stated):
         log = read_recording(recording, path, card, stated, Demands(needed, sound, gearing), window)
-    mappings = {} if mapping is None else {Path(mapping).name: _compute_digest(Path(mapping))}
+    mappings = {} if stated.file is None else {stated.file.name: _compute_digest(stated.file)}
     return replace(log, mappings=mappings)
-
-
-@contextmanager
-def open_as_mapped(
-    path: Path, stated: Mapped, card: VehicleCard | None
-) -> Iterator[tuple[Recording, Mapped]]:
-    """Open a log with the `stated` options, completed by those that the twin of the card remembers.
-
-    Yields the recording and the mapping with the options that were used. A log that cannot be
-    opened with the remembered options is opened without them.
-    """
-    with ExitStack() as stack:
-        options = stated.options
-        if card is not None:
-            options = recall_options(options, card.remembered.options, path.parent)
-        if options != stated.options:
-            try:
-                recording = stack.enter_context(open_recording(path, options))
-            except DrivetwinError:
-                options = stated.options
-            else:
-                recalled = (*stated.findings, report(Code.OPTIONS_REMEMBERED))
-                yield recording, replace(stated, options=options, findings=recalled)
-                return
-        yield stack.enter_context(open_recording(path, options)), stated
 
 
 def read_recording(
@@ -134,7 +110,8 @@ def read_recording(
 
     See `read_log`; the log names no mapping file.
     """
-    log = assemble_log(recording, str(path), card, stated, demands, window)
+    with name_project_mapping(stated):
+        log = assemble_log(recording, str(path), card, stated, demands, window)
     return replace(log, sha256=_compute_digest(path))
 
 

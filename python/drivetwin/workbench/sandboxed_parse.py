@@ -7,7 +7,7 @@ A file of a few kilobytes may claim gigabytes. Then the child fails, not the pro
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -32,6 +32,7 @@ from drivetwin.findings import Finding
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.formats.parser_limits import compute_parser_limits
+from drivetwin.logs.open_mapped import open_stated
 from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Survey, find_shortest_step, survey_recording
 from drivetwin.plausibility.check import check_card, drop_card_findings, select_card_findings
@@ -64,7 +65,8 @@ class Opened:
 class Request:
     """Files to open, and the user's corrections of the mapping.
 
-    The labels name the files in messages and results; without a card `card` is None.
+    The labels name the files in messages and results; without a card `card` is None. `beside` is
+    True for a mapping that was found beside the log.
     """
 
     log: Path
@@ -72,6 +74,7 @@ class Request:
     card: Path | None = None
     card_label: str = ""
     mapping: Path | None = None
+    beside: bool = False
     corrections: Corrections = field(default_factory=Corrections)
 
 
@@ -117,7 +120,8 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
         with _apply_labels(_get_labels(request)):
             mapping = _write_mapping(scratch, stated)
             read = read_log(request.log, names, mapping, gearing=card is not None)
-            log = replace(read, source=request.label, mappings={})
+            findings = (*stated.findings, *read.findings)
+            log = replace(read, source=request.label, mappings={}, findings=findings)
             if card is None:
                 log = replace(log, findings=drop_card_findings(log.findings))
             found = None if card is None else detect_shifts(log, card)
@@ -188,7 +192,7 @@ def survey_for_card(emit: Emit, request: Request, scratch: Path) -> None:
     limit_memory(compute_parser_limits(request.log).memory)
     with _apply_labels(_get_labels(request)):
         survey: LogSurvey = survey_log(
-            request.log, _write_mapping(scratch, _read_stated(request, None))
+            request.log, read_mapping(_write_mapping(scratch, _read_stated(request, None)))
         )
     emit(replace(survey, log=replace(survey.log, source=request.label, mappings={})))
 
@@ -206,7 +210,7 @@ def _load_card(request: Request) -> VehicleCard | None:
 
 def _read_stated(request: Request, card: VehicleCard | None) -> Mapped:
     """Read the mapping file with the corrections, those of elements that a card lacks left out."""
-    stated = Mapped({}) if request.mapping is None else read_mapping(request.mapping)
+    stated = _read_mapping(request)
     corrected = {
         role: spec
         for role, spec in request.corrections.channels.items()
@@ -220,6 +224,17 @@ def _read_stated(request: Request, card: VehicleCard | None) -> Mapped:
         channels=combine_specs(stated.channels, corrected, request.corrections.ignored),
         options=replace(stated.options, ignored=ignored, time=time),
     )
+
+
+def _read_mapping(request: Request) -> Mapped:
+    """Read the mapping file; one beside the log that fits no column gives a finding alone."""
+    if request.mapping is None:
+        return Mapped({})
+    stated = replace(read_mapping(request.mapping), beside=request.beside)
+    if request.beside:
+        with suppress(UnitError), open_stated(request.log, stated) as (_, fitting):
+            return fitting
+    return stated
 
 
 def _check_card(card: VehicleCard, log: ShiftLog, found: FoundShifts) -> tuple[Finding, ...]:

@@ -429,5 +429,6 @@ def _make_request(
         card=None if card is None else card.path,
         card_label="" if card is None else card.name,
         mapping=mapping or project,
+        beside=mapping is None and project is not None,
         corrections=corrections,
     )
