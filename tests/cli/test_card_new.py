@@ -123,7 +123,7 @@ QUESTIONS = (
     ("Shift element", b"B2,B3\n"),
     ("Is B2 a brake", b"\n"),
     ("P0 of B2", b"0,8\n"),
-    ("decimal point", b"0.8+-0.05\n"),
+    ("write a point", b"0.8+-0.05\n"),
     ("known as gain", b"diameters\n"),
     ("Friction surfaces", b"14\n"),
     ("De-rating", b"0.9\n"),

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
+from drivetwin.authoring.stated_number import StatedNumber
+
 Key = tuple[str, ...]
 """Place of an answer, such as `("final_drive",)` or `("elements", "B2", "kind")`."""
 
@@ -48,7 +50,7 @@ class GearAnswer:
     """A gear: its name, its ratio without the input gear, the shift element that makes it."""
 
     name: str
-    ratio: float
+    ratio: StatedNumber
     element: str
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
 from drivetwin._util.toml import format_key, format_text, parse_toml, raise_faults
 from drivetwin._util.visible_text import escape_line
@@ -79,7 +78,7 @@ def _format_head(answers: Answers, survey: LogSurvey | None, *, draft: bool) -> 
     yield from format_entry("i_in", i_in, "input gear: engine over gearbox input speed [-]")
     yield from format_entry(
         "final_drive",
-        _add_std(answers.get(("final_drive",), UNKNOWN), survey),
+        answers.get(("final_drive",), UNKNOWN),
         "i_f: output over wheel speed, hub reduction included [-]",
     )
 
@@ -97,7 +96,7 @@ def _format_gears(answers: Answers, survey: LogSurvey | None) -> Iterator[str]:
     for gear in gears:
         yield "[[gears]]"
         yield from format_entry("name", _take(notes["names"], gear.name), "")
-        yield from format_entry("ratio", _add_std(_take(notes["ratios"], gear.ratio), survey), "")
+        yield from format_entry("ratio", _take(notes["ratios"], gear.ratio), "")
         yield from format_entry("elements", _take(notes["elements"], [gear.element]), "")
         yield ""
     if survey is not None and survey.has_input_slip and get_value(answers, *KEY) is None:
@@ -108,12 +107,6 @@ def _format_gears(answers: Answers, survey: LogSurvey | None) -> Iterator[str]:
 def _take(answer: Answer, value: object) -> Answer:
     """Return one value of a list with the origin of the list."""
     return Answer(value, answer.origin, answer.note)
-
-
-def _add_std(answer: Answer, survey: LogSurvey | None) -> Answer:
-    """Return a ratio with its standard deviation if it is the one that the log shows."""
-    std = 0.0 if survey is None else survey.measured_ratios.get(answer.value, 0.0)
-    return answer if std == 0.0 else replace(answer, value=(answer.value, std))
 
 
 def _format_inertia(answers: Answers) -> Iterator[str]:

@@ -17,6 +17,7 @@ from drivetwin.authoring.answers import (
 )
 from drivetwin.authoring.gearboxes import reduce_gears
 from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
+from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.errors import CardError, Where
 from drivetwin.plausibility.settings import PLAUSIBILITY
 from drivetwin.vehicle.check import RATIO_TOLERANCE
@@ -50,11 +51,15 @@ def _derive_gearbox(answers: Answers) -> Iterator[tuple[Key, Answer]]:
         return
     note = f"computed from the built-in gearbox {name}"
     elements = reduce_gears(name, names)
-    yield ("gears", "ratios"), Answer(tuple(one.ratio for one in elements), note=note)
+    yield (
+        ("gears", "ratios"),
+        Answer(tuple(StatedNumber.compute(one.ratio) for one in elements), note=note),
+    )
     yield ("gears", "elements"), Answer(tuple(one.element for one in elements), note=note)
     for one in elements:
-        for part in ("kind", "i_c", "i_out"):
-            yield ("elements", one.element, part), Answer(getattr(one, part), note=note)
+        yield ("elements", one.element, "kind"), Answer(one.kind, note=note)
+        for part, ratio in (("i_c", one.i_c), ("i_out", one.i_out)):
+            yield ("elements", one.element, part), Answer(StatedNumber.compute(ratio), note=note)
 
 
 def _spread_common(answers: Answers) -> Iterator[tuple[Key, Answer]]:

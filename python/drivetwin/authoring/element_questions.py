@@ -15,11 +15,16 @@ from drivetwin.authoring.parsing import (
     Parser,
     make_choice_parser,
     make_number_parser,
-    parse_design_value,
     parse_share,
     parse_surfaces,
 )
 from drivetwin.authoring.question import Question
+from drivetwin.authoring.stated_number import (
+    StatedNumber,
+    make_stated_parser,
+    parse_ratio,
+    parse_stated,
+)
 from drivetwin.vehicle.check import RATIO_TOLERANCE
 
 
@@ -40,9 +45,10 @@ _KIND_LETTERS = {"B": "brake", "K": "clutch"}
 """Kinds by the usual first letter of an element's name."""
 
 
-def parse_clutch_ratio(text: str) -> float:
+def parse_clutch_ratio(text: str) -> StatedNumber:
     """Parse a ratio of a clutch, which may be negative but not zero."""
-    value = make_number_parser(-1e3, 1e3)(text)
+    is_negative = text.strip().startswith("-")
+    value = parse_stated(text, -1e3, 1e3) if is_negative else parse_ratio(text)
     if abs(value) < 1e-3:
         raise ValueError(f"{value:g} is too near to zero for a ratio")
     return value
@@ -52,8 +58,8 @@ ELEMENT_PARTS: dict[str, Parser] = {
     "kind": make_choice_parser(("brake", "clutch")),
     "i_c": parse_clutch_ratio,
     "i_out": parse_clutch_ratio,
-    "P0_bar": parse_design_value,
-    "gain_m3": make_number_parser(high=MOST_GAIN, unit="m³"),
+    "P0_bar": make_stated_parser(zero=True),
+    "gain_m3": make_stated_parser(high=MOST_GAIN, unit="m³"),
     "surfaces": parse_surfaces,
     "derating": parse_share,
     "area_m2": make_number_parser(high=MOST_GAIN, unit="m²"),
@@ -62,7 +68,7 @@ ELEMENT_PARTS: dict[str, Parser] = {
     "inner_mm": make_number_parser(high=MOST_DIAMETER, unit="mm", zero=True),
     "piston_outer_mm": make_number_parser(1.0, MOST_DIAMETER, unit="mm"),
     "piston_inner_mm": make_number_parser(high=MOST_DIAMETER, unit="mm", zero=True),
-    "drum_inertia_kgm2": parse_design_value,
+    "drum_inertia_kgm2": make_stated_parser(zero=True),
     "peak": make_number_parser(1.0, 10.0, zero=True),
 }
 """Parts of an element that may be stated, each with its parser."""
@@ -164,7 +170,7 @@ def iterate_element_questions(
     Without gears they are those on one element without a name.
     """
     gears = [(one.name, one.ratio, one.element) for one in list_gears(answers)]
-    for gear, ratio, element in gears or [("", 2.0, "")]:
+    for gear, ratio, element in gears or [("", StatedNumber.make("2"), "")]:
         yield _make_kind_question(element, gear, ratio)
         if get_value(answers, "elements", element, "kind") == "clutch":
             yield from _iterate_ratio_questions(answers, element, ratio)
@@ -226,15 +232,17 @@ def _make_kind_parser(ratio: float) -> Parser:
     return parse
 
 
-def _iterate_ratio_questions(answers: Answers, element: str, ratio: float) -> Iterator[Question]:
+def _iterate_ratio_questions(
+    answers: Answers, element: str, ratio: StatedNumber
+) -> Iterator[Question]:
     yield _make_question(element, "i_c")
     i_c = get_value(answers, "elements", element, "i_c")
-    implied = Answer(ratio / i_c, Origin.DEFAULT, "gear ratio over i_c") if i_c else None
+    implied = Answer(ratio.divide(i_c), Origin.DEFAULT, "gear ratio over i_c") if i_c else None
     yield _make_question(element, "i_out", _make_product_parser(ratio, i_c), implied)
 
 
-def _make_product_parser(ratio: float, i_c: float | None) -> Parser:
-    def parse(text: str) -> float:
+def _make_product_parser(ratio: StatedNumber, i_c: StatedNumber | None) -> Parser:
+    def parse(text: str) -> StatedNumber:
         i_out = parse_clutch_ratio(text)
         if i_c is not None and abs(i_c * i_out / ratio - 1.0) > RATIO_TOLERANCE:
             raise ValueError(f"i_c·i_out = {i_c * i_out:.4g}, but the gear has {ratio:g}")

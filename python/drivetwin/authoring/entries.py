@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from drivetwin._util.toml import format_text
 from drivetwin._util.visible_text import escape_line
 from drivetwin.authoring.answers import Answer, Origin
+from drivetwin.authoring.stated_number import StatedNumber
 
 
 def format_entry(key: str, answer: Answer, meaning: str) -> Iterator[str]:
@@ -27,16 +28,13 @@ def format_range(key: str, answer: Answer, meaning: str) -> Iterator[str]:
 
 
 def format_value(value: object) -> str:
-    """Write a value in TOML; a pair of value and standard deviation as a table or, exact, alone."""
+    """Write a value in TOML; a stated number in its own digits."""
+    if isinstance(value, StatedNumber):
+        return value.entry
     if isinstance(value, str):
         return format_text(value)
     if isinstance(value, list):
         return f"[{', '.join(map(format_value, value))}]"
-    if isinstance(value, tuple):
-        number, std = value
-        if std == 0.0:
-            return format_value(number)
-        return f"{{ value = {format_value(number)}, std = {format_value(std)} }}"
     return repr(value)
 
 

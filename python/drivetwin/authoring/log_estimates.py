@@ -10,6 +10,7 @@ import numpy as np
 
 from drivetwin.authoring.answers import Answers, get_value, list_gears
 from drivetwin.authoring.log_survey import LogSurvey
+from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import BAR
@@ -20,6 +21,7 @@ from drivetwin.plausibility.settings import PLAUSIBILITY, Limits
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.torque_onset import locate_torque_dip, smooth_channel
+from drivetwin.vehicle.distribution import describe_fill_pressure, describe_inertia
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -42,7 +44,7 @@ class LogEstimates:
     `remark` states why there is none.
     """
 
-    P0: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    P0: Mapping[str, StatedNumber] = field(default_factory=dict)
     J_prime: Limits | None = None
     J_vehicle: Limits | None = None
     products: Mapping[str, FrictionProduct] = field(default_factory=dict)
@@ -106,7 +108,7 @@ def make_provisional_card(answers: Answers) -> VehicleCard:
         J_vehicle_range=get_value(
             answers, "inertia", "J_vehicle", default=PLAUSIBILITY.vehicle_inertia
         ),
-        J_out=None if J_out is None else PriorValue(*J_out),
+        J_out=None if J_out is None else J_out.to_prior(describe_inertia),
     )
 
 
@@ -119,7 +121,7 @@ def _make_element(answers: Answers, name: str, ratio: float) -> ElementSpec:
     if i_c is not None and i_out is None:
         i_out = ratio / i_c
     P0 = get_value(answers, "elements", name, "P0_bar")
-    fill = USUAL_FILL if P0 is None else PriorValue(P0[0] * BAR, P0[1] * BAR)
+    fill = USUAL_FILL if P0 is None else P0.to_prior(describe_fill_pressure, BAR)
     return ElementSpec(
         name,
         kind,
@@ -143,13 +145,13 @@ def name_pressures(log: ShiftLog, answers: Answers) -> ShiftLog:
 
 def estimate_fill_pressures(
     log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
-) -> dict[str, tuple[float, float]]:
+) -> dict[str, StatedNumber]:
     """Estimate P0 [bar] of on-coming elements with one standard deviation [bar].
 
     It is the pressure at which the output torque begins to fall in a power-on upshift. Elements
     whose torque begins while the pressure changes quickly have no estimate.
     """
-    found: dict[str, tuple[float, float]] = {}
+    found: dict[str, StatedNumber] = {}
     if "output_torque" not in log:
         return found
     for shift in shifts:
@@ -166,5 +168,5 @@ def estimate_fill_pressures(
         early, at, late = log[role].updates.interpolate(instants) / BAR
         std = max(LEAST_FILL_ERROR, 0.5 * abs(late - early))
         if np.isfinite(at + std) and at > 0.0 and std <= MOST_FILL_ERROR:
-            found[shift.oncoming] = (round(float(at), 2), round(float(std), 2))
+            found[shift.oncoming] = StatedNumber.measure(float(at), std)
     return found

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped, make_spec, select_free
 from drivetwin.channels.name_table import load_name_table, normalise_name
@@ -54,9 +55,9 @@ class LogGear:
     std: float = 0.0
 
     @property
-    def measured(self) -> tuple[float, float]:
+    def measured(self) -> StatedNumber:
         """Ratio and its standard deviation, in the digits that it has."""
-        return round_to_std(self.ratio, self.std)
+        return StatedNumber.measure(self.ratio, self.std)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,14 +79,6 @@ class LogSurvey:
     input_gear: float | None = None
     has_input_slip: bool = False
     remark: str = ""
-
-    @property
-    def measured_ratios(self) -> dict[float, float]:
-        """Standard deviations of the ratios that the log shows, by the value as it is proposed."""
-        found = dict(gear.measured for gear in self.gears)
-        return (
-            found if self.final_drive is None else found | dict([round_to_std(*self.final_drive)])
-        )
 
     @property
     def name(self) -> str:
@@ -110,14 +103,6 @@ class LogSurvey:
             ]
             != [self.specs[label]]
         }
-
-
-def round_to_std(value: float, std: float) -> tuple[float, float]:
-    """Round a value to a tenth of its standard deviation, and that to two digits."""
-    if std <= 0.0:
-        return value, 0.0
-    digits = 1 - int(np.floor(np.log10(std)))
-    return round(value, digits), round(std, digits)
 
 
 def survey_log(path: Path, stated: Mapped) -> LogSurvey:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
-from itertools import pairwise
 
 from drivetwin._util.toml import MAX_EXPONENT, is_extreme
 
@@ -59,20 +58,6 @@ def split_list(text: str) -> list[str]:
     return [part for one in parts if (part := one.strip().strip(",").strip())]
 
 
-def parse_ratios(text: str) -> tuple[float, ...]:
-    """Parse the ratios of two or more gears, which fall from low gear to high gear."""
-    parse = make_number_parser(high=1000.0)
-    ratios = tuple(parse(part) for part in split_list(text))
-    if len(ratios) < 2:
-        raise ValueError("a card needs two gears or more, as 1.86, 1.41")
-    for lower, higher in pairwise(ratios):
-        if higher >= lower:
-            raise ValueError(
-                f"the ratios run from low to high gear: {higher:g} must be below {lower:g}"
-            )
-    return ratios
-
-
 def parse_name(text: str) -> str:
     """Parse a name: any text of a line, without bytes that are no characters."""
     name = text.strip()
@@ -107,7 +92,7 @@ def _split_pair(text: str, separators: str, example: str) -> list[float]:
     if re.search(r"\d\s*,\s*\d", text):
         raise ValueError(f"{text.strip()!r} has a comma: write a decimal point, or {example}")
     parse = make_number_parser(zero=True)
-    parts = [parse(part) for part in re.split(rf"\s*(?:{separators})\s*", text.strip()) if part]
+    parts = [parse(part) for part in re.split(rf"\s*(?:{separators})\s*", text.strip())]
     if len(parts) not in (1, 2):
         raise ValueError(f"give one number, or {example}")
     return parts
@@ -120,12 +105,6 @@ def parse_range(text: str, spread: float = 2.0) -> tuple[float, float]:
     if not 0.0 < low < high:
         raise ValueError(f"a range is LOW..HIGH with 0 below LOW below HIGH, not {low:g}..{high:g}")
     return low, high
-
-
-def parse_design_value(text: str) -> tuple[float, float]:
-    """Parse VALUE or VALUE+-STD: a design value and one standard deviation in the same unit."""
-    parts = _split_pair(text, r"\+/?-|±", "VALUE+-STD for a standard deviation, as 0.8+-0.1")
-    return parts[0], parts[1] if len(parts) == 2 else 0.0
 
 
 def make_choice_parser(choices: Iterable[str]) -> Callable[[str], str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from drivetwin.authoring.answers import Answer, Key
 from drivetwin.authoring.parsing import Parser
+from drivetwin.authoring.stated_number import StatedNumber
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,8 @@ class Question:
         """Return the default as a user would type it; empty without one."""
         if self.shown or self.default is None or self.default.value is None:
             return self.shown
-        separators = {"P0_bar": "+-", "J_prime": "..", "J_vehicle": ".."}
-        return format_value(self.default.value, separators.get(self.key[-1], ","))
+        separator = ".." if self.key[-1] in ("J_prime", "J_vehicle") else ","
+        return format_value(self.default.value, separator)
 
     def answer(self, text: str) -> Answer:
         """Return the answer for a text; ValueError states why the text is refused."""
@@ -57,6 +58,8 @@ class FormEntry:
 
 def format_value(value: object, separator: str = ",") -> str:
     """Return a value as a user would type it, the parts of a tuple with a `separator`."""
+    if isinstance(value, StatedNumber):
+        return value.typed
     if isinstance(value, tuple):
         return separator.join(format_value(one) for one in value)
     return f"{value:.6g}" if isinstance(value, float) else str(value)

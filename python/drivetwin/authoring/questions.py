@@ -17,16 +17,14 @@ from drivetwin.authoring.gearboxes import (
     refuse_irreducible,
 )
 from drivetwin.authoring.log_estimates import LogEstimates
-from drivetwin.authoring.log_survey import LogSurvey, assign_pressures, round_to_std
+from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
 from drivetwin.authoring.parsing import (
     Parser,
     make_choice_parser,
     make_names_parser,
     make_number_parser,
-    parse_design_value,
     parse_name,
     parse_range,
-    parse_ratios,
 )
 from drivetwin.authoring.question import Question
 from drivetwin.authoring.sensor_classes import (
@@ -34,6 +32,12 @@ from drivetwin.authoring.sensor_classes import (
     list_classes,
     parse_sensor,
     read_sensor_classes,
+)
+from drivetwin.authoring.stated_number import (
+    StatedNumber,
+    make_stated_parser,
+    parse_ratio,
+    parse_ratios,
 )
 from drivetwin.channels.pressure_roles import get_pressure_element
 from drivetwin.errors import CardError
@@ -78,7 +82,7 @@ def iterate_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
 
 def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
     survey = sources.survey
-    held = () if survey is None else tuple(gear.measured[0] for gear in survey.gears)
+    held = () if survey is None else tuple(gear.measured for gear in survey.gears)
     fits = match_gearboxes(held) if len(held) > 1 else []
     known = list_builtin_gearboxes()
     fitting = "".join(
@@ -232,17 +236,17 @@ def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
     yield Question(
         ("i_in",), "--input-gear RATIO", "Ratio of the input gear",
         "Engine speed over gearbox input speed with the lock-up closed; 1 without an input gear.",
-        make_number_parser(high=100.0), default=default,
+        lambda text: parse_ratio(text, high=100.0), default=default,
     )  # fmt: skip
     final = None
     if survey is not None and survey.final_drive is not None:
-        ratio, _ = round_to_std(*survey.final_drive)
-        final = Answer(ratio, Origin.GUESS, f"output over wheel speed in {survey.name}")
+        measured = StatedNumber.measure(*survey.final_drive)
+        final = Answer(measured, Origin.GUESS, f"output over wheel speed in {survey.name}")
     yield Question(
         ("final_drive",), "--final-drive RATIO", "Ratio of the final drive",
         "Output speed over wheel speed, hub reduction included; 1 where the gear ratios include it "
         "or where it is unknown and inertias count at the output shaft.",
-        make_number_parser(high=1000.0), default=final,
+        parse_ratio, default=final,
     )  # fmt: skip
 
 
@@ -287,7 +291,7 @@ def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Q
         ("inertia", "J_out"), "--output-inertia VALUE+-STD", "Inertia of the output side, or blank",
         "Jo′ is gearbox output and propeller shaft before the elastic shaft, without clutch drums; "
         "blank if unknown.",
-        parse_design_value, "kg·m²", UNKNOWN,
+        make_stated_parser(zero=True), "kg·m²", UNKNOWN,
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from drivetwin.authoring.questions import (
     list_open_questions,
     list_stated_elements,
 )
+from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.errors import CardError, InputError, Where
 
 Ask = Callable[[Question, str], str]
@@ -136,8 +137,7 @@ class Session:
 
 def _list_dependencies(answers: Answers) -> tuple[object, ...]:
     """List the values that estimates from a log depend on."""
-    return (
-        tuple(list_gears(answers)),
+    values = (
         *(get_value(answers, *key) for key in (("i_in",), ("final_drive",), ("inertia", "J_out"))),
         *(
             get_value(answers, "elements", gear.element, part)
@@ -145,6 +145,9 @@ def _list_dependencies(answers: Answers) -> tuple[object, ...]:
             for part in ("label", "kind", "i_c", "i_out", "P0_bar")
         ),
     )
+    # Numbers that differ in their standard deviations only are equal.
+    texts = (one.typed if isinstance(one, StatedNumber) else one for one in values)
+    return (tuple(list_gears(answers)), *texts)
 
 
 def _make_open_error(questions: list[Question]) -> InputError:

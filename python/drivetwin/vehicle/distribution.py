@@ -20,7 +20,7 @@ from drivetwin.vehicle.spec import PriorValue
 DIGIT_STD = 2.0 / math.sqrt(12.0)
 """Standard deviation of a ratio in units of its last written digit [-]."""
 GIVEN_DIGITS = 6
-"""Significant digits of a ratio whose text is lost, as from a form or a program [count]."""
+"""Significant digits of a ratio whose text is lost, as from a program [count]."""
 FILL_PRESSURE_STD = 0.1 * BAR
 """Standard deviation of a P0 without a stated one [Pa]; engineering estimate."""
 INERTIA_STD = 0.10

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""Numbers of a new card with the text in which a person stated them: the digits are data."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from decimal import Decimal
+from itertools import pairwise
+
+from drivetwin._util.toml import WrittenNumber, format_text
+from drivetwin.authoring.parsing import make_number_parser, split_list
+from drivetwin.vehicle.distribution import describe_ratio, parse_teeth
+from drivetwin.vehicle.spec import PriorValue
+
+PLUS_MINUS = r"\+/?-|±"
+COMPUTED_DIGITS = 6
+"""Digits after the point of a ratio that is computed, as from the teeth of a gearbox [count]."""
+MOST_DIGITS = 12
+"""Most digits after the point of a measured number [count]; more are rounding errors of a float."""
+
+
+class StatedNumber(float):
+    """A number with its text: digits or tooth counts, and the digits of its standard deviation.
+
+    `digits` are such as TOML takes, or tooth counts; `std_digits` is None where no standard
+    deviation is stated. Both keep what a float loses: `2.010` is known better than `2.01`.
+    """
+
+    digits: str
+    std_digits: str | None
+
+    @classmethod
+    def make(cls, digits: str, std_digits: str | None = None) -> StatedNumber:
+        """Return the number of a text of digits or tooth counts."""
+        number = cls(parse_teeth(digits) if "/" in digits else float(digits))
+        number.digits, number.std_digits = digits, std_digits
+        return number
+
+    @classmethod
+    def measure(cls, value: float, std: float) -> StatedNumber:
+        """Return a measured number, rounded to a tenth of its standard deviation.
+
+        Without a standard deviation, as from speeds without noise, all digits are kept.
+        """
+        if not std > 0.0:
+            return cls.make(repr(float(value)))
+        places = min(max(1 - math.floor(math.log10(std)), 0), MOST_DIGITS)
+        return cls.make(f"{value:.{places}f}", f"{std:.{places}f}")
+
+    @classmethod
+    def compute(cls, value: float) -> StatedNumber:
+        """Return a computed ratio, which is known to all digits that a card gets."""
+        return cls.make(f"{value:.{COMPUTED_DIGITS}f}")
+
+    @property
+    def std(self) -> float | None:
+        """Stated standard deviation; None without one. That of tooth counts is zero."""
+        if self.std_digits is None:
+            return 0.0 if "/" in self.digits else None
+        return float(self.std_digits)
+
+    @property
+    def entry(self) -> str:
+        """Text of the entry on a card, in TOML."""
+        digits = format_text(self.digits) if "/" in self.digits else self.digits
+        if self.std_digits is None:
+            return digits
+        return f"{{ value = {digits}, std = {self.std_digits} }}"
+
+    @property
+    def typed(self) -> str:
+        """Text as a person types it."""
+        return self.digits if self.std_digits is None else f"{self.digits}+-{self.std_digits}"
+
+    def to_ratio(self) -> PriorValue:
+        """Return the distribution of the number as a ratio."""
+        if self.std is not None:
+            return PriorValue(float(self), self.std)
+        return describe_ratio(WrittenNumber.parse(self.digits))
+
+    def to_prior(self, describe: Callable[[float], PriorValue], factor: float = 1.0) -> PriorValue:
+        """Return the distribution in SI; `factor` is the size of the card's unit.
+
+        `describe` is the distribution of a number in SI without a stated standard deviation.
+        """
+        if self.std is None:
+            return describe(factor * self)
+        return PriorValue(factor * self, factor * self.std)
+
+    def divide(self, divisor: StatedNumber) -> StatedNumber:
+        """Return the ratio that this one is of another, with the uncertainty of both."""
+        one, other = self.to_ratio(), divisor.to_ratio()
+        if other == PriorValue(1.0):
+            return self
+        value = one.value / other.value
+        std = abs(value) * math.hypot(one.std / one.value, other.std / other.value)
+        if std == 0.0:
+            return StatedNumber.make(repr(value), "0.0")
+        return StatedNumber.measure(value, std)
+
+
+def parse_stated(
+    text: str, low: float = 0.0, high: float = 1e12, *, zero: bool = False, unit: str = ""
+) -> StatedNumber:
+    """Parse VALUE, or VALUE+-STD with one standard deviation, and keep the digits.
+
+    The value is above `low` (with `zero` from it on) and up to `high`. Raises ValueError for
+    another text.
+    """
+    parts = re.split(rf"\s*(?:{PLUS_MINUS})\s*", text.strip())
+    if len(parts) > 2:
+        raise ValueError(f"{text.strip()!r} has more than one standard deviation")
+    make_number_parser(low, high, zero=zero, unit=unit)(parts[0])
+    if len(parts) == 2:
+        make_number_parser(zero=True, unit=unit)(parts[1])
+    return StatedNumber.make(*map(_format_digits, parts))
+
+
+def parse_ratio(text: str, high: float = 1000.0) -> StatedNumber:
+    """Parse a ratio above zero: a number, VALUE+-STD, or tooth counts such as 49/33."""
+    plain = join_signs(text).strip()
+    if "/" in re.sub(PLUS_MINUS, "", plain):
+        make_number_parser(high=high)(repr(parse_teeth(plain)))
+        return StatedNumber.make(plain)
+    return parse_stated(plain, high=high)
+
+
+def parse_ratios(text: str) -> tuple[StatedNumber, ...]:
+    """Parse the ratios of two or more gears, which fall from low gear to high gear."""
+    ratios = tuple(parse_ratio(part) for part in split_list(join_signs(text)))
+    if len(ratios) < 2:
+        raise ValueError("a card needs two gears or more, as 1.86, 1.41")
+    for lower, higher in pairwise(ratios):
+        if higher >= lower:
+            raise ValueError(
+                f"the ratios run from low to high gear: {higher:g} must be below {lower:g}"
+            )
+    return ratios
+
+
+def join_signs(text: str) -> str:
+    """Return a text of several numbers without the blanks around `+-`, `±`, `/` and `*`."""
+    return re.sub(rf"\s*({PLUS_MINUS}|[/*])\s*", r"\1", text)
+
+
+def make_stated_parser(
+    low: float = 0.0, high: float = 1e12, *, zero: bool = False, unit: str = ""
+) -> Callable[[str], StatedNumber]:
+    """Return a parser of `parse_stated` with these limits."""
+    return lambda text: parse_stated(text, low, high, zero=zero, unit=unit)
+
+
+def _format_digits(text: str) -> str:
+    """Write the digits of a number as TOML takes them: without exponent, sign and leading zeros."""
+    # The exponent of a zero has no bound; its digits would fill the memory.
+    return f"{Decimal(text.strip()):f}" if float(text) else "0.0"
