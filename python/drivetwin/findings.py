@@ -136,6 +136,8 @@ class Code(StrEnum):
     RATIO_REFINED = auto()
     RATIO_OFF_CARD = auto()
     GAIN_SUSPECT = auto()
+    GAIN_ASSUMED = auto()
+    MU_FOR_ASSUMED_GAIN = auto()
     GAINS_CONTRADICT = auto()
     CARD_MORE_CERTAIN = auto()
     CARD_FILL_PRESSURE = auto()

@@ -13,12 +13,15 @@ from hypothesis import strategies as st
 from drivetwin._util.toml import parse_toml
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.card_text import format_card
+from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.options import ORDER, CardOptions, parse_options
 from drivetwin.authoring.question import Question
 from drivetwin.authoring.questions import Sources
 from drivetwin.authoring.session import Session
 from drivetwin.errors import CardError, InputError
+from drivetwin.plausibility.friction import FrictionProduct
 from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 VALID = {
@@ -239,3 +242,22 @@ def test_a_draft_without_answers_is_toml_of_comments() -> None:
     assert "final_drive" not in document
     assert document["i_in"] == 1.0
     assert session.list_open()
+
+
+@pytest.mark.parametrize("way", ["option", "gain", "form"])
+def test_an_unknown_gain_is_assumed_and_marked(tmp_path: Path, way: str) -> None:
+    texts = {"gain": {"form": "gain", "gain_m3": "Unknown"}, "form": {"form": "unknown"}}
+    session = make_session(CardOptions({}, ["gain_m3=unknown"] if way == "option" else []))
+    session.ask_all(lambda one, _: texts.get(way, {}).get(one.key[-1], answer_valid(one)))
+    assert not any(key[-1] == "surfaces" for key in session.answers)
+    gains = [one.gain for one in load(format_card(session.answers), tmp_path).elements.values()]
+    assert all(one == PriorValue(0.012, 0.006, assumed=True) for one in gains)
+
+
+def test_a_gain_is_assumed_from_what_the_log_shows() -> None:
+    product = FrictionProduct("B3", 0.003, 0.0048, "2-3")
+    estimates = LogEstimates(products={"B3": product})
+    own, other = estimates.assume_gain("B3")[0], estimates.assume_gain("B2")[0]
+    assert own.value == pytest.approx((0.003 * 0.0048) ** 0.5 / 0.12)
+    assert (own.std, other.std) == pytest.approx((0.2 * own.value, 0.4 * own.value))
+    assert other.value == pytest.approx(own.value)

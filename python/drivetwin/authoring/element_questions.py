@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from drivetwin.authoring.answers import Answer, Answers, Origin, get_value, list_gears
 from drivetwin.authoring.derive import GEOMETRY
-from drivetwin.authoring.log_estimates import LogEstimates
+from drivetwin.authoring.log_estimates import ASSUMED_FRICTION, LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.parsing import (
     Parser,
@@ -34,6 +34,7 @@ class GainForm(StrEnum):
     GAIN = "gain"  # one number
     AREA = "area"  # with area and effective radius
     DIAMETERS = "diameters"  # which both follow from
+    UNKNOWN = "unknown"  # assumed from a usual μ
 
 
 MOST_GAIN = 10.0
@@ -54,12 +55,19 @@ def parse_clutch_ratio(text: str) -> StatedNumber:
     return value
 
 
+def parse_gain(text: str) -> StatedNumber | GainForm:
+    """Parse a gain [m^3] as VALUE or VALUE+-STD, or `unknown`."""
+    if text.strip().casefold() == GainForm.UNKNOWN:
+        return GainForm.UNKNOWN
+    return parse_stated(text, high=MOST_GAIN, unit="m³")
+
+
 ELEMENT_PARTS: dict[str, Parser] = {
     "kind": make_choice_parser(("brake", "clutch")),
     "i_c": parse_clutch_ratio,
     "i_out": parse_clutch_ratio,
     "P0_bar": make_stated_parser(zero=True),
-    "gain_m3": make_stated_parser(high=MOST_GAIN, unit="m³"),
+    "gain_m3": parse_gain,
     "surfaces": parse_surfaces,
     "derating": parse_share,
     "area_m2": make_number_parser(high=MOST_GAIN, unit="m²"),
@@ -104,7 +112,10 @@ PART_TEXTS = {
         "bar",
     ),
     "gain_m3": PartText(
-        "Gain N·D·A·r", "About 0.005 for a car's clutch, 0.03 for a truck's.", "gain_m3=M3", "m³"
+        "Gain N·D·A·r",
+        "About 0.005 for a car's clutch, 0.03 for a truck's; as VALUE, VALUE+-STD, or unknown.",
+        "gain_m3=M3",
+        "m³",
     ),
     "surfaces": PartText(
         "Friction surfaces",
@@ -157,8 +168,9 @@ def describe_product(low: float, high: float) -> str:
     """Describe a product of μ and gain [m^3] from a log, without a claim on the gain alone."""
     middle = (low * high) ** 0.5
     return (
-        f"the log gives μ·gain = {middle:.3g} m³ ({low:.3g} to {high:.3g}); with μ 0.10 the gain "
-        f"would be {middle / 0.1:.3g} m³. The log does not determine the gain alone"
+        f"the log gives μ·gain = {middle:.3g} m³ ({low:.3g} to {high:.3g}); with μ "
+        f"{ASSUMED_FRICTION:g} the gain would be {middle / ASSUMED_FRICTION:.3g} m³. The log does "
+        "not determine the gain alone"
     )
 
 
@@ -271,16 +283,22 @@ def _iterate_gain_questions(
     if form is None:
         yield Question(
             ("elements", element, "form"),
-            _make_option(element, "gain_m3=M3, or surfaces=N,derating=SHARE,area_m2=M2,radius_m=M"),
-            f"Is the gain of {element or 'the element'} known as gain, area or diameters",
+            _make_option(
+                element,
+                "gain_m3=M3, gain_m3=unknown, or surfaces=N,derating=SHARE,area_m2=M2,radius_m=M",
+            ),
+            f"Is the gain of {element or 'the element'} known as gain, area or diameters, or "
+            "unknown",
             "The gain N·D·A·r turns pressure into torque: friction surfaces, de-rating, area and "
-            f"effective radius; it is one number, or computed from its parts.{hint}",
+            "effective radius; it is one number, or computed from its parts. If it is unknown, the "
+            "card contains an assumed gain: the product of μ and gain is identified, and μ is for "
+            f"an assumed gain.{hint}",
             make_choice_parser(tuple(GainForm)),
             choices=tuple(GainForm),
         )
     elif form is GainForm.GAIN:
         yield _make_question(element, "gain_m3", hint=hint)
-    else:
+    elif form is not GainForm.UNKNOWN:
         yield _make_question(element, "surfaces")
         yield _make_question(element, "derating")
         yield from _iterate_size_questions(answers, element, form)
@@ -309,6 +327,8 @@ def find_form(answers: Answers, element: str) -> GainForm | None:
     """Return how the gain of an element is stated; None if nothing is stated of it."""
     stated = get_value(answers, "elements", element, "form")
     parts = {key[2] for key in answers if key[:2] == ("elements", element)}
+    if get_value(answers, "elements", element, "gain_m3") is GainForm.UNKNOWN:
+        return GainForm.UNKNOWN
     if stated is not None:
         return GainForm(stated)
     if "gain_m3" in parts:

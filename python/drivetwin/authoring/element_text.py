@@ -49,7 +49,7 @@ def _format_element(
     if P0.value is None and survey is not None:
         yield f"# {escape_line(survey.name)} does not show it: P0 is guessed only where the output"
         yield "# torque begins to fall in a power-on upshift to the gear of the element."
-    yield from _format_gain(answers, name)
+    yield from _format_gain(answers, name, estimates)
     product = estimates.products.get(name)
     if product is not None:
         shift = escape_line(product.shift)
@@ -74,9 +74,15 @@ def _format_ratios(answers: Answers, name: str) -> Iterator[str]:
             yield from format_entry(part, answer, meaning)
 
 
-def _format_gain(answers: Answers, name: str) -> Iterator[str]:
-    """Write the gain as one number or by its parts; commented where it is unknown."""
+def _format_gain(answers: Answers, name: str, estimates: LogEstimates) -> Iterator[str]:
+    """Write the gain as one number or by its parts; commented where nothing is stated of it."""
     form = find_form(answers, name)
+    if form is GainForm.UNKNOWN:
+        assumed, note = estimates.assume_gain(name)
+        yield "# N·D·A·r is unknown: μ is given for this assumed gain, μ·gain does not depend on it"
+        entry = f"{{ value = {assumed.value:.3g}, std = {assumed.std:.3g}, assumed = true }}"
+        yield f"gain_m3 = {entry}  # assumed: {escape_line(note)}"
+        return
     if form is GainForm.GAIN:
         gain = answers.get(("elements", name, "gain_m3"), UNKNOWN)
         meaning = "N·D·A·r: friction surfaces, de-rating, area, effective radius [m³]"

@@ -21,7 +21,11 @@ from drivetwin.plausibility.settings import PLAUSIBILITY, Limits
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.torque_onset import locate_torque_dip, smooth_channel
-from drivetwin.vehicle.distribution import describe_fill_pressure, describe_inertia
+from drivetwin.vehicle.distribution import (
+    describe_assumed_gain,
+    describe_fill_pressure,
+    describe_inertia,
+)
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -33,6 +37,15 @@ LEAST_FILL_ERROR = 0.25
 MOST_FILL_ERROR = 0.45
 """Largest standard deviation [bar] of a P0 that is worth a guess."""
 
+ASSUMED_FRICTION = 0.12
+"""μ [-] for which a gain is assumed: the middle of the usual range of a paper lining."""
+PARTNER_GAIN_STD = 0.4
+"""Standard deviation of a gain that is assumed to be that of another element [ratio]: gains in one
+gearbox seldom differ by more than a factor of two; engineering estimate."""
+USUAL_GAIN = 0.012
+"""Gain [m^3] that is assumed without a log: between those of a car and of a truck."""
+USUAL_GAIN_STD = 0.5
+"""Standard deviation of the usual gain [ratio]: 0.005 to 0.03 m³; engineering estimate."""
 MOST_SPREAD = 5.0
 """Largest ratio of the limits of μ·gain that is worth a remark."""
 
@@ -49,6 +62,20 @@ class LogEstimates:
     J_vehicle: Limits | None = None
     products: Mapping[str, FrictionProduct] = field(default_factory=dict)
     remark: str = ""
+
+    def assume_gain(self, element: str) -> tuple[PriorValue, str]:
+        """Return a gain [m^3] for an element whose gain is unknown, and where it is from."""
+        products = {name: one.middle / ASSUMED_FRICTION for name, one in self.products.items()}
+        if element in products:
+            note = f"μ·gain of the log over a usual μ of {ASSUMED_FRICTION:g}"
+            return describe_assumed_gain(products[element]), note
+        if products:
+            others = ", ".join(products)
+            value = float(np.exp(np.mean(np.log([*products.values()]))))
+            note = f"the log shows no μ·gain of it; the gain that {others} would have"
+            return PriorValue(value, PARTNER_GAIN_STD * value, assumed=True), note
+        note = "usual size of a clutch; no log shows its μ·gain"
+        return PriorValue(USUAL_GAIN, USUAL_GAIN_STD * USUAL_GAIN, assumed=True), note
 
 
 def estimate_entries(survey: LogSurvey, answers: Answers) -> LogEstimates:

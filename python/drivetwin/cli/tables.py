@@ -159,7 +159,7 @@ def build_friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
         for place, index in enumerate((0, curve.slip.size // 2, curve.slip.size - 1)):
             band = (float(curve.mu_lo[index]), float(curve.mu_hi[index]))
             value, interval, _ = format_estimate(float(curve.mu[index]), band, "1")
-            first = (element, curve.verdict.value) if place == 0 else ("", "")
+            first = (element, curve.verdict_text) if place == 0 else ("", "")
             table.add_row(first[0], f"{curve.slip[index]:.1f}", value, interval, first[1])
     return table
 

@@ -26,14 +26,13 @@ from drivetwin.estimation.paper.pipeline import (
 )
 from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
-from drivetwin.estimation.result.friction_verdict import complete_friction
+from drivetwin.estimation.result.friction_verdict import complete_friction, report_assumed_gains
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.estimation.result.verdict import apply_errors
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.shifts.coverage import AFTER, BEFORE
-from drivetwin.vehicle.spec import PriorValue
 
 BEHIND_CONVERTER = (
     "the converter is open in the shifts: what drives the gearbox is its turbine, by the map on "
@@ -83,6 +82,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         *_drop_refined(collect_shift_findings(log.signals), found),
         *found.findings,
         *gains,
+        *report_assumed_gains(found.friction),
         *_check_card(found, log, method),
     )
     return Identification(
@@ -191,8 +191,7 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
 def _complete(found: EstimateSet, log: PreparedLog) -> EstimateSet:
     """Return the estimates with μ times gain of every friction curve."""
     couplings = log.drivelines[0].couplings
-    gains = {name: PriorValue(one.gain, one.gain_std) for name, one in couplings.items()}
-    return complete_friction(found, gains)
+    return complete_friction(found, {name: one.gain_prior for name, one in couplings.items()})
 
 
 def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) -> _Stage:

@@ -86,6 +86,7 @@ class FrictionRecord(Record):
     method: str
     gain_m3: OptionalFloat = None
     gain_std_m3: OptionalFloat = None
+    gain_assumed: bool = False
     verdict: Verdict = Verdict.IDENTIFIED
     reason: str = ""
 
@@ -109,6 +110,7 @@ class FrictionRecord(Record):
             "method": source.method_text,
             "gain_m3": None if source.gain is None else source.gain.value,
             "gain_std_m3": None if source.gain is None else source.gain.std,
+            "gain_assumed": source.has_assumed_gain,
             "verdict": source.verdict,
             "reason": source.reason,
         }
@@ -130,7 +132,7 @@ class FrictionRecord(Record):
             over_eta=self.method.endswith(OF_RATIO),
             gain=None
             if self.gain_m3 is None
-            else PriorValue(self.gain_m3, self.gain_std_m3 or 0.0),
+            else PriorValue(self.gain_m3, self.gain_std_m3 or 0.0, self.gain_assumed),
             verdict=self.verdict,
             reason=self.reason,
         )

@@ -25,6 +25,9 @@ FILL_PRESSURE_STD = 0.1 * BAR
 """Standard deviation of a P0 without a stated one [Pa]; engineering estimate."""
 INERTIA_STD = 0.10
 """Standard deviation of an inertia without a stated one [ratio]; engineering estimate."""
+ASSUMED_GAIN_STD = 0.2
+"""Standard deviation of a gain that is assumed from a usual μ [ratio]; engineering estimate: μ of a
+paper lining from 0.09 to 0.15, and the error of the product of μ and gain from a log."""
 PARTNER_LEVEL_STD = 0.07
 """Standard deviation of the friction of an element that the log does not determine, over that of
 its partner [ratio]; engineering estimate for two clutches with the same lining and oil."""
@@ -85,6 +88,11 @@ def describe_inertia(value: float) -> PriorValue:
     """Return the distribution of an inertia [kg m^2] without a stated standard deviation; zero,
     which means that there is no such member, is exact."""
     return PriorValue(value, INERTIA_STD * abs(value))
+
+
+def describe_assumed_gain(value: float) -> PriorValue:
+    """Return the distribution of an assumed gain [m^3] without a stated standard deviation."""
+    return PriorValue(value, ASSUMED_GAIN_STD * value, assumed=True)
 
 
 def multiply(*factors: PriorValue) -> PriorValue:

@@ -16,6 +16,7 @@ from drivetwin.channels.units import BAR, RPM
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.distribution import (
+    describe_assumed_gain,
     describe_fill_pressure,
     describe_inertia,
     describe_ratio,
@@ -111,14 +112,20 @@ NO_INPUT_GEAR = RatioTable(value=1.0, std=0.0)
 
 
 class GainTable(StrictModel):
-    """Gain N·D·A·r [m^3] with its standard deviation; 0: μ is given for this gain."""
+    """Gain N·D·A·r [m^3] with its standard deviation; 0: μ is given for this gain.
+
+    `assumed` marks a gain that nobody knows.
+    """
 
     value: float = Field(gt=0)
-    std: float = Field(default=0.0, ge=0)
+    std: float | None = Field(default=None, ge=0)
+    assumed: bool = False
 
     def to_prior(self) -> PriorValue:
         """Return the gain in SI."""
-        return PriorValue(self.value, self.std)
+        if self.std is not None:
+            return PriorValue(self.value, self.std, self.assumed)
+        return describe_assumed_gain(self.value) if self.assumed else PriorValue(self.value)
 
 
 GainEntry = Annotated[

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from drivetwin.actuator.model import ActuatorModel
@@ -17,15 +17,17 @@ Pair = tuple[float, float]
 class PriorValue:
     """A design value and its standard deviation, same unit; `std` 0: taken as known.
 
-    It is no float: a stage either uses the distribution or names the nominal `value`.
+    It is no float: a stage either uses the distribution or names the nominal `value`. `assumed`
+    marks a value that nobody knows and that the card contains to make a first result possible.
     """
 
     value: float
     std: float = 0.0
+    assumed: bool = False
 
     def scale(self, factor: float) -> PriorValue:
         """Return the quantity times an exact factor."""
-        return PriorValue(factor * self.value, abs(factor) * self.std)
+        return replace(self, value=factor * self.value, std=abs(factor) * self.std)
 
 
 @dataclass(frozen=True)

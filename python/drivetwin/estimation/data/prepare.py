@@ -276,6 +276,7 @@ def build_driveline(card: VehicleCard, shift: Shift) -> KnownDriveline:
             drum=spec.drum_inertia,
             peak=spec.peak,
             gain_std=spec.gain.std,
+            gain_assumed=spec.gain.assumed,
             gear=gears[name],
             i_in=card.i_in.value,
             follows_ratio=spec.i_c is None,

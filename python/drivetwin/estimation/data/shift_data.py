@@ -78,9 +78,10 @@ class ShiftElementKinematics:
 
     `a` = 1/(i_in·i_c), `b` = i_out; its torque acts as -a·T on the engine and b·T on the output
     side. `gain` N·D·A·r [m^3] with `gain_std`: the motion depends on μ times the gain alone, so
-    that μ is stated for this gain. `drum` [kg m^2] is the inertia that turns with the slip; `peak`
-    is the static over the kinetic capacity at zero slip. `gear` is the gear that the element makes;
-    `follows_ratio` marks a brake, whose i_c is the ratio of the gear less 1.
+    that μ is stated for this gain; `gain_assumed` marks one that nobody knows. `drum` [kg m^2] is
+    the inertia that turns with the slip; `peak` is the static over the kinetic capacity at zero
+    slip. `gear` is the gear that the element makes; `follows_ratio` marks a brake, whose i_c is the
+    ratio of the gear less 1.
     """
 
     name: str
@@ -92,8 +93,14 @@ class ShiftElementKinematics:
     drum: PriorValue = NO_DRUM
     peak: float = 1.0
     gain_std: float = 0.0
+    gain_assumed: bool = False
     i_in: float = 1.0
     follows_ratio: bool = False
+
+    @property
+    def gain_prior(self) -> PriorValue:
+        """Gain [m^3] with its distribution."""
+        return PriorValue(self.gain, self.gain_std, self.gain_assumed)
 
     @property
     def ratio(self) -> float:

@@ -116,6 +116,16 @@ class FrictionCurve:
         return 0.5 * float(self.slip[0] + self.slip[-1])
 
     @property
+    def has_assumed_gain(self) -> bool:
+        """True where μ is for a gain that nobody knows; μ times the gain is not affected."""
+        return self.gain is not None and self.gain.assumed
+
+    @property
+    def verdict_text(self) -> str:
+        """Verdict of μ, with what it depends on."""
+        return self.verdict.value + (", for an assumed gain" if self.has_assumed_gain else "")
+
+    @property
     def gain_spread(self) -> float:
         """Relative standard deviation of the gain; 0 where none is stated."""
         return 0.0 if self.gain is None else self.gain.std / self.gain.value

@@ -99,12 +99,29 @@ def _adopt_verdict(curve: FrictionCurve, one: Estimate) -> FrictionCurve:
     """Return a curve with the verdict of its μ times gain, and a band at least as wide."""
     if curve.gain is None:
         return curve
-    judged, std = replace(curve, verdict=one.verdict, reason=one.reason), compute_mu_gain(curve)[1]
+    assumed = explain(Code.MU_FOR_ASSUMED_GAIN) if curve.has_assumed_gain else ""
+    reason = join_reasons(one.reason, assumed)
+    judged, std = replace(curve, verdict=one.verdict, reason=reason), compute_mu_gain(curve)[1]
     if one.std_total is None or one.std_total <= std:
         return judged
     more = Z95 * float(np.sqrt(one.std_total**2 - std**2)) / curve.gain.value
     below, above = (np.hypot(end - curve.mu, more) for end in (curve.mu_lo, curve.mu_hi))
     return replace(judged, mu_lo=curve.mu - below, mu_hi=curve.mu + above)
+
+
+def report_assumed_gains(curves: Mapping[str, FrictionCurve]) -> list[Finding]:
+    """Report each element whose μ is for a gain that nobody knows."""
+    return [
+        report(
+            Code.GAIN_ASSUMED,
+            "",
+            element=element,
+            gain=Number(curve.gain.value, "m^3"),
+            percent=100.0 * curve.gain_spread,
+        )
+        for element, curve in curves.items()
+        if curve.gain is not None and curve.gain.assumed
+    ]
 
 
 def report_gains(

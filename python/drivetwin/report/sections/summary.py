@@ -155,7 +155,9 @@ def _describe_verdict(curve: FrictionCurve) -> str:
         return f"{curve.verdict.value}: {curve.reason}"
     gain = ""
     if curve.gain is not None:
-        gain = f" for a gain of {format_with_unit(curve.gain.value, 'm^3', curve.gain.std)}"
+        article = "an assumed" if curve.has_assumed_gain else "a"
+        size = format_with_unit(curve.gain.value, "m^3", curve.gain.std)
+        gain = f" for {article} gain of {size}"
     return f"{curve.verdict.value}{gain}, method: {curve.method_text}"
 
 

@@ -78,8 +78,7 @@ def _find_base(fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], name: st
 
 
 def _get_gain(fit: LikelihoodFit, name: str) -> PriorValue:
-    one = fit.problem.parts[0].structure.driveline.couplings[name]
-    return PriorValue(one.gain, one.gain_std)
+    return fit.problem.parts[0].structure.driveline.couplings[name].gain_prior
 
 
 def _get_law(
