@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
+from tests.cli.conftest import Files
 from tests.plausibility.fixtures import Synthetic, make_log
 
 
@@ -92,5 +93,42 @@ def test_mapping_beside_the_log_is_used_without_an_option(
     assert "'Gear'" in capsys.readouterr().out
     assert main(["card", "check", str(made.card), str(log), "--strict"]) == 0
     assert main(["inspect", str(log), "--vehicle", str(made.card), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out.split("implausible")[-1])
+    found = json.loads(capsys.readouterr().out.split("implausible")[-1].partition("\n")[2])
     assert found["mapping"]["input_speed"]["source"] == "ColumnA"
+
+
+def test_each_ratio_has_one_finding_with_both_intervals(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench = Synthetic(bench_files.log, bench_files.card)
+    wrong = write_wrong(bench, tmp_path, "final_drive = 5.38", "final_drive = 5.43")
+    wrong = write_wrong(
+        Synthetic(bench.log, Path(wrong)), tmp_path, "ratio = 1.43", "ratio = 1.436"
+    )
+    files = [wrong, str(bench.log)]
+    assert main(["card", "check", *files, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["findings"]
+    ratios = {"gears[0].ratio", "gears[1].ratio", "final_drive"}
+    told = {one["place"]["key"]: one for one in found if one["place"]["key"] in ratios}
+    assert {key: one["code"] for key, one in told.items()} == {
+        "gears[1].ratio": "ratio_off_card", "final_drive": "ratio_off_card",
+    }  # fmt: skip
+    assert sum(one["place"]["key"] in ratios for one in found) == len(told)
+    log, card = (told["gears[1].ratio"]["numbers"][one] for one in ("log", "card"))
+    assert abs(log["value"] - 1.43) <= log["half_width"] < 1e-3
+    assert card["half_width"] == pytest.approx(1.96 * 2.0 / 12.0**0.5 * 1e-3, rel=1e-3)
+
+    assert main(["identify", *files[1:], "--vehicle", wrong, "-o", str(tmp_path / "out")]) == 0
+    shown = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))["findings"]
+    codes = [one["code"] for one in shown if "ratio" in one["code"] or "final" in one["code"]]
+    assert codes == ["ratio_off_card", "ratio_off_card"]
+
+
+def test_the_count_of_the_check_contains_the_remarks(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench = Synthetic(bench_files.log, bench_files.card)
+    rough = write_wrong(bench, tmp_path, "ratio = 1.91", "ratio = 1.9")
+    rough = write_wrong(Synthetic(bench.log, Path(rough)), tmp_path, "= 5.38", "= 5.4")
+    assert main(["card", "check", rough, str(bench.log), "--strict"]) == 0
+    assert capsys.readouterr().out.rstrip().endswith("nothing implausible, 2 remarks above")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MissingChannelError, TimeError
-from drivetwin.findings import render
+from drivetwin.findings import Code, Number, render
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.settings import ShiftSettings
 from drivetwin.shifts.shift import Shift
@@ -248,9 +248,10 @@ def test_refused_where_the_open_element_rests_above_P0() -> None:
 
 def test_ratio_off_the_card_is_warned_of() -> None:
     (shift,), _ = detect_shifts(_UP.log(), make_card({"2": 1.92, "3": 1.43}))
-    assert any(
-        "gear 2 is 1.91, the vehicle card has 1.92" in warning for warning in render(shift.findings)
-    )
+    found = next(one for one in shift.findings if one.code is Code.RATIO_DEVIATES)
+    ratio = found.numbers["ratio"]
+    assert abs(ratio.value - 1.91) <= (ratio.half_width or 0.0) < 1e-3
+    assert found.numbers["card"] == Number(1.92)
 
 
 def test_gap_and_spikes_outside_the_shift_do_no_harm() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -64,13 +65,21 @@ def check(
         print_json({"findings": dump_findings(findings), "refusal": error})
     else:
         print_findings(findings)
-        print_line(f"{card_file}: {len(warnings) or 'nothing'} implausible")
+        print_line(f"{card_file}: {_count_findings(findings)}")
         if refusal is not None:
             show_error(refusal, as_json=False)
     if refusal is not None:
         raise typer.Exit(refusal.exit_code)
     if strict and warnings:
         raise typer.Exit(IMPLAUSIBLE)
+
+
+def _count_findings(findings: Sequence[Finding]) -> str:
+    """Return the numbers of implausible entries and of remarks in words."""
+    warnings = len(select_warnings(findings))
+    remarks = len(findings) - warnings
+    beside = f", {remarks} remark{'s' if remarks > 1 else ''} above" if remarks else ""
+    return f"{warnings or 'nothing'} implausible{beside}"
 
 
 def _compare(
@@ -80,7 +89,7 @@ def _compare(
     from drivetwin.estimation.data.prepare import prepare_shift
     from drivetwin.estimation.result.ratio_check import compare_ratios
     from drivetwin.logs.read import read_log
-    from drivetwin.plausibility.check import check_card, select_card_findings
+    from drivetwin.plausibility.check import check_card, merge_ratios, select_card_findings
     from drivetwin.shifts.detect import detect_shifts
 
     if log is None:
@@ -91,17 +100,18 @@ def _compare(
             recording = read_log(log, vehicle, mapping, needed=(), sound=(), gearing=False)
     except DrivetwinError as refusal:
         return check_card(vehicle), refusal
-    remarks = list(select_card_findings(vehicle, recording.findings))
+    remarks, refined = list(select_card_findings(vehicle, recording.findings)), []
     try:
         shifts = detect_shifts(recording, vehicle).shifts
         if not shifts:
             why = "no shift of the card's gears was found, so torques and friction are unchecked"
             remarks.append(report(Code.CARD_NOT_COMPARED, why=why))
-        remarks += compare_ratios([prepare_shift(recording, vehicle, one) for one in shifts])
+        refined = compare_ratios([prepare_shift(recording, vehicle, one) for one in shifts])
     except DrivetwinError as error:
         shifts = ()
         remarks.append(report(Code.CARD_NOT_COMPARED, why=error.what))
-    return (*check_card(vehicle, recording, shifts), *remarks), None
+    found = (*check_card(vehicle, recording, shifts), *remarks)
+    return merge_ratios(vehicle, found, refined), None
 
 
 def _describe_ratios(log: Path | None, channels: Path | None) -> str:

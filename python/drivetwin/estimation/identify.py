@@ -31,7 +31,7 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.estimation.result.verdict import apply_errors
 from drivetwin.findings import Code, Finding, report
-from drivetwin.parameters import OVER_ETA, get_parameter_spec, make_ratio_id
+from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.shifts.coverage import AFTER, BEFORE
 
 BEHIND_CONVERTER = (
@@ -77,7 +77,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
     shifts, design = tuple(s.shift for s in log.signals), log.design
     estimates, gains = check_efficiency_limit(found.estimates, design.loss_law)
     findings = (
-        *log.findings,
+        *_drop_refined(log.findings, found),
         *_report_unfitted(log),
         *_drop_refined(collect_shift_findings(log.signals), found),
         *found.findings,
@@ -114,13 +114,17 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
 
 
 def _drop_refined(findings: Sequence[Finding], found: EstimateSet) -> list[Finding]:
-    """Return the findings of the shifts without measured ratios that the fit estimates."""
-    return [
-        one
-        for one in findings
-        if one.code is not Code.RATIO_DEVIATES
-        or make_ratio_id(str(one.names["gear"])) not in found.estimates
-    ]
+    """Return findings without those on measured ratios that the fit estimates: its own findings
+    compare them with the vehicle card."""
+    return [one for one in findings if _find_ratio_id(one) not in found.estimates]
+
+
+def _find_ratio_id(finding: Finding) -> str:
+    """Return the id of the ratio that a finding compares with the card; empty for another one."""
+    if finding.code is Code.FINAL_DRIVE_DIFFERS:
+        return FINAL_DRIVE
+    is_gear = finding.code is Code.RATIO_DEVIATES
+    return make_ratio_id(finding.names["gear"]) if is_gear else ""
 
 
 def _check_card(found: EstimateSet, log: PreparedLog, method: Method) -> tuple[Finding, ...]:

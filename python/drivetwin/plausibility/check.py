@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.findings import Code, Finding
+from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.plausibility.entries import check_entries, find_entry
 from drivetwin.plausibility.friction import check_friction
 from drivetwin.plausibility.inertias import check_inertias
@@ -65,6 +66,21 @@ def select_card_findings(card: VehicleCard, findings: Iterable[Finding]) -> tupl
         for one in findings
         if one.code in FROM_READING
     )
+
+
+def merge_ratios(
+    card: VehicleCard, findings: Iterable[Finding], refined: Iterable[Finding]
+) -> tuple[Finding, ...]:
+    """Return the findings with one for each ratio.
+
+    `refined` are those of the speeds of the shifts, by parameter id. They replace the others on
+    the same ratio, which compare whole channels.
+    """
+    keys = {make_ratio_id(gear.name): f"gears[{k}].ratio" for k, gear in enumerate(card.gears)}
+    keys[FINAL_DRIVE] = "final_drive"
+    placed = [replace(one, place=find_entry(card, keys[one.subject])) for one in refined]
+    known = {one.place.key for one in placed}
+    return (*(one for one in findings if one.place.key not in known), *placed)
 
 
 def list_doubted_elements(card: VehicleCard, found: Iterable[Finding]) -> frozenset[str]:

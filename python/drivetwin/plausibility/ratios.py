@@ -10,11 +10,12 @@ import numpy as np
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import MissingChannelError, TimeError
-from drivetwin.findings import Code, Finding, report
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.entries import find_entry
 from drivetwin.plausibility.settings import PLAUSIBILITY
 from drivetwin.shifts.kinematics import GearboxSpeeds, resample_speeds
 from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 WIDTH = 0.1
@@ -108,7 +109,11 @@ def check_ratios(log: ShiftLog, card: VehicleCard) -> list[Finding]:
         )
         gear = absent.pop(index)
         free.remove(nearest)
-        shown = {"found": gear.ratio.value, "expected": nearest.ratio, "time": nearest.time}
+        found, expected = (
+            Number(one.value, "1", one.half_width)
+            for one in (gear.ratio, PriorValue(nearest.ratio, nearest.std))
+        )
+        shown = {"found": found, "expected": expected, "time": Number(nearest.time)}
         place = find_entry(card, f"gears[{index}].ratio")
         findings.append(report(Code.CARD_RATIO_DIFFERS, "", place, gear=gear.name, **shown))
     return [*findings, *_check_input_gear(log, card)]

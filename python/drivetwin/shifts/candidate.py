@@ -25,6 +25,7 @@ from drivetwin.shifts.torque_onset import (
     smooth_channel,
 )
 from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _RATIO_DRIFT = 0.002
@@ -250,8 +251,12 @@ def _check_ratios(search: Search, *runs: Run) -> tuple[Finding, ...]:
     findings = []
     for run in runs:
         gear = run.gear or ""
-        ratio = float(np.median(compute_ratio(search.speeds, run.first, run.last)))
-        if abs(ratio / search.ratios[gear] - 1.0) > _RATIO_DRIFT:
-            card = search.ratios[gear]
-            findings.append(report(Code.RATIO_DEVIATES, gear=gear, ratio=ratio, card=card))
+        ratios = compute_ratio(search.speeds, run.first, run.last)
+        # The median of normal values scatters by √(π/2) times their mean.
+        std = float(np.sqrt(0.5 * np.pi / ratios.size) * np.std(ratios))
+        found, nominal = PriorValue(float(np.median(ratios)), std), search.ratios[gear]
+        if abs(found.value / nominal - 1.0) > _RATIO_DRIFT:
+            card = search.card.get_gear(gear).ratio.scale(search.card.i_in.value)
+            ratio, stated = (Number(one.value, "1", one.half_width) for one in (found, card))
+            findings.append(report(Code.RATIO_DEVIATES, gear=gear, ratio=ratio, card=stated))
     return tuple(findings)

@@ -10,7 +10,7 @@ import numpy as np
 from drivetwin.estimation.data.shift_data import PLAUSIBLE_ETA
 from drivetwin.estimation.identification import Identification
 from drivetwin.findings import Code, Finding, report
-from drivetwin.parameters import get_parameter_spec
+from drivetwin.parameters import FINAL_DRIVE, get_parameter_spec
 
 LEAST_SIZE = 3.0
 """Deviation, in usual standard deviations, from which an efficiency is no scatter."""
@@ -102,6 +102,10 @@ def _rank_findings(found: Identification) -> Iterator[Suspect]:
     for one in found.findings:
         if one.code is Code.CARD_CONTRADICTED:
             yield one.numbers["apart"].value, f"{one.subject} on the card"
+        elif one.code is Code.RATIO_OFF_CARD:
+            log, stated = one.numbers["log"].value, one.numbers["card"].value
+            what = "final_drive" if one.subject == FINAL_DRIVE else one.names["what"]
+            yield abs(log / stated - 1.0) / RATIO_STD, f"{what} ({log:.4g})"
         elif one.code is Code.RATIO_DEVIATES:
             ratio, card = one.numbers["ratio"].value, one.numbers["card"].value
             gear = one.names["gear"]

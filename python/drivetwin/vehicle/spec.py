@@ -11,6 +11,8 @@ from drivetwin.actuator.model import ActuatorModel
 
 ElementKind = Literal["brake", "clutch"]
 Pair = tuple[float, float]
+Z95 = 1.959963984540054
+"""Half of a 95 % interval of a normal distribution, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,11 @@ class PriorValue:
     value: float
     std: float = 0.0
     assumed: bool = False
+
+    @property
+    def half_width(self) -> float | None:
+        """Half of the 95 % interval; None for an exact value."""
+        return Z95 * self.std if self.std > 0.0 else None
 
     def scale(self, factor: float) -> PriorValue:
         """Return the quantity times an exact factor."""

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +12,7 @@ import pytest
 from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import PlausibilityError, TimeError
-from drivetwin.findings import render
+from drivetwin.findings import Number, render
 from drivetwin.logs.quality.consistency_checks import (
     check_common_span,
     check_coverage,
@@ -23,6 +22,7 @@ from drivetwin.logs.quality.consistency_checks import (
     check_torque_signs,
 )
 from drivetwin.logs.read import read_log
+from drivetwin.vehicle.spec import PriorValue
 from tests.logs.fixtures import CARD, card, write
 
 TIME = np.linspace(0.0, 0.5, 50)
@@ -149,13 +149,17 @@ def driven(wheel_over: float, noise: float = 0.02) -> dict[str, Channel]:
 
 
 def test_a_final_drive_that_is_not_the_cards_is_told(tmp_path: Path) -> None:
-    vehicle = card(tmp_path)
+    rough = card(tmp_path)
+    vehicle = replace(rough, final_drive=PriorValue(5.0))
     (one,) = check_final_drive(driven(4.99), vehicle)
-    found = re.match(
-        r"'output_speed' over 'wheel_speed' is ([\d.]+), .* final_drive = 5\.", one.text
+    ratio = one.numbers["ratio"]
+    assert ratio.value == pytest.approx(4.99, abs=0.001)
+    assert 0.0 < (ratio.half_width or 0.0) < 0.001
+    assert one.numbers["card"] == Number(5.0)
+    assert check_final_drive(driven(4.99), rough) == []
+    assert check_final_drive(driven(4.85), rough)[0].numbers["card"].half_width == pytest.approx(
+        1.96 * 0.0577, rel=1e-3
     )
-    assert found is not None
-    assert float(found[1]) == pytest.approx(4.99, abs=0.001)
     assert check_final_drive(driven(5.0), vehicle) == []
     assert check_final_drive(driven(4.998), vehicle) == []
     assert check_final_drive(driven(4.99, noise=3.0), vehicle) == []

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
+from drivetwin.vehicle.spec import Z95 as Z95  # the place where results look it up
 from drivetwin.vehicle.spec import PriorValue
 
 FloatArray = NDArray[np.float64]
@@ -18,10 +19,6 @@ FloatArray = NDArray[np.float64]
 
 OF_RATIO = ", μ over η"
 """Suffix of the method name for a friction curve that is μ/η."""
-
-
-Z95 = 1.959963984540054
-"""Half width of a 95 % interval in standard deviations, of a normal distribution."""
 
 
 class Verdict(StrEnum):

@@ -130,7 +130,8 @@ def report_refined(
         is_within = abs(one.value - prior.value) <= Z95 * prior.std
         code = Code.RATIO_REFINED if is_within else Code.RATIO_OFF_CARD
         log = Number(one.value, one.unit, Z95 * (one.std_total or 0.0))
-        found.append(report(code, name, what=describe_ratio_id(name), log=log, card=prior.value))
+        card = Number(prior.value, one.unit, prior.half_width)
+        found.append(report(code, name, what=describe_ratio_id(name), log=log, card=card))
     return found
 
 
