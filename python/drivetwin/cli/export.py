@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -71,6 +72,14 @@ _Inputs = Annotated[
         "them (CSV), delays removed.",
     ),
 ]
+_AsLogged = Annotated[
+    bool,
+    typer.Option(
+        "--as-logged",
+        help="For models, with --log: take inputs as the log shows them. The model delays the "
+        "earlier inputs, and its outputs are later by the largest delay.",
+    ),
+]
 _Platforms = Annotated[
     list[Platform] | None,
     typer.Option("--platform", help="For fmu: target platform, built by zig; repeatable."),
@@ -90,6 +99,7 @@ def export(
     shift: _Shift = None,
     log: _Log = None,
     inputs: _Inputs = None,
+    as_logged: _AsLogged = False,
     channels: ChannelsFile = None,
     fmi: Annotated[
         FmiVersion, typer.Option("--fmi", help="For fmu: version of the standard.")
@@ -106,26 +116,27 @@ def export(
     """
     model = load_plant(twin, drop_part=drop_part)
     path = output or Path(f"{twin.stem}.{to.ending}")
+    load = partial(_load_subject, shift=shift, log=log, channels=channels, as_logged=as_logged)
     with show_step(f"writing {path.name}"):
         match to:
             case Target.C:
                 from drivetwin.export.c import write_c
 
-                subject, experiment = _load_subject(model, shift, log, channels)
+                subject, experiment = load(model)
                 write_c(subject, path)
                 _write_inputs(subject, experiment, inputs)
                 listed: dict[str, object] = {}
             case Target.FMU:
                 from drivetwin.export.fmu.build import BuildOptions, build_fmu
 
-                subject, experiment = _load_subject(model, shift, log, channels)
+                subject, experiment = load(model)
                 build_fmu(subject, path, BuildOptions(fmi, tuple(platforms or ()), experiment))
                 _write_inputs(subject, experiment, inputs)
                 listed = {"fmi": fmi.value}
             case Target.MODELICA:
                 from drivetwin.export.modelica.dual_clutch import write_modelica
 
-                subject, experiment = _load_subject(model, shift, log, channels)
+                subject, experiment = load(model)
                 write_modelica(subject, experiment, path)
                 _write_inputs(subject, experiment, inputs)
                 listed = {}
@@ -179,18 +190,21 @@ def _write_parameters(
 
 
 def _load_subject(
-    twin: Twin, shift: str | None, log: Path | None, channels: Path | None
+    twin: Twin, *, shift: str | None, log: Path | None, channels: Path | None, as_logged: bool
 ) -> tuple[Subject, Experiment | None]:
     """Load the model, and the initial state from the shift of the log if one is given."""
     from drivetwin.export.subject import build_subject
 
     gears = None if shift is None else parse_gears(shift)
     if log is None:
+        if as_logged:
+            why = "--as-logged needs a log that shows how often the engine torque is updated"
+            raise InputError(why, "name it with --log", Where(key="--as-logged"))
         return build_subject(twin, gears), None
     from drivetwin.export.fmu.measured import build_measured_subject
 
     recording, _ = read_twin_log(twin, log, None, channels)
-    return build_measured_subject(twin, recording, gears)
+    return build_measured_subject(twin, recording, gears, as_logged=as_logged)
 
 
 def parse_gears(text: str) -> tuple[str, str]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from drivetwin.export.input_delays import InputDelays
 from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, State
 
 INF = math.inf
@@ -94,6 +95,15 @@ def start_entries(start: State) -> tuple[Entry, ...]:
         Entry("start.output_speed", "output_speed", start.output_speed, "rad/s", "output speed"),
         Entry("start.wheel_speed", "wheel_speed", start.wheel_speed, "rad/s", "wheel speed"),
         Entry("start.twist", "twist", start.twist, "rad", "twist of the output shaft"),
+    )
+
+
+def delay_entries(delays: InputDelays) -> tuple[Entry, ...]:
+    """The delays inside the model; `field` is the place in `dt_delays`."""
+    return (
+        Entry("delay.torque", "engine_torque", delays.torque_line, "s", "delay of the input"),
+        Entry("delay.pressure", "pressure", delays.pressure_line, "s", "delay of the inputs"),
+        Entry("delay.lag", "lag", delays.lag, "s", "delay of the outputs"),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.validation import Validation
+from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
 from drivetwin.export.input_kind import InputKind
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
@@ -52,24 +53,48 @@ def sample_signals(signals: Sequence[Signal], time: FloatArray) -> FloatArray:
 
 
 def run_fixed_step(
-    model: DualClutch, start: State, time: FloatArray, inputs: FloatArray, kind: InputKind
+    model: DualClutch,
+    start: State,
+    time: FloatArray,
+    inputs: FloatArray,
+    kind: InputKind,
+    delays: InputDelays = ACTING_INPUTS,
 ) -> Trajectory:
     """Run with `inputs` (n, 3) given at `time` (n,): engine torque, then pressures in the order of
     the elements; integrated to round-off. Where inputs jump, torques are those from there on.
 
-    Raises InputError for an inconsistent description; a run that fails returns its status.
+    `delays` are those of the exported model. Raises InputError for an inconsistent description; a
+    run that fails returns its status.
     """
-    torque, *pressures = (_build_signal(time, column, kind) for column in inputs.T)
+    lines = (delays.torque_line, delays.pressure_line, delays.pressure_line)
+    torque, *pressures = (
+        _build_signal(time, *_delay_column(time, column, kind, line))
+        for column, line in zip(inputs.T, lines, strict=True)
+    )
     names = [element.name for element in model.elements]
     given = dict(zip(names, pressures, strict=True))
     return simulate(model, torque, given, start, time, accuracy=Accuracy(exact=True))
 
 
-def _build_signal(time: FloatArray, values: FloatArray, kind: InputKind) -> Signal:
-    if kind is InputKind.LINEAR:
-        return Signal(time, np.ascontiguousarray(values))
-    # A repeated time stamp is a jump: every value lasts until the next point.
-    return Signal(np.repeat(time, 2)[1:-1], np.repeat(values[:-1], 2))
+def _delay_column(
+    time: FloatArray, values: FloatArray, kind: InputKind, delay: float
+) -> tuple[FloatArray, FloatArray]:
+    """Values (n - 1,) of an input behind its delay line at the begin and at the end of each step.
+
+    The line is linear between the samples, of which those after the begin of a step are not known
+    yet if inputs are held.
+    """
+    first, last = (np.interp(ends - delay, time, values) for ends in (time[:-1], time[1:]))
+    if kind is InputKind.HOLD:
+        last = np.where(time[1:] - delay > time[:-1], values[:-1], last)
+    return first, last
+
+
+def _build_signal(time: FloatArray, first: FloatArray, last: FloatArray) -> Signal:
+    """Signal that is linear over each step; a repeated time stamp is a jump."""
+    if np.array_equal(first[1:], last[:-1]):
+        return Signal(time, np.append(first, last[-1:]))
+    return Signal(np.repeat(time, 2)[1:-1], np.column_stack((first, last)).ravel())
 
 
 def sample_inputs(shift: Validation, stepping: Stepping) -> tuple[FloatArray, FloatArray]:

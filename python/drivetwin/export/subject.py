@@ -5,51 +5,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
 from drivetwin.simulation.dual_clutch import DualClutch, State
 from drivetwin.twin.nominal_shift import build_nominal_shift
-from drivetwin.twin.twin import PRESSURE_DELAY, Twin
+from drivetwin.twin.twin import Twin
 
 DEFAULT_ENGINE_SPEED = 150.0
 """Default engine speed [rad/s] at the start, for a twin without recorded speeds."""
-
-
-@dataclass(frozen=True)
-class InputDelays:
-    """Delays [s] between the inputs of a log and those that act in the model.
-
-    A log shows the engine torque `torque` after it acts. Pressures act `pressure` after the log
-    shows them. Both may be negative.
-    """
-
-    torque: float = 0.0
-    pressure: float = 0.0
-
-    @classmethod
-    def from_twin(cls, twin: Twin) -> InputDelays:
-        """Return the identified delays of a twin."""
-        return cls(twin.get_value("te_delay", 0.0), twin.get_value(PRESSURE_DELAY, 0.0))
-
-    def describe_torque(self) -> str:
-        """Describe how a logged engine torque becomes the input; empty without a delay."""
-        return _describe_shift(-self.torque)
-
-    def describe_pressure(self) -> str:
-        """Describe how a logged pressure becomes the input; empty without a delay."""
-        return _describe_shift(self.pressure)
-
-    def describe(self) -> str:
-        """Describe both in one line; empty without a delay."""
-        parts = (("engine torque", self.describe_torque()), ("pressures", self.describe_pressure()))
-        return "; ".join(f"{name} {text}" for name, text in parts if text)
-
-
-def _describe_shift(late: float) -> str:
-    """Describe an input that acts `late` [s] after the log shows it."""
-    if late == 0.0:
-        return ""
-    way, side = ("delay", "after") if late > 0.0 else ("advance", "before")
-    size = f"{abs(late):.5g} s"
-    return f"as it acts, {size} {side} the log shows it: {way} the logged signal by {size}"
 
 
 @dataclass(frozen=True)
@@ -61,8 +23,8 @@ class Subject:
     start: State
     note: str = ""
     """Origin of the numbers, one line."""
-    delays: InputDelays = InputDelays()
-    """Delays of the logged inputs behind those that the model takes."""
+    delays: InputDelays = ACTING_INPUTS
+    """Delays between the inputs of a log and those that act."""
 
 
 def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:

@@ -22,13 +22,20 @@ package Modelica
     input Real table[:, :];
     input Integer column;
     output Real y;
+  protected
+    Integer low;
+    Integer high;
+    Integer middle;
   algorithm
-    y := table[1, column];
-    for i in 1:size(table, 1) - 1 loop
-      y := y + (table[i + 1, column] - table[i, column])/(table[i + 1, 1] - table[i, 1])
-        *(if i == size(table, 1) - 1 then max(u - table[i, 1], 0)
-          else min(max(u - table[i, 1], 0), table[i + 1, 1] - table[i, 1]));
+    low := 1;
+    high := size(table, 1);
+    for k in 1:14 loop
+      middle := div(low + high, 2);
+      high := if middle > low and table[middle, 1] > u then middle else high;
+      low := if table[middle, 1] <= u then middle else low;
     end for;
+    y := table[low, column] + (table[high, column] - table[low, column])
+      /(table[high, 1] - table[low, 1])*max(u - table[low, 1], 0);
   end interpolate;
 
   function hold "Linear between the rows of a table, constant beyond"

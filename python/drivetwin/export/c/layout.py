@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Structures of `dt_model.h` and `dt_observer.h` as ctypes classes, read from the headers."""
+"""Structures of the C headers as ctypes classes, read from the headers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ class Precision(Enum):
 def read_layout(precision: Precision) -> SimpleNamespace:
     """Return the ctypes class of every structure by its name without `dt_`."""
     sources = read_model_sources()
-    text = _COMMENT.sub("", "".join(sources[f"dt_{n}.h"].decode() for n in ("model", "observer")))
+    text = _COMMENT.sub(
+        "", "".join(sources[f"dt_{n}.h"].decode() for n in ("model", "delay", "observer"))
+    )
     sizes = {f"DT_{name}": int(value) for name, value in _CONSTANT.findall(text)}
     types: dict[str, Any] = {"dt_real": precision.value, "uint64_t": ctypes.c_uint64}
     types |= dict.fromkeys(("int", "dt_mode", "dt_loss_law"), ctypes.c_int)

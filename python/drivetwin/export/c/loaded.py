@@ -62,6 +62,7 @@ class CModel:
             self.library = ctypes.CDLL(str(target))
         pointer, real = ctypes.c_void_p, precision.value
         self.library.dt_step.argtypes = [*(pointer,) * 4, real, pointer]
+        self.library.dt_step_delayed.argtypes = [*(pointer,) * 5, real, pointer]
         self.library.dt_observe.argtypes = [*(pointer,) * 4, real, pointer]
         layout = self.layout
         self.library.dt_usual_tuning.restype = layout.tuning
@@ -69,13 +70,14 @@ class CModel:
         self.params = layout.params.from_buffer_copy(fixed)
         start = layout.start.in_dll(self.library, "dt_twin_start")
         self.start = layout.start.from_buffer_copy(start)
+        self._delays = layout.delays.in_dll(self.library, "dt_twin_delays")
 
     def run(self, time: FloatArray, inputs: FloatArray, *, hold: bool = False) -> CRun:
         """Step over `time` (n,) [s]; `inputs` (n, 3): engine torque [N m], two pressures [Pa].
 
         Inputs are linear between rows, or held. The first row of the result is the start.
         """
-        state, outputs = self.layout.state(), self.layout.outputs()
+        state, line, outputs = self.layout.state(), self.layout.line(), self.layout.outputs()
         rows = [self.to_c_inputs(row) for row in inputs]
         table = np.full((len(time), len(COLUMNS)), np.nan)
         status = self.library.dt_begin(
@@ -83,12 +85,13 @@ class CModel:
         )
         if status == 0:
             table[0] = _to_row(outputs)
+        self.library.dt_line_begin(*map(ctypes.byref, (line, self._delays, rows[0])))
         for i in range(1, len(time)):
             if status != 0:
                 break
             ends = (rows[i - 1], rows[i - 1] if hold else rows[i])
-            status = self.library.dt_step(
-                *map(ctypes.byref, (state, self.params, *ends)),
+            status = self.library.dt_step_delayed(
+                *map(ctypes.byref, (state, line, self.params, *ends)),
                 float(time[i] - time[i - 1]),
                 ctypes.byref(outputs),
             )

@@ -10,7 +10,13 @@ from pathlib import Path
 from drivetwin._util.atomic import write_bytes
 from drivetwin._util.visible_text import escape_text
 from drivetwin.export.checks import check_exportable
-from drivetwin.export.entries import Entry, get_lock_index, list_entries, start_entries
+from drivetwin.export.entries import (
+    Entry,
+    delay_entries,
+    get_lock_index,
+    list_entries,
+    start_entries,
+)
 from drivetwin.export.subject import Subject
 
 _LOSS_LAWS = {"paper": "DT_PAPER", "dissipative": "DT_DISSIPATIVE"}
@@ -53,6 +59,10 @@ def generate_twin_source(subject: Subject) -> str:
             "const dt_start dt_twin_start = {",
             *map(_format_initialiser, start_entries(start)),
             f"    .locked = {get_lock_index(model, start)},",
+            "};",
+            "",
+            "const dt_delays dt_twin_delays = {",
+            *map(_format_initialiser, delay_entries(subject.delays)),
             "};",
             "",
         )

@@ -92,7 +92,9 @@ def _build_experiment_files(
     root = ET.Element("Experiments", name=experiment.name)
     files = {}
     for kind in _list_input_kinds(version):
-        run = run_fixed_step(subject.model, subject.start, experiment.time, experiment.inputs, kind)
+        run = run_fixed_step(
+            subject.model, subject.start, experiment.time, experiment.inputs, kind, subject.delays
+        )
         results = np.column_stack([getattr(run, name) for name in _SPEEDS])
         name = _RESULTS[kind]
         _add_experiment(root, experiment, kind)
@@ -140,7 +142,7 @@ _SPEEDS = ("engine_speed", "output_speed", "wheel_speed", "twist", "shaft_torque
 
 
 def format_inputs(subject: Subject, experiment: Experiment) -> str:
-    """Format the inputs of a log as the exported model takes them, at the instants they act.
+    """Format the inputs of a log as the exported model takes them: as they act, or as logged.
 
     Columns are the time [s] and the inputs by their names in the FMU [N m, Pa]; importers of FMUs
     and the runner of the C sources read the table.

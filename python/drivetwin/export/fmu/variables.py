@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from drivetwin.export.entries import Entry, get_lock_index, list_entries, start_entries
+from drivetwin.export.input_delays import InputDelays
 from drivetwin.export.parameters.spelling import make_distinct, to_ascii_line, to_one_line
-from drivetwin.export.subject import InputDelays, Subject
+from drivetwin.export.subject import Subject
 
 INPUTS, OUTPUTS, MODES, LOSS_LAW, LOCKED, START, PARAMETERS = 1, 10, 30, 40, 41, 50, 100
 INF = math.inf
@@ -76,7 +77,7 @@ def list_variables(subject: Subject) -> tuple[Variable, ...]:
     names = list(spelled.values())
     return (
         *_list_inputs(names, subject.delays),
-        *_list_outputs(names),
+        *_list_outputs(names, subject.delays),
         Variable(
             "loss_law",
             LOSS_LAW,
@@ -151,7 +152,7 @@ def _list_inputs(names: list[str], delays: InputDelays) -> list[Variable]:
     return [of("engine_torque", 0, torque, "N*m"), *pressures]
 
 
-def _list_outputs(names: list[str]) -> list[Variable]:
+def _list_outputs(names: list[str], delays: InputDelays) -> list[Variable]:
     reals = (
         ("engine_speed", "engine speed", "rad/s"),
         ("output_speed", "speed of the gearbox output", "rad/s"),
@@ -161,13 +162,15 @@ def _list_outputs(names: list[str]) -> list[Variable]:
         *((f"{name}.torque", "torque, drives the output", "N*m") for name in names),
         *((f"{name}.slip", "slip, w_in / i_c - i_out w_out", "rad/s") for name in names),
     )
+    late = f", {delays.describe_outputs()}" if delays.lag else ""
+    mode = f"friction mode{late}"
     return [
         *(
-            Variable(name, OUTPUTS + i, Kind.REAL, Role.OUTPUT, meaning, unit)
+            Variable(name, OUTPUTS + i, Kind.REAL, Role.OUTPUT, f"{meaning}{late}", unit)
             for i, (name, meaning, unit) in enumerate(reals)
         ),
         *(
-            Variable(f"{n}.mode", MODES + i, Kind.FRICTION_MODE, Role.OUTPUT, "friction mode")
+            Variable(f"{n}.mode", MODES + i, Kind.FRICTION_MODE, Role.OUTPUT, mode)
             for i, n in enumerate(names)
         ),
     ]

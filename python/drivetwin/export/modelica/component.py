@@ -52,7 +52,16 @@ def format_values(**modifiers: float) -> Modifiers:
 
 @dataclass(frozen=True)
 class Names:
-    """Identifiers of elements and of inputs by their names in the network."""
+    """Identifiers of elements and of inputs by their names in the network.
+
+    `delays` [s] are those between an input of the model and the parts that take it, by input.
+    """
 
     elements: dict[str, str] = field(default_factory=dict)
     inputs: dict[str, str] = field(default_factory=dict)
+    delays: dict[str, float] = field(default_factory=dict)
+
+    def get_acting(self, name: str) -> str:
+        """Identifier of an input behind its delay."""
+        plain = self.inputs[name]
+        return f"{plain}_acting" if name in self.delays else plain

@@ -31,7 +31,13 @@ def format_modelica(
     run = None
     if inputs is not None and time is not None:
         run = Run(inputs, build_network_start(subject.start), time)
-    return format_package(subject.name, build_network(subject.model), run, note=subject.note)
+    lines = subject.delays
+    delays = {
+        ENGINE_TORQUE: lines.torque_line,
+        **{element.name: lines.pressure_line for element in subject.model.elements},
+    }
+    network = build_network(subject.model)
+    return format_package(subject.name, network, run, note=subject.note, delays=delays)
 
 
 def write_modelica(subject: Subject, experiment: Experiment | None, path: Path) -> None:

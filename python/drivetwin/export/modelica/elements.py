@@ -154,7 +154,7 @@ def _build_road_load(element: Element, names: Names) -> Part:
 
 def _build_torque(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
-    equation = (f"{name}.tau = {names.inputs[element['input']]};",)
+    equation = (f"{name}.tau = {names.get_acting(element['input'])};",)
     reaction = element.get("reaction")
     if reaction is None or reaction == GROUND:
         flanges: Flanges = (("flange", element["node"]),)
@@ -167,7 +167,7 @@ def _build_speed_source(element: Element, names: Names) -> Part:
     name = names.elements[element["name"]]
     flange = (("flange", element["node"]),)
     source = Component(f"{_SOURCES}.Speed", name, (("exact", "true"),), flange)
-    return Part((source,), (f"{name}.w_ref = {names.inputs[element['input']]};",))
+    return Part((source,), (f"{name}.w_ref = {names.get_acting(element['input'])};",))
 
 
 def _build_engine_map(element: Element, names: Names) -> Part:
@@ -181,7 +181,7 @@ def _build_engine_map(element: Element, names: Names) -> Part:
     )
     source = Component(f"{_SOURCES}.Torque", name, (), (("flange", element["node"]),))
     equations = [
-        f"{name}_map.u1 = {names.inputs[element['throttle']]};",
+        f"{name}_map.u1 = {names.get_acting(element['throttle'])};",
         f"{name}_map.u2 = der({name}.flange.phi);",
     ]
     if element.get("lag") is None:

@@ -88,7 +88,7 @@ def _build_friction_component(kind: str, element: Element, flanges: Flanges, nam
         ("mu_pos", format_matrix(build_friction_rows(element["friction"]))),
         *format_values(peak=element["peak"], cgeo=element["gain"], fn_max=_FULL_PRESSURE),
     )
-    pressure = names.inputs[element["pressure"]]
+    pressure = names.get_acting(element["pressure"])
     fill = f"P0_{name}"
     return Part(
         (Component(kind, name, modifiers, flanges),),

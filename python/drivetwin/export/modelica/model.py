@@ -47,15 +47,17 @@ def format_package(
     *,
     note: str = "",
     ends: tuple[str, ...] = (),
+    delays: Mapping[str, float] | None = None,
 ) -> str:
     """Modelica package `name` with the model `Driveline` and, for a run, the model `Shift`.
 
     Inputs of the driveline are `u_<input>`, in SI; the nodes `ends` get flanges `flange_<node>` to
-    connect it by. Raises InputError for an element that has no Modelica form and for a name that
+    connect it by. `delays` [s] stand between inputs of the driveline, by name, and the parts that
+    take them. Raises InputError for an element that has no Modelica form and for a name that
     would stand for two things.
     """
     _refuse_doubles(str(element["name"]) for element in elements)
-    names = _collect_names(elements)
+    names = _collect_names(elements, delays or {})
     parts = {str(element["name"]): build_part(element, names) for element in elements}
     helpers = sorted(frozenset().union(*(part.helpers for part in parts.values())))
     plain = make_identifier(name)
@@ -80,12 +82,13 @@ def _refuse_doubles(names: Iterable[str]) -> None:
         )
 
 
-def _collect_names(elements: Sequence[Element]) -> Names:
+def _collect_names(elements: Sequence[Element], delays: Mapping[str, float]) -> Names:
     found = chain.from_iterable(_list_inputs(element) for element in elements)
     listed = list(dict.fromkeys(found))
     inputs = make_identifiers(f"u_{name}" for name in listed)
     own = make_identifiers(str(element["name"]) for element in elements)
-    return Names(own, {name: inputs[f"u_{name}"] for name in listed})
+    late = {name: delay for name, delay in delays.items() if delay > 0.0}
+    return Names(own, {name: inputs[f"u_{name}"] for name in listed}, late)
 
 
 def _list_inputs(element: Element) -> list[str]:
@@ -97,28 +100,43 @@ def _format_driveline(parts: Mapping[str, Part], names: Names, ends: tuple[str, 
     components = [one for part in parts.values() for one in part.components]
     flanges = {node: make_identifier(f"flange_{node}") for node in ends}
     ports_of_nodes = [f"  {_FLANGE} {flange};" for flange in flanges.values()]
-    ports = [
-        f"  Modelica.Blocks.Interfaces.RealInput {plain} {format_string(name + ' [SI]')};"
-        for name, plain in names.inputs.items()
-    ]
     nodes = _collect_flanges(components)
     fixed = Component(f"{ROTATIONAL}.Components.Fixed", "ground_")
+    acting = {name: names.get_acting(name) for name in names.delays}
     declared = (one.name for one in (*components, fixed))
-    _refuse_doubles((*declared, *flanges.values(), *names.inputs.values()))
+    inner = (*flanges.values(), *names.inputs.values(), *acting.values())
+    _refuse_doubles((*declared, *inner))
     lines = [
         "model Driveline",
         *ports_of_nodes,
-        *ports,
+        *_format_inputs(names, acting),
         *(line for part in parts.values() for line in part.parameters),
         *(one.format_declaration() for one in components),
         *([fixed.format_declaration()] if GROUND in nodes else []),
         "equation",
+        *(
+            f"  {plain} = delay({names.inputs[name]}, {format_number(names.delays[name])});"
+            for name, plain in acting.items()
+        ),
         *(f"  {line}" for part in parts.values() for line in part.equations),
         *(line for node, members in nodes.items() for line in _format_connections(node, members)),
         *(f"  connect({flange}, {nodes[node][0]});" for node, flange in flanges.items()),
         "end Driveline;\n",
     ]
     return "\n".join(f"  {line}" for line in lines)
+
+
+def _format_inputs(names: Names, acting: Mapping[str, str]) -> list[str]:
+    """Declarations of the inputs, and of the variables `acting` behind their delays."""
+    ports = (
+        f"  Modelica.Blocks.Interfaces.RealInput {plain} {format_string(f'{name} [SI]')};"
+        for name, plain in names.inputs.items()
+    )
+    inner = (
+        f"  Real {plain} {format_string(f'{name} as it acts [SI]')};"
+        for name, plain in acting.items()
+    )
+    return [*ports, *inner]
 
 
 def _collect_flanges(components: Sequence[Component]) -> dict[str, list[str]]:

@@ -59,11 +59,13 @@ int main(int argc, char **argv) {
     const int hold = argc > 1 && strcmp(argv[1], "hold") == 0;
     double before[4], now[4];
     dt_state state;
+    dt_line line;
     dt_outputs y;
     if (read_row(before) != ROW) {
         return failed("no row of four numbers", 6, 0.0);
     }
     dt_inputs from = inputs_of(before);
+    dt_line_begin(&line, &dt_twin_delays, &from);
     dt_status status = dt_begin(&state, &dt_twin_params, &dt_twin_start, &from, &y);
     if (status != DT_OK) {
         return failed(faults[status], (int)status, before[0]);
@@ -74,8 +76,8 @@ int main(int argc, char **argv) {
     reading next_row;
     while ((next_row = read_row(now)) == ROW) {
         const dt_inputs next = inputs_of(now);
-        status = dt_step(&state, &dt_twin_params, &from, hold ? &from : &next,
-                         (dt_real)(now[0] - before[0]), &y);
+        status = dt_step_delayed(&state, &line, &dt_twin_params, &from, hold ? &from : &next,
+                                 (dt_real)(now[0] - before[0]), &y);
         if (status != DT_OK) {
             return failed(faults[status], (int)status, before[0]);
         }

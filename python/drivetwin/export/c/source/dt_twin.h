@@ -5,6 +5,7 @@
 #ifndef DT_TWIN_H
 #define DT_TWIN_H
 
+#include "dt_delay.h"
 #include "dt_model.h"
 
 #ifdef __cplusplus
@@ -15,6 +16,8 @@ extern "C" {
 extern const dt_params dt_twin_params;
 /** Where a run starts unless told otherwise: steadily in the old gear. */
 extern const dt_start dt_twin_start;
+/** Delays of the inputs for dt_line_begin; zero where the inputs are those that act. */
+extern const dt_delays dt_twin_delays;
 /** Name of the twin. */
 extern const char dt_twin_name[];
 /** Names of the shift elements: off-going, on-coming. */

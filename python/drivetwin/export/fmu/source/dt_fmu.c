@@ -223,11 +223,15 @@ int dt_fmu_do_step(dt_fmu *fmu, double time, double h) {
     if (fault != 0) {
         return fail(fmu, "parameter out of range: ", fault);
     }
+    if (!now->has_stepped) {
+        dt_line_begin(&now->line, &dt_twin_delays, &now->inputs);
+        now->has_stepped = 1;
+    }
     const double parts = ceil(h / LONGEST_STEP);
     for (double part = 0.0; part < parts; part += 1.0) {
         const dt_inputs to = moved(&now->inputs, &now->rates, h / parts);
-        const dt_status status = dt_step(&now->state, &now->params, &now->inputs, &to, h / parts,
-                                         &now->outputs);
+        const dt_status status = dt_step_delayed(&now->state, &now->line, &now->params,
+                                                 &now->inputs, &to, h / parts, &now->outputs);
         if (status != DT_OK) {
             return fail(fmu, "step failed: ", faults[status]);
         }

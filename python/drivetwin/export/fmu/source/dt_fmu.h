@@ -36,9 +36,11 @@ typedef struct {
     dt_inputs inputs; /**< at the start of the next step */
     dt_inputs rates;  /**< of the inputs over the next step, per s */
     dt_state state;
+    dt_line line;
     dt_outputs outputs;
     double time;
     dt_fmu_phase phase;
+    int has_stepped; /**< whether the line holds the inputs so far */
     int is_changed; /**< whether parameters or start have been set since they were checked */
 } dt_fmu_data;
 
