@@ -11,7 +11,7 @@ from typing import Any
 from drivetwin._util.atomic import protect_files, refuse_overwrite
 from drivetwin._util.output_lock import lock_outputs
 
-_OUTPUTS = frozenset(("output", "figure", "html", "write_mapping", "modelica"))
+_OUTPUTS = frozenset(("output", "figure", "html", "inputs", "write_mapping", "modelica"))
 """Parameters of commands that name what is written; files that all others name are read."""
 
 

@@ -16,7 +16,11 @@ TOLERANCE = 1e-10
 
 
 def run(
-    text: str, time: FloatArray, variables: Sequence[str], folder: Path
+    text: str,
+    time: FloatArray,
+    variables: Sequence[str],
+    folder: Path,
+    tolerance: float = TOLERANCE,
 ) -> dict[str, FloatArray]:
     """Simulate the model `Shift` of a package and return variables of its driveline on `time`."""
     package = text.split(maxsplit=2)[1]
@@ -26,7 +30,7 @@ def run(
     result = model.simulate(
         t=(float(time[0]), float(time[-1])),
         dt=float(time[1] - time[0]),
-        config=rumoca.SimConfig(rtol=TOLERANCE, atol=TOLERANCE),
+        config=rumoca.SimConfig(rtol=tolerance, atol=tolerance),
     )
     instants = np.asarray(result.time)
     return {
