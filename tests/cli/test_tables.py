@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from drivetwin.cli.tables import build_suggestion_table, list_limits
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.suggestion import (
+    CardNumber,
+    CardNumberKind,
     ExpectedPrecision,
     Experiment,
     ExperimentRanking,
@@ -25,4 +29,9 @@ def test_what_no_experiment_narrows_is_listed_once_for_each_reason() -> None:
         for one in suggestions
     }
     assert build_suggestion_table(suggestions, estimates).row_count == 1
+    number = CardNumber(CardNumberKind.EFFECT, "input_drag", share=0.5)
+    known = [replace(one, number=number) for one in suggestions]
+    table = build_suggestion_table(known, estimates)
+    assert table.row_count == 3
+    assert list(table.columns[4].cells)[1] == "input_drag"
     assert list_limits(suggestions) == [f"eta, k_o: {limit}"]

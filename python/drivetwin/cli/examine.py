@@ -231,8 +231,8 @@ def _build_bootstrap_table(one: Bootstrap, found: Identification) -> Table:
         linear = Z95 * (estimate.std_noise or float("inf"))
         table.add_row(
             name,
-            format_half_width(estimate.value, linear, estimate.unit),
-            format_half_width(estimate.value, Z95 * float(one.std[k]), estimate.unit),
+            format_half_width(linear, estimate.unit),
+            format_half_width(Z95 * float(one.std[k]), estimate.unit),
             f"{one.bias[k] / one.std[k]:+.2f} σ",
             format_estimate(None, None, estimate.unit)[2],
         )

@@ -35,11 +35,11 @@ def format_quantity(value: float | None, si_unit: str) -> str:
     return f"{format_significant(value * display.factor, 3)} {display.label}".rstrip()
 
 
-def format_half_width(value: float | None, half: float, si_unit: str) -> str:
-    """`± half width` of an interval about a value in display units; `open` where infinite."""
+def format_half_width(half: float, si_unit: str) -> str:
+    """`± half width` of an interval in display units; `open` where infinite."""
     if half == float("inf"):
         return "open"
-    return format_estimate(value or half, (-half, half), si_unit)[1]
+    return format_estimate(half, (-half, half), si_unit)[1]
 
 
 def format_percent(value: float | None) -> str:

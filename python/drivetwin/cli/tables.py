@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -120,19 +121,31 @@ def _number_reasons(estimates: Mapping[str, Estimate]) -> dict[str, int]:
 def build_suggestion_table(
     suggestions: Sequence[ExperimentRanking], estimates: Mapping[str, Estimate]
 ) -> Table:
-    """By parameter the experiment that would narrow it most, with the interval now and then."""
+    """By parameter the experiment and the number of the card that would narrow it most, with the
+    interval now and then."""
     table = make_table(
-        "Next experiments", "parameter", "now", "experiment", "then", "unit",
-        right=("now", "then"),
+        "Narrower intervals", "parameter", "now", "by the experiment", "then",
+        "or exact on the card", "then ", "unit", right=("now", "then", "then "),
     )  # fmt: skip
     for one in suggestions:
-        estimate, best = estimates[one.parameter], one.best
-        if best is None:
+        estimate, best, number = estimates[one.parameter], one.best, one.best_number
+        if best is None and number is None:
             continue
-        unit = estimate.unit
-        then = format_half_width(estimate.value, best.half_width, unit)
-        now = format_half_width(estimate.value, one.half_width, unit)
-        table.add_row(one.parameter, now, one.text, then, format_estimate(None, None, unit)[2])
+        widths = (
+            one.half_width,
+            math.inf if best is None else best.half_width,
+            math.inf if number is None else number.share * one.half_width,
+        )
+        now, then, known = (format_half_width(width, estimate.unit) for width in widths)
+        table.add_row(
+            one.parameter,
+            now,
+            "–" if best is None else one.text,
+            "" if best is None else then,
+            "–" if number is None else number.text,
+            "" if number is None else known,
+            format_estimate(None, None, estimate.unit)[2],
+        )
     return table
 
 

@@ -8,7 +8,7 @@ their results.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.result.cause import Cause
     from drivetwin.estimation.result.multi_log import Several
     from drivetwin.estimation.result.spread import PredictedSpread
-    from drivetwin.estimation.result.suggestion import ExperimentRanking
+    from drivetwin.estimation.result.suggestion import CardNumber, ExperimentRanking
     from drivetwin.estimation.result.validation import HeldOut, Validation
 
 
@@ -52,6 +52,8 @@ class StageResults:
     """Predicted spread of the free-running simulation of each shift by signal; likelihood only."""
     several: Several | None = None
     """The logs behind a fit of several, from `identify_joint`; None of one log."""
+    numbers: Mapping[str, CardNumber] = field(default_factory=dict)
+    """Number of the card that would narrow each parameter most; likelihood method only."""
     suggestions: tuple[ExperimentRanking, ...] = ()
     """Recommended experiments by parameter, from `rank_experiments`; likelihood method only."""
     validation: tuple[Validation, ...] = ()

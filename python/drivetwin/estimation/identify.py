@@ -97,7 +97,12 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         inputs=dict(log.inputs),
         settings=_collect_settings(design, method),
         evidence=replace(
-            evidence, signals=log.signals, loads=found.loads, cause=found.cause, spread=found.spread
+            evidence,
+            signals=log.signals,
+            loads=found.loads,
+            cause=found.cause,
+            spread=found.spread,
+            numbers=found.numbers,
         ),
         findings=findings,
         assumptions=(

@@ -20,7 +20,11 @@ from drivetwin.estimation.result.estimate import (
     LoadLaw,
     Verdict,
 )
-from drivetwin.estimation.result.suggestion import Experiment, ExperimentRanking
+from drivetwin.estimation.result.suggestion import (
+    CardNumberKind,
+    Experiment,
+    ExperimentRanking,
+)
 from drivetwin.findings import Code, Finding, Number, Row, Severity
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
@@ -270,10 +274,21 @@ class ProspectRecord(Record):
     shift: str = ""
 
 
+class CardNumberRecord(Record):
+    """Number of a vehicle card that would narrow a parameter if it were exact: a parameter, an
+    effect or a sensor error. `share` is the width of the interval then over the present width."""
+
+    kind: CardNumberKind
+    name: str
+    subject: str = ""
+    share: float
+
+
 class SuggestionRecord(Record):
     """A parameter, its 95 % half width now (null where open), and all experiments by their worth.
 
-    `text` names the best one, or says that none helps or why.
+    `text` names the best one, or the reason why none helps. `number` is the number of the card that
+    would narrow it most.
     """
 
     parameter: str
@@ -282,6 +297,7 @@ class SuggestionRecord(Record):
     half_width: OptionalFloat
     text: str
     experiments: list[ProspectRecord]
+    number: CardNumberRecord | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -290,4 +306,9 @@ class SuggestionRecord(Record):
             return source
         fields = {name: getattr(source, name) for name in ("parameter", "verdict", "half_width")}
         unit = get_parameter_spec(source.parameter).unit
-        return fields | {"unit": unit, "text": source.text, "experiments": source.prospects}
+        return fields | {
+            "unit": unit,
+            "text": source.text,
+            "experiments": source.prospects,
+            "number": source.number,
+        }

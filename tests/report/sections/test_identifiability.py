@@ -9,7 +9,13 @@ import numpy as np
 
 from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.suggestion import ExpectedPrecision, Experiment, ExperimentRanking
+from drivetwin.estimation.result.suggestion import (
+    CardNumber,
+    CardNumberKind,
+    ExpectedPrecision,
+    Experiment,
+    ExperimentRanking,
+)
 from drivetwin.report.sections.blocks import NotesBlock, TableBlock
 from drivetwin.report.sections.identifiability import build_limits_section
 from tests.report.sample import identification
@@ -54,15 +60,25 @@ def test_close_pairs_are_named() -> None:
 
 def test_simulated_experiments_take_the_place_of_the_general_advice() -> None:
     best = ExpectedPrecision(Experiment.THROTTLE_STEPS, 2, 0.25e-3, Verdict.IDENTIFIED)
+    limit = "the gain of the torque sensor"
+    number = CardNumber(CardNumberKind.PARAMETER, "P0.B3", share=0.5)
     told = (
         ExperimentRanking("te_delay", Verdict.NOT_IDENTIFIABLE, float("inf"), (best,)),
-        ExperimentRanking("eta", Verdict.IDENTIFIED, 0.02, (), "the gain of the torque sensor"),
+        ExperimentRanking("eta", Verdict.IDENTIFIED, 0.02, (), limit, number),
     )
     found = identification()
     found = replace(found, evidence=StageResults(suggestions=told))
     tables = [one for one in build_limits_section(found).blocks if isinstance(one, TableBlock)]
     rows = [[cell.text for cell in row] for row in tables[0].rows]
     assert rows == [
-        ["τ_e", "not identifiable", "open", f"{Experiment.THROTTLE_STEPS}, 2 times", "± 0.25 ms"],
-        ["η", "identified", "± 0.020", "the gain of the torque sensor", "–"],
+        [
+            "τ_e",
+            "not identifiable",
+            "open",
+            f"{Experiment.THROTTLE_STEPS}, 2 times",
+            "± 0.25 ms",
+            "–",
+            "–",
+        ],
+        ["η", "identified", "± 0.020", limit, "–", "P0.B3", "± 0.010"],
     ]

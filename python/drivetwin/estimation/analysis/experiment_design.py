@@ -12,7 +12,7 @@ uncertainty from the sensors' gains and offsets, or from effects that the model 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,8 +32,8 @@ from drivetwin.estimation.likelihood.fit import (
     invert_information,
 )
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
-    compute_jacobian,
     compute_parameters,
+    differentiate,
     make_log_id,
 )
 from drivetwin.estimation.optimize.objective import ParameterVector
@@ -47,22 +47,20 @@ from drivetwin.parameters import get_parameter_spec
 AGE = "te_delay"
 REPEATS = (1, 2, 4)
 """Numbers of repetitions of the best experiment, tried in this order."""
-LEAST_KNOWN = 3
-"""Number of identified parameters that are ranked beside the open ones."""
 NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"
 
 
 def compute_rankings(found: Identification) -> tuple[ExperimentRanking, ...]:
-    """Rank the experiments for every weak or not identifiable parameter of a likelihood fit.
+    """Rank the experiments for every estimated parameter of a likelihood fit.
 
-    After these come the `LEAST_KNOWN` others of widest relative interval.
+    Weak and not identifiable ones come first, then the identified ones by falling relative
+    interval. Each has the number of the card that would narrow it most.
     Raises IdentificationError where the identification is not by the likelihood method.
     """
     fit, signals = get_likelihood_fit(found)
     open_ = [one for one in found.estimates.values() if one.verdict in _OPEN]
     known = [one for one in found.estimates.values() if one.verdict is Verdict.IDENTIFIED]
-    least = sorted(known, key=_compute_relative_width, reverse=True)[:LEAST_KNOWN]
-    asked = (*open_, *least)
+    asked = (*open_, *sorted(known, key=_compute_relative_width, reverse=True))
     places = {one.id: _find_shifts(one.id, fit) for one in asked}
     wanted = list(dict.fromkeys(k for every in places.values() for k in every))
     gains = {}
@@ -71,8 +69,12 @@ def compute_rankings(found: Identification) -> tuple[ExperimentRanking, ...]:
             0.9 * number / len(wanted), 0.9 * (number + 1) / len(wanted), "experiments"
         ):
             gains[k] = _compute_gains(fit, signals, k)
+    numbers, base = found.evidence.numbers, _linearise(found)
     return tuple(
-        _rank_for_parameter(one, fit, signals, [gain for k in places[one.id] for gain in gains[k]])
+        replace(
+            _rank_for_parameter(one, base, [gain for k in places[one.id] for gain in gains[k]]),
+            number=numbers.get(one.id),
+        )
         for one in asked
     )
 
@@ -94,13 +96,11 @@ def _find_shifts(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
 
 @check_arguments
 def rank_experiments(found: Identification) -> Identification:
-    """Attach the experiments that would identify what the log leaves open.
+    """Attach the experiments and the numbers of the card that would narrow each parameter.
 
-    `evidence.suggestions` holds them, as `suggest` gives them; unchanged where nothing is open,
-    or by another method than the likelihood.
+    `evidence.suggestions` holds them; unchanged by another method than the likelihood.
     """
-    is_open = any(one.verdict in _OPEN for one in found.estimates.values())
-    if found.method is not Method.LIKELIHOOD or not is_open:
+    if found.method is not Method.LIKELIHOOD or found.evidence.likelihood is None:
         return found
     return replace(found, evidence=replace(found.evidence, suggestions=compute_rankings(found)))
 
@@ -192,21 +192,48 @@ def _eliminate_start(gain: _InformationGain, size: int) -> FloatArray:
     return reduce_information(gain.information, own, start)
 
 
+@dataclass(frozen=True, eq=False)
+class _Linearisation:
+    """Parameters at the minimum by id, and their derivatives (q, p) by the unknowns of the fit."""
+
+    fit: LikelihoodFit
+    values: Mapping[str, float]
+    jacobian: FloatArray
+
+    def get_row(self, name: str, names: tuple[str, ...]) -> FloatArray:
+        """Return the derivative (r,) of a parameter by the unknowns `names`."""
+        row = np.zeros(len(names))
+        if name == make_log_id(AGE, self.fit.problem.parts[-1].structure.log):
+            row[names.index(_get_delay_name(self.fit))] = 1.0
+            return row
+        row[: len(self.fit.point.names)] = self.jacobian[list(self.values).index(name)]
+        return row
+
+
+def _linearise(found: Identification) -> _Linearisation:
+    """Compute the parameters of a fit with their derivatives."""
+    fit, signals = get_likelihood_fit(found)
+    slips = {name: curve.middle_slip for name, curve in found.friction.items()}
+
+    def compute(at: ParameterVector) -> dict[str, float]:
+        return compute_parameters(fit.problem, at, signals, slips)
+
+    slopes = differentiate(compute, fit.point, np.sqrt(np.diag(fit.covariance)))
+    return _Linearisation(fit, compute(fit.point), slopes)
+
+
 def _rank_for_parameter(
-    one: Estimate,
-    fit: LikelihoodFit,
-    signals: Sequence[ShiftSignals],
-    gains: Sequence[_InformationGain],
+    one: Estimate, base: _Linearisation, gains: Sequence[_InformationGain]
 ) -> ExperimentRanking:
     half = np.inf if one.std_total is None else Z95 * one.std_total
-    told = compute_parameters(fit.problem, fit.point, signals)
+    fit, told = base.fit, base.values
     if one.id not in told:
         return ExperimentRanking(one.id, one.verdict, half, (), NO_SCALE)
     systematic = one.std_systematic or 0.0
     if one.std_noise is not None and is_sensor_limited(one.std_noise, systematic):
         return ExperimentRanking(one.id, one.verdict, half, (), explain(Code.SENSOR_LIMITED))
     names = _add_delay(fit).names
-    row = _compute_row(one.id, fit, signals, names)
+    row = base.get_row(one.id, names)
     if not row.any():  # specific to another log
         return ExperimentRanking(one.id, one.verdict, half, ())
     loud = np.sqrt(_compute_noise_power(fit, row))
@@ -242,18 +269,3 @@ def _get_sort_key(prospect: ExpectedPrecision) -> tuple[bool, float]:
     effort."""
     settles = prospect.verdict is Verdict.IDENTIFIED
     return (not settles, prospect.half_width * np.sqrt(prospect.repeats))
-
-
-def _compute_row(
-    name: str, fit: LikelihoodFit, signals: Sequence[ShiftSignals], names: tuple[str, ...]
-) -> FloatArray:
-    """Compute the derivative (r,) of a parameter by the unknowns `names`."""
-    row = np.zeros(len(names))
-    if name == make_log_id(AGE, fit.problem.parts[-1].structure.log):
-        row[names.index(_get_delay_name(fit))] = 1.0
-        return row
-    std = np.sqrt(np.diag(fit.covariance))
-    matrix = compute_jacobian(fit.problem, fit.point, std, signals)
-    place = list(compute_parameters(fit.problem, fit.point, signals)).index(name)
-    row[: len(fit.point.names)] = matrix[place]
-    return row

@@ -31,6 +31,7 @@ from drivetwin.estimation.likelihood.effects.withdrawal import compute_doubt, fi
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.selection.loss_law import check_other_law
 from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
+from drivetwin.estimation.likelihood.uncertainty.card_numbers import rank_card_numbers
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_laws,
     compute_parameters,
@@ -161,6 +162,7 @@ def build_estimates(
         predict_spread(fit, predicted),
         cause,
         own.joint,
+        rank_card_numbers(corrected, ids, matrix),
     )
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 
 import numpy as np
@@ -15,6 +15,7 @@ from drivetwin.estimation.result.cause import Cause
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.joint import JointCovariance
 from drivetwin.estimation.result.spread import PredictedSpread
+from drivetwin.estimation.result.suggestion import CardNumber
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import make_shift_labels
 
@@ -39,6 +40,8 @@ class EstimateSet:
     """Departure from the model that the log shows; likelihood method only."""
     joint: JointCovariance | None = None
     """Total covariance of parameters and friction laws; likelihood method only."""
+    numbers: Mapping[str, CardNumber] = field(default_factory=dict)
+    """Number of the card that would narrow each parameter most; likelihood method only."""
 
 
 def _check_excitation(signals: ShiftSignals) -> Finding | None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from drivetwin.estimation.result.estimate import Verdict
@@ -13,6 +13,38 @@ NARROWER = 0.9
 
 
 NONE_HELPS = "none of the known experiments narrows it by a tenth or more"
+
+
+class CardNumberKind(StrEnum):
+    """Kinds of numbers that a vehicle card can state."""
+
+    PARAMETER = "parameter"
+    EFFECT = "effect"
+    SENSOR = "sensor error"
+
+
+@dataclass(frozen=True)
+class CardNumber:
+    """Number of a vehicle card that would narrow the interval of a parameter if it were exact.
+
+    `name` is a parameter id, the key of an effect, or `<role> gain`, `offset` or `age` of a sensor;
+    `subject` is the element or gear that has the effect. `share` is the width of the interval then
+    over the present width.
+    """
+
+    kind: CardNumberKind
+    name: str
+    subject: str = ""
+    share: float = 1.0
+
+    def set_share(self, share: float) -> CardNumber:
+        """Return the number with its gain."""
+        return replace(self, share=share)
+
+    @property
+    def text(self) -> str:
+        """The number as a phrase."""
+        return f"{self.name} ({self.subject})" if self.subject else self.name
 
 
 @dataclass(frozen=True)
@@ -35,7 +67,8 @@ class ExperimentRanking:
     """Experiments for one parameter, in order of worth, helpful or not.
 
     `half_width` is that of the present 95 % interval (noise and sensors), infinite without one.
-    `limit` names what no experiment mends; empty where there is no such thing.
+    `limit` is the reason why no experiment helps; empty without one. `number` is the number of the
+    card that narrows the parameter most.
     """
 
     parameter: str
@@ -43,6 +76,13 @@ class ExperimentRanking:
     half_width: float
     prospects: tuple[ExpectedPrecision, ...]
     limit: str = ""
+    number: CardNumber | None = None
+
+    @property
+    def best_number(self) -> CardNumber | None:
+        """Number of the card, if it narrows the interval to `NARROWER` or less."""
+        one = self.number
+        return one if one is not None and one.share <= NARROWER else None
 
     @property
     def best(self) -> ExpectedPrecision | None:

@@ -83,6 +83,8 @@ def _build_suggestion_tables(
     for one in suggestions:
         display = get_display_unit(found.estimates[one.parameter].unit)
         then = None if one.best is None else one.best.half_width
+        number = one.best_number
+        known = None if number is None else number.share * one.half_width
         rows.append(
             (
                 Cell(get_parameter_label(one.parameter)),
@@ -90,6 +92,8 @@ def _build_suggestion_tables(
                 Cell(_format_half_width(one.half_width, display), number=True),
                 Cell(one.text),
                 Cell("–" if then is None else _format_half_width(then, display), number=True),
+                Cell("–" if number is None else number.text),
+                Cell("–" if known is None else _format_half_width(known, display), number=True),
             )
         )
     head = (
@@ -97,10 +101,13 @@ def _build_suggestion_tables(
         Cell("now", number=True, note="± 95 %"),
         Cell("experiment that would narrow it"),
         Cell("then", number=True, note="± 95 %, to expect"),
+        Cell("number that would narrow it if exact on the card"),
+        Cell("then", number=True, note="± 95 %, to expect"),
     )
     yield TableBlock(
         "Next recordings: each experiment was simulated with this model and the noise of this "
-        "log's sensors, and the information it adds gives the interval to expect.",
+        "log's sensors, and the information it adds gives the interval to expect. A number on the "
+        "card that is known exactly takes its share of the variance away.",
         head,
         rows,
     )
