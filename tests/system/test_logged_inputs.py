@@ -175,8 +175,13 @@ def test_modelica(name: str, as_logged: bool, tmp_path: Path) -> None:
         model, subject.start, whole.time, whole.inputs, InputKind.LINEAR, subject.delays
     )
     first = int(np.argmax(span))
-    speeds = (core.engine_speed, core.output_speed, core.wheel_speed, core.twist)
-    start = State(*(float(one[first]) for one in speeds), subject.start.locked)
+    start = State(
+        engine_speed=float(core.engine_speed[first]),
+        output_speed=float(core.output_speed[first]),
+        wheel_speed=float(core.wheel_speed[first]),
+        twist=float(core.twist[first]),
+        locked=subject.start.locked,
+    )
     part = Experiment(whole.name, whole.time[span], whole.inputs[span], whole.step)
     path = tmp_path / "shift.mo"
     write_modelica(replace(subject, start=start), part, path)
