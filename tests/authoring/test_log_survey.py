@@ -95,7 +95,7 @@ def test_products_follow_from_the_ratios_of_the_elements(
     unknown = draft(made.log, CardOptions({"--elements": "X,Y"})).estimates
     assert not unknown.products
     text = format_card(draft(made.log).answers, estimates=draft(made.log).estimates)
-    assert "with μ 0.10 the gain would be" in text
+    assert "with μ 0.12 the gain would be" in text
 
 
 def test_a_complete_card_of_a_log_and_options_is_read(made: Synthetic, tmp_path: Path) -> None:

@@ -139,7 +139,7 @@ def test_a_ratio_over_i_c_is_no_better_known_than_the_ratio() -> None:
 def test_a_measured_number_keeps_a_tenth_of_its_standard_deviation(
     value: float, std: float
 ) -> None:
-    found = StatedNumber.measure(value, std)
+    found = StatedNumber.measure(PriorValue(value, std))
     assert found.std == pytest.approx(std, rel=0.051)
     assert abs(found - value) <= 0.051 * std
     entry = parse_toml(f"x = {found.entry}")["x"]

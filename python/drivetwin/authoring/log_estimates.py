@@ -195,5 +195,5 @@ def estimate_fill_pressures(
         early, at, late = log[role].updates.interpolate(instants) / BAR
         std = max(LEAST_FILL_ERROR, 0.5 * abs(late - early))
         if np.isfinite(at + std) and at > 0.0 and std <= MOST_FILL_ERROR:
-            found[shift.oncoming] = StatedNumber.measure(float(at), std)
+            found[shift.oncoming] = StatedNumber.measure(PriorValue(float(at), std))
     return found

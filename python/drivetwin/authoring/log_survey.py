@@ -23,7 +23,7 @@ from drivetwin.channels.units import find_unit
 from drivetwin.errors import MissingChannelError, TimeError
 from drivetwin.findings import Code
 from drivetwin.logs.open_mapped import open_stated
-from drivetwin.logs.quality.time_alignment import estimate_speed_ratio
+from drivetwin.logs.quality.time_alignment import estimate_final_drive, estimate_speed_ratio
 from drivetwin.logs.raw import Remembered
 from drivetwin.logs.read import Demands, read_recording
 from drivetwin.plausibility.ratios import find_held_ratios
@@ -39,6 +39,9 @@ MOST_LABEL = 40
 """Longest label that a pressure without a known form of name gets from its column."""
 NO_GEAR = PriorValue(1.0)
 """Ratio of a gear that is not there."""
+ONE_SHAFT = 2e-3
+"""Difference of engine over input speed from 1 below which both are one shaft: an error of the
+sensors. No input gear is so near to 1."""
 LEAST_SAMPLES = 20
 """Fewest samples that two speeds are compared at."""
 
@@ -57,7 +60,7 @@ class LogGear:
     @property
     def measured(self) -> StatedNumber:
         """Ratio and its standard deviation, in the digits that it has."""
-        return StatedNumber.measure(self.ratio, self.std)
+        return StatedNumber.measure(PriorValue(self.ratio, self.std))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,16 +70,17 @@ class LogSurvey:
     `log` contains the pressures under the labels of their columns, `specs` how those are read;
     `columns` are all columns of the file.
     `gears` run from low to high. `final_drive` is output over wheel speed, with one standard
-    deviation; None without both speeds. `input_gear` is engine over input speed; None without both,
-    or where they slip. `remark` states why no gears were found.
+    deviation; None without both speeds. `input_gear` is engine over input speed, exactly 1 where
+    both are one shaft; None without both, or where they slip. `remark` states why no gears were
+    found.
     """
 
     log: ShiftLog
     specs: Mapping[str, ChannelSpec]
     columns: tuple[Column, ...]
     gears: tuple[LogGear, ...]
-    final_drive: tuple[float, float] | None
-    input_gear: float | None = None
+    final_drive: PriorValue | None
+    input_gear: PriorValue | None = None
     has_input_slip: bool = False
     remark: str = ""
 
@@ -117,13 +121,11 @@ def survey_log(path: Path, stated: Mapped) -> LogSurvey:
         columns = tuple(recording.columns)
         log = read_recording(recording, path, blank, named, Demands((), (), gearing=False))
     labels = [label for label in specs if make_pressure_role(label) in log]
-    final_drive = None
-    if "output_speed" in log and "wheel_speed" in log:
-        final_drive = estimate_speed_ratio(log["output_speed"], log["wheel_speed"])
+    final_drive = estimate_final_drive(log.channels)
     input_gear, slips = _compare_input_speeds(log)
     found = LogSurvey(log, specs, columns, (), final_drive, input_gear, slips)
     try:
-        speeds = resample_geared(log, 1.0, 1.0 if final_drive is None else final_drive[0])
+        speeds = resample_geared(log, 1.0, 1.0 if final_drive is None else final_drive.value)
     except (MissingChannelError, TimeError) as fault:
         left_out = [one.text for one in log.findings if one.code is Code.CHANNEL_LEFT_OUT]
         return replace(found, remark="; ".join([fault.what, *left_out]))
@@ -131,7 +133,7 @@ def survey_log(path: Path, stated: Mapped) -> LogSurvey:
     return replace(found, gears=gears, remark="" if gears else "the speeds hold no ratio")
 
 
-def _compare_input_speeds(log: ShiftLog) -> tuple[float | None, bool]:
+def _compare_input_speeds(log: ShiftLog) -> tuple[PriorValue | None, bool]:
     """Return engine over input speed, None if unknown, and True where the two slip."""
     if "engine_speed" not in log or "input_speed" not in log:
         return None, False
@@ -145,7 +147,9 @@ def _compare_input_speeds(log: ShiftLog) -> tuple[float | None, bool]:
     low, middle, high = np.quantile(ratios, (0.1, 0.5, 0.9))
     if high - low > PLAUSIBILITY.ratio_tolerance * middle:
         return None, True
-    return float(middle), False
+    if abs(middle - 1.0) < ONE_SHAFT:
+        return NO_GEAR, False
+    return estimate_speed_ratio(log["engine_speed"], log["input_speed"]), False
 
 
 def name_pressures(specs: Mapping[str, ChannelSpec], stated: Mapped) -> tuple[VehicleCard, Mapped]:

@@ -230,7 +230,7 @@ def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
     default = Answer(1.0, Origin.DEFAULT, "no input gear")
     if survey is not None and survey.input_gear is not None:
         note = f"engine over input speed in {survey.name}"
-        default = Answer(round(survey.input_gear, 4), Origin.GUESS, note)
+        default = Answer(StatedNumber.measure(survey.input_gear), Origin.GUESS, note)
     elif survey is not None:
         default = Answer(1.0, Origin.GUESS, f"no input gear; {survey.name} does not show one")
     yield Question(
@@ -240,7 +240,7 @@ def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
     )  # fmt: skip
     final = None
     if survey is not None and survey.final_drive is not None:
-        measured = StatedNumber.measure(*survey.final_drive)
+        measured = StatedNumber.measure(survey.final_drive)
         final = Answer(measured, Origin.GUESS, f"output over wheel speed in {survey.name}")
     yield Question(
         ("final_drive",), "--final-drive RATIO", "Ratio of the final drive",

@@ -39,11 +39,12 @@ class StatedNumber(float):
         return number
 
     @classmethod
-    def measure(cls, value: float, std: float) -> StatedNumber:
+    def measure(cls, measured: PriorValue) -> StatedNumber:
         """Return a measured number, rounded to a tenth of its standard deviation.
 
         Without a standard deviation, as from speeds without noise, all digits are kept.
         """
+        value, std = measured.value, measured.std
         if not std > 0.0:
             return cls.make(repr(float(value)))
         places = min(max(1 - math.floor(math.log10(std)), 0), MOST_DIGITS)
@@ -98,7 +99,7 @@ class StatedNumber(float):
         std = abs(value) * math.hypot(one.std / one.value, other.std / other.value)
         if std == 0.0:
             return StatedNumber.make(repr(value), "0.0")
-        return StatedNumber.measure(value, std)
+        return StatedNumber.measure(PriorValue(value, std))
 
 
 def parse_stated(

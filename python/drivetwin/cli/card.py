@@ -88,6 +88,7 @@ def _compare(
     """Check a card with its log; return the findings, and the error of a log that is unusable."""
     from drivetwin.estimation.data.prepare import prepare_shift
     from drivetwin.estimation.result.ratio_check import compare_ratios
+    from drivetwin.logs.quality.time_alignment import estimate_final_drive
     from drivetwin.logs.read import read_log
     from drivetwin.plausibility.check import check_card, merge_ratios, select_card_findings
     from drivetwin.shifts.detect import detect_shifts
@@ -106,7 +107,8 @@ def _compare(
         if not shifts:
             why = "no shift of the card's gears was found, so torques and friction are unchecked"
             remarks.append(report(Code.CARD_NOT_COMPARED, why=why))
-        refined = compare_ratios([prepare_shift(recording, vehicle, one) for one in shifts])
+        prepared = [prepare_shift(recording, vehicle, one) for one in shifts]
+        refined = compare_ratios(prepared, estimate_final_drive(recording.channels))
     except DrivetwinError as error:
         shifts = ()
         remarks.append(report(Code.CARD_NOT_COMPARED, why=error.what))

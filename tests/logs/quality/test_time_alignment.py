@@ -98,10 +98,27 @@ def test_the_ratio_is_found_whether_or_not_one_speed_is_late(ratio: float, late:
     faster = channel("output_speed", time, output(time))
     found = estimate_speed_ratio(faster, channel("wheel_speed", time + late, output(time) / ratio))
     assert found is not None
-    value, sigma = found
     # The sensors' noise of 0.05 in 16 rad/s over 80 independent means of 10 samples.
-    assert sigma < 3e-4 * ratio
-    assert value == pytest.approx(ratio, abs=4.0 * sigma + 1e-4 * ratio)
+    assert found.std < 3e-4 * ratio
+    assert found.value == pytest.approx(ratio, abs=4.0 * found.std + 1e-4 * ratio)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.02])
+def test_the_twist_of_a_shaft_is_no_error_of_the_ratio(late: float) -> None:
+    time = np.arange(0.0, 8.0, 0.001)
+    torque = 300.0 - 25.0 * time + 60.0 * np.exp(-time) * np.sin(2.0 * np.pi * 9.0 * time)
+    twist, wheel = torque / 1600.0, output(time) / 5.0
+    faster = channel("output_speed", time, 5.0 * wheel + np.gradient(twist, time))
+    slower = channel("wheel_speed", time + late, wheel)
+    measured = Channel("output_torque", Quantity.TORQUE, time, torque, "T", "Nm")
+    found = estimate_speed_ratio(faster, slower, measured)
+    assert found is not None
+    # The sensors' noise, five times that of the wheel, in 16 rad/s over 8000 samples.
+    assert found.std < 2.0 * 5.0 * 0.05 / 16.0 / 8000.0**0.5
+    assert abs(found.value - 5.0) < 3.0 * found.std
+    # The means of the speeds alone have the error of the twist over the angle.
+    off = (twist[-1] - twist[0]) / float(np.trapezoid(wheel, time))
+    assert abs(off) > 4.0 * found.std
 
 
 def test_a_gap_costs_what_it_touches_only() -> None:

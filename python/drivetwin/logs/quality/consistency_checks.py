@@ -11,8 +11,8 @@ from drivetwin.channels.roles import AUXILIARY, get_quantity
 from drivetwin.channels.shiftlog import Channel, find_uncovered_ends
 from drivetwin.errors import PlausibilityError, TimeError, Where
 from drivetwin.findings import Code, Finding, Number, report
-from drivetwin.logs.quality.time_alignment import SIGNIFICANT, estimate_speed_ratio
-from drivetwin.vehicle.spec import Z95, PriorValue
+from drivetwin.logs.quality.time_alignment import SIGNIFICANT, estimate_final_drive
+from drivetwin.vehicle.spec import Z95
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 STARTS_APART = 0.05
@@ -119,20 +119,15 @@ def check_gearing(channels: Mapping[str, Channel], card: VehicleCard, file: str)
 def check_final_drive(channels: Mapping[str, Channel], card: VehicleCard) -> list[Finding]:
     """Return a finding if the ratio of output and wheel speed is not the final drive, beyond what
     the digits on the card can mean."""
-    if "output_speed" not in channels or "wheel_speed" not in channels:
-        return []
-    outlet, wheel = channels["output_speed"], channels["wheel_speed"]
-    final = card.final_drive
-    found = estimate_speed_ratio(outlet, wheel)
+    final, found = card.final_drive, estimate_final_drive(channels)
     if found is None:
         return []
-    usual = FINAL_DRIVE_DRIFT * final.value + SIGNIFICANT * found[1] + Z95 * final.std
-    if abs(found[0] - final.value) < usual:
+    usual = FINAL_DRIVE_DRIFT * final.value + SIGNIFICANT * found.std + Z95 * final.std
+    if abs(found.value - final.value) < usual:
         return []
+    outlet, wheel = channels["output_speed"], channels["wheel_speed"]
     names = {"outlet": outlet.source_name, "wheel": wheel.source_name}
-    ratio, card_value = (
-        Number(one.value, "1", one.half_width) for one in (PriorValue(*found), final)
-    )
+    ratio, card_value = (Number(one.value, "1", one.half_width) for one in (found, final))
     return [report(Code.FINAL_DRIVE_DIFFERS, ratio=ratio, card=card_value, **names)]
 
 

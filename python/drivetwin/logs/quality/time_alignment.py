@@ -16,6 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from drivetwin._util.signal_processing import integrate_trapezoids
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 GRID = 0.01
@@ -26,6 +27,12 @@ SMOOTH = 0.1
 
 _IN_GEAR = 0.01
 """Relative distance from a ratio within which its gear is held."""
+
+_LEAST_BLOCK = 0.01
+"""Shortest means [s] from which a ratio is estimated; short beside a period of a shaft."""
+
+_BATCHES = 20
+"""Parts of a log from whose scatter a standard deviation is estimated [count]."""
 
 _LEAST_TIME = 1.0
 """So much time in gear [s] is needed for a statement."""
@@ -93,23 +100,69 @@ def estimate_speed_delay(faster: Channel, slower: Channel, ratios: Sequence[floa
     return Delay(float(value), float(sigma), float(drift), float(drift_sigma), float(np.ptp(t)))
 
 
-def estimate_speed_ratio(faster: Channel, slower: Channel) -> tuple[float, float] | None:
-    """Ratio of two speeds that are always geared to each other, and its standard deviation.
+def estimate_speed_ratio(
+    faster: Channel, slower: Channel, torque: Channel | None = None
+) -> PriorValue | None:
+    """Ratio of two speeds that are always geared to each other, with its standard deviation.
 
-    Least squares of ω_f = i·ω_s + i·τ·dω_s/dt: a delay τ between the two is no error of the ratio.
+    Least squares over means of blocks, whose noise is independent, of
+    ω_f = i·ω_s + i·τ·dω_s/dt + dφ/dt with dφ/dt = (dT/dt)/k - c·(d²T/dt²)/k²: neither a delay τ
+    between the two nor the twist φ of a shaft between them is an error of the ratio. Without the
+    `torque` T of the shaft its twist is part of the residual and widens the standard deviation.
     None where there is too little time, or no motion.
     """
     start, end = max(faster.time[0], slower.time[0]), min(faster.time[-1], slower.time[-1])
     if not _LEAST_TIME <= end - start <= LONGEST * max(faster.time.size, slower.time.size) * GRID:
         return None
-    time = np.arange(start, end, GRID)
-    fast, slow = smooth_at_times(faster, time), smooth_at_times(slower, time)
-    rate = np.gradient(slow, GRID)
-    known = np.isfinite(rate) & np.isfinite(fast)
-    if np.count_nonzero(known) * GRID < _LEAST_TIME:
+    width = max(_LEAST_BLOCK, 2.0 * max(faster.step, slower.step))
+    edges = np.arange(start, end, width)
+    fast, slow = _compute_block_means(faster, edges), _compute_block_means(slower, edges)
+    known = np.isfinite(fast) & np.isfinite(slow)
+    if np.count_nonzero(known) * width < _LEAST_TIME:
         return None
-    fit = fit_least_squares(np.column_stack([slow[known], rate[known]]), fast[known])
-    return None if fit is None else (float(fit.solution[0]), float(np.sqrt(fit.covariance[0, 0])))
+    rate = np.gradient(uniform_filter1d(slow, max(1, round(SMOOTH / width))), width)
+    columns = [slow, rate]
+    if torque is not None:
+        twist = np.diff(sample_means(torque, edges)) / width
+        columns += [twist, np.gradient(twist, width)]
+    design = np.column_stack(columns)
+    known &= np.isfinite(design).all(axis=1)
+    return _fit_first(design[known], fast[known])
+
+
+def estimate_final_drive(channels: Mapping[str, Channel]) -> PriorValue | None:
+    """Output over wheel speed with its standard deviation; None without both speeds or motion."""
+    if "output_speed" not in channels or "wheel_speed" not in channels:
+        return None
+    torque = channels.get("output_torque")
+    return estimate_speed_ratio(channels["output_speed"], channels["wheel_speed"], torque)
+
+
+def _fit_first(design: FloatArray, target: FloatArray) -> PriorValue | None:
+    """Fit `design` (n, p) to `target` (n,); return the first coefficient.
+
+    Its standard deviation is that of sums over `_BATCHES` parts of the log (sandwich estimate):
+    what a shaft swings back within a part adds nothing. None where a column is none of its own.
+    """
+    scale = np.linalg.norm(design, axis=0)
+    columns = design[:, scale > 0.0] / scale[scale > 0.0]
+    solution, _, rank, _ = np.linalg.lstsq(columns, target, rcond=1e-8)
+    count = min(_BATCHES, target.size // 2)
+    if scale[0] == 0.0 or rank < columns.shape[1] or count <= rank:
+        return None
+    residual = target - columns @ solution
+    weight = np.linalg.pinv(columns)[0] * residual
+    sums = np.array([part.sum() for part in np.array_split(weight, count)])
+    std = float(np.sqrt(np.sum(sums**2) * count / (count - rank)))
+    return PriorValue(float(solution[0] / scale[0]), std / float(scale[0]))
+
+
+def _compute_block_means(channel: Channel, edges: FloatArray) -> FloatArray:
+    """Means (n - 1,) of a channel between `edges` (n,); NaN where a block touches a gap."""
+    total = integrate_trapezoids(channel.values, channel.time)
+    mean = np.diff(np.interp(edges, channel.time, total)) / np.diff(edges)
+    inside = np.isfinite(channel.interpolate(edges))
+    return np.where(inside[1:] & inside[:-1], mean, np.nan)
 
 
 def sample_means(channel: Channel, time: FloatArray) -> FloatArray:

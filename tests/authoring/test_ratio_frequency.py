@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""Frequency with which the intervals of measured ratios contain the truth."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from drivetwin.authoring.log_survey import survey_log
+from drivetwin.channels.mapping import Mapped
+from drivetwin.cli.synth import write_run
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.spec import Z95
+
+LOGS = 200
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("scenario", ["paper_steps", "power_on_down"])
+def test_intervals_of_ratios_contain_the_truth(scenario: str, tmp_path: Path) -> None:
+    inside: dict[str, int] = defaultdict(int)
+    for seed in range(LOGS):
+        made = run(load_scenario(scenario), seed=seed)
+        log, card_file, _ = write_run(tmp_path / f"{seed}.csv", made)
+        card, survey = load_card(card_file), survey_log(log, Mapped({}))
+        found = {"final drive": (survey.final_drive, card.final_drive.value)}
+        for gear, held in zip(card.gears, survey.gears, strict=True):
+            found[gear.name] = (held.measured.to_ratio(), gear.ratio.value)
+        for name, (measured, true) in found.items():
+            assert measured is not None
+            inside[name] += abs(measured.value - true) <= Z95 * measured.std
+        log.unlink()
+    assert {name: 0.90 <= count / LOGS <= 0.99 for name, count in inside.items()} == dict.fromkeys(
+        ("final drive", *(gear.name for gear in card.gears)), True
+    ), dict(inside)
