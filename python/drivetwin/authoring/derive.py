@@ -21,6 +21,7 @@ from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.errors import CardError, Where
 from drivetwin.plausibility.settings import PLAUSIBILITY
 from drivetwin.vehicle.check import RATIO_TOLERANCE
+from drivetwin.vehicle.distribution import describe_wheel_radius
 
 GEOMETRY = frozenset((
     "surfaces", "derating", "area_m2", "radius_m", "outer_mm", "inner_mm", "piston_outer_mm",
@@ -140,14 +141,21 @@ def compute_effective_radius(outer: float, inner: float) -> float:
 
 
 def _derive_vehicle(answers: Answers) -> Iterator[tuple[Key, Answer]]:
-    """J3 of a mass on wheels: m·r², and up to a tenth more for wheels and axles."""
+    """J3 of a mass on wheels: m·r², and up to a tenth more for wheels and axles.
+
+    The radius counts with two standard deviations to either side, as a single mass does.
+    """
     mass, radius = get_value(answers, "vehicle", "mass"), get_value(answers, "vehicle", "radius")
     if mass is None or radius is None:
         return
     low, high = mass
-    note = f"{low:.4g} to {high:.4g} kg times the square of {radius:g} m; wheels add up to 10 %"
+    spread = 2.0 * radius.to_prior(describe_wheel_radius).std
+    note = (
+        f"{low:.4g} to {high:.4g} kg times the square of {radius:g} ± {spread:.2g} m; wheels add "
+        "up to 10 %"
+    )
     limits = (
-        float(f"{low * radius**2:.4g}"),
-        float(f"{WHEELS * high * radius**2:.4g}"),
+        float(f"{low * (radius - spread) ** 2:.4g}"),
+        float(f"{WHEELS * high * (radius + spread) ** 2:.4g}"),
     )
     yield ("inertia", "J_vehicle"), Answer(limits, note=note)

@@ -22,7 +22,6 @@ from drivetwin.authoring.parsing import (
     Parser,
     make_choice_parser,
     make_names_parser,
-    make_number_parser,
     parse_name,
     parse_range,
 )
@@ -42,11 +41,12 @@ from drivetwin.authoring.stated_number import (
 from drivetwin.channels.pressure_roles import get_pressure_element
 from drivetwin.errors import CardError
 from drivetwin.gearbox import list_builtin_gearboxes
+from drivetwin.vehicle.distribution import MASS_STD
 
 INERTIA_MARGIN = 1.25
 """Factor by which a range estimated from a log is widened to both sides."""
-MASS_SPREAD = 1.1
-"""Factor between a single mass and the limits of its range."""
+MASS_SPREAD = 1.0 + 2.0 * MASS_STD
+"""Factor between a single mass and the limits of its range: two standard deviations."""
 LEAST_MASS = 50.0
 """Least mass of a vehicle [kg]."""
 SENSOR_ROLES = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
@@ -277,8 +277,9 @@ def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Q
         if mass is None or mass.value is not None:
             yield Question(
                 ("vehicle", "radius"), "--wheel-radius M (with --mass)", "Radius of the wheels",
-                "Rolling radius of the driven wheels: 0.3 for a car, 0.5 for a truck.",
-                make_number_parser(0.05, 5.0, unit="m"), "m",
+                "Rolling radius of the driven wheels: 0.3 for a car, 0.5 for a truck; one value "
+                "counts ± 4 %, VALUE+-STD twice its standard deviation.",
+                make_stated_parser(0.05, 5.0, unit="m"), "m",
             )  # fmt: skip
         else:
             yield Question(

@@ -25,6 +25,12 @@ FILL_PRESSURE_STD = 0.1 * BAR
 """Standard deviation of a P0 without a stated one [Pa]; engineering estimate."""
 INERTIA_STD = 0.10
 """Standard deviation of an inertia without a stated one [ratio]; engineering estimate."""
+MASS_STD = 0.05
+"""Standard deviation of the mass of a vehicle without a stated range [ratio]; engineering estimate:
+fuel, driver and load."""
+WHEEL_RADIUS_STD = 0.02
+"""Standard deviation of a wheel radius without a stated one [ratio]; engineering estimate: a tread
+of 8 to 15 mm wears, which is 2 to 3 % of the radius."""
 ASSUMED_GAIN_STD = 0.2
 """Standard deviation of a gain that is assumed from a usual μ [ratio]; engineering estimate: μ of a
 paper lining from 0.09 to 0.15, and the error of the product of μ and gain from a log."""
@@ -93,6 +99,11 @@ def describe_inertia(value: float) -> PriorValue:
 def describe_assumed_gain(value: float) -> PriorValue:
     """Return the distribution of an assumed gain [m^3] without a stated standard deviation."""
     return PriorValue(value, ASSUMED_GAIN_STD * value, assumed=True)
+
+
+def describe_wheel_radius(value: float) -> PriorValue:
+    """Return the distribution of a wheel radius [m] without a stated standard deviation."""
+    return PriorValue(value, WHEEL_RADIUS_STD * value)
 
 
 def multiply(*factors: PriorValue) -> PriorValue:
