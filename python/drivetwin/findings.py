@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum, auto
 from functools import cache
 from pathlib import Path
+from string import Formatter
 
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.errors import Where
@@ -211,6 +212,13 @@ def load_catalogue() -> dict[Code, Entry]:
         )
         for code, table in tables.items()
     }
+
+
+def list_fields(code: Code) -> dict[str, str]:
+    """List the names and numbers in the texts of a code, each with its format."""
+    entry = load_catalogue()[code]
+    parsed = Formatter().parse(f"{entry.text} {entry.remedy}")
+    return {name: spec or "" for _, name, spec, _ in parsed if name and name != "subject"}
 
 
 @dataclass(frozen=True)

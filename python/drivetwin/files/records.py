@@ -25,7 +25,7 @@ from drivetwin.estimation.result.suggestion import (
     Experiment,
     ExperimentRanking,
 )
-from drivetwin.findings import Code, Finding, Number, Row, Severity
+from drivetwin.findings import Code, Finding, Number, Row, Severity, list_fields
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
@@ -239,10 +239,17 @@ class FindingRecord(Record):
     text: str
 
     def to_finding(self) -> Finding:
-        """Back to the finding."""
-        numbers = _build_numbers(self.numbers)
+        """Back to the finding; what an older version did not record is named as such."""
+        names, numbers = dict(self.names), _build_numbers(self.numbers)
+        for key, spec in list_fields(self.code).items():
+            if key in names or key in numbers:
+                continue
+            if spec:
+                numbers[key] = Number(math.nan)
+            else:
+                names[key] = "not recorded by the older version"
         rows = tuple(Row(one.names, _build_numbers(one.numbers)) for one in self.rows)
-        return Finding(self.code, self.subject, self.place, numbers, self.names, rows)
+        return Finding(self.code, self.subject, self.place, numbers, names, rows)
 
 
 def _build_numbers(records: Mapping[str, NumberRecord]) -> dict[str, Number]:
