@@ -54,7 +54,7 @@ def test_a_finding_shows_place_subject_numbers_and_remedy() -> None:
     assert one.names == {"side": "larger"}
     assert one.numbers == {"limit": limit}
     assert one.set_subject("other") == one
-    assert report(Code.LOCKUP_UNKNOWN, channel="x").text.endswith("`lockup_engaged`.")
+    assert report(Code.LOCKUP_UNKNOWN, channel="x").text.endswith("'lockup_engaged'.")
 
 
 def test_the_subject_is_not_repeated() -> None:

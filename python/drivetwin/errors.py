@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 PYTHON_WORDS = {
     "--drop-part": "Twin.drop_part()",
-    "in a channel mapping file (--channels)": "in a channel mapping file (argument `mapping`)",
-    "in a channel mapping (--channels)": "in a channel mapping (argument `mapping`)",
+    "in a channel mapping file (--channels)": "in a channel mapping file (argument 'mapping')",
+    "in a channel mapping (--channels)": "in a channel mapping (argument 'mapping')",
     "with --shift, such as --shift 2-3": "by its gears",
-    "`drivetwin identify`": "`drivetwin.identify`",
+    "'drivetwin identify'": "'drivetwin.identify'",
 }
 """Words of the Python interface in place of options and commands of the shell."""
 INTERRUPTED = 130

@@ -120,7 +120,7 @@ def test_missing_roles_are_all_named_with_columns_and_remedy() -> None:
         "log.csv: no column for 'output_torque' nor 'input_speed' among EngTrq, PrsBrk2, PrsBrk3, "
         "SpdOut, SpdWhl\n"
         "  -> name its column in a channel mapping (--channels): channels.output_torque = "
-        '{ source = "..." }; `drivetwin inspect` lists the columns'
+        "{ source = \"...\" }; 'drivetwin inspect' lists the columns"
     )
 
 

@@ -53,7 +53,7 @@ def test_one_gear_is_shown_in_full(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_gearbox_becomes_a_modelica_package(tmp_path: Path) -> None:
     path = tmp_path / "box.mo"
-    assert main(["gearbox", "three-set-3000", "--modelica", str(path)]) == 0
+    assert main(["gearbox", "three-set-3000", "-o", str(path)]) == 0
     text = path.read_text("utf-8")
     assert text.count("Components.IdealPlanetary P") == 3
     assert "Interfaces.Flange_a flange_output;" in text

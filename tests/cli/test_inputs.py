@@ -42,7 +42,7 @@ def test_it_is_refused_before_anything_is_computed(
     both = [str(folder / "no.toml"), str(folder / "log.csv")]
     assert main(["simulate", *both, "-o", both[1]]) == 2
     assert "log.csv: this file is read by the same command" in capsys.readouterr().err
-    assert main(["observe", *both, "--figure", both[0]]) == 2
+    assert main(["observe", *both, "-o", both[0]]) == 2
     assert "no.toml: this file is read by the same command" in capsys.readouterr().err
 
 

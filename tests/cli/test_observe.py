@@ -52,7 +52,7 @@ def test_writes_torques_with_their_deviation(
 def test_json_and_figure(bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     twin, log = map(str, bench.files)
     page = tmp_path / "o.html"
-    assert main(["observe", twin, log, "--by", "simulation", "--figure", str(page), "--json"]) == 0
+    assert main(["observe", twin, log, "--by", "simulation", "-o", str(page), "--json"]) == 0
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
     assert shift["torques"]["output_torque"]["highest"] > 4000.0
     assert "95 % band" in page.read_text(encoding="utf-8")

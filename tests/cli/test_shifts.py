@@ -76,7 +76,7 @@ def test_the_page_shows_shift_quality_by_kind(
 ) -> None:
     page = tmp_path / "shifts.html"
     command = ["shifts", str(bench_files.log), "--vehicle", str(bench_files.card)]
-    assert main([*command, "--html", str(page)]) == 0
+    assert main([*command, "-o", str(page)]) == 0
     assert f"wrote {page}" in "".join(capsys.readouterr().out.split("\n"))
     text = page.read_text()
     assert not re.findall(r'(?:src|href)="https?:', text)

@@ -44,12 +44,12 @@ def test_traces_are_those_of_the_run_beside_the_measurement(bench: Bench, tmp_pa
 def test_a_page_compares_both(bench: Bench, tmp_path: Path) -> None:
     twin, log = map(str, bench.files)
     page = tmp_path / "page.html"
-    assert main(["simulate", twin, log, "--html", str(page)]) == 0
+    assert main(["simulate", twin, log, "-o", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
     assert "Simulation of" in text
     assert "Shift by shift" in text
     assert "measured" in text
-    assert main(["simulate", twin, log, "--html", log]) == 2
+    assert main(["simulate", twin, log, "-o", log]) == 2
 
 
 @pytest.mark.parametrize("command", ["simulate", "observe"])

@@ -111,7 +111,7 @@ def test_all_faults_are_reported_together_with_suggestions() -> None:
     for part in (
         "wheel: inertia = 'heavy' is no finite number",
         "gear: loss: unknown field 'etta'; did you mean 'eta'?",
-        "gear: loss: missing field `eta`",
+        "gear: loss: missing field 'eta'",
         "gear has several ports: name one of a, b",
         "wheel: two elements have this name",
         "start: no node 'axel'; did you mean 'axle'?",

@@ -76,7 +76,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], Start, str]] = {
     "missing field": (
         [{"type": "inertia", "name": "J", "node": "a"}],
         AT_REST,
-        "missing field `inertia`",
+        "missing field 'inertia'",
     ),
     "several impossible values": (
         [inertia("a", -1.0), inertia("b"), clutch("c", "a", "b") | {"peak": 0.5}],

@@ -113,7 +113,7 @@ def test_what_is_called_required_is(kind: str) -> None:
     for field, default in documented(kind, "field").items():
         rest = {key: value for key, value in element.items() if key != field}
         if default == "required":
-            with pytest.raises(InputError, match=f"missing field `{field}`"):
+            with pytest.raises(InputError, match=f"missing field '{field}'"):
                 run(rest)
         else:
             assert run(rest) == "completed"
@@ -137,7 +137,7 @@ def test_the_fields_of_a_group_are_those_of_the_core(kind: str, group: str) -> N
     for field, default in fields.items():
         part = {key: value for key, value in element[group].items() if key != field}
         if default == "required":
-            with pytest.raises(InputError, match=f"missing field `{field}`"):
+            with pytest.raises(InputError, match=f"missing field '{field}'"):
                 run({**element, group: part})
         else:
             assert run({**element, group: part}) == "completed"

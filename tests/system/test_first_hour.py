@@ -79,7 +79,7 @@ def first_hour(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str
         folder, "card", "check", "wagen.toml", "messung.csv"
     )
     run_command(folder, "identify", "messung.csv", "--vehicle", "wagen.toml", "-o", "out")
-    run_command(folder, "simulate", "out", "messung.csv", "--html", "vergleich.html")
+    run_command(folder, "simulate", "out", "messung.csv", "-o", "vergleich.html")
     assert time.process_time() - begun < MOST_CPU
     return folder, truth
 

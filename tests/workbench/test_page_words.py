@@ -19,7 +19,7 @@ ABOVE = ("cli", "fleet", "calibration", "observer", "estimation/multi_log", "est
 ELSEWHERE = ("validation/multi_log.py", "workbench/server.py", "vehicle/effects.py",
              "validation/cross_validation.py", "files/stages_file.py")  # fmt: skip
 """Files whose messages it never shows."""
-COMMAND = re.compile(r"(?<![\w-])--[a-z]|`drivetwin ")
+COMMAND = re.compile(r"(?<![\w-])--[a-z]|'drivetwin ")
 
 
 def _list_messages() -> list[str]:
@@ -67,11 +67,11 @@ def test_there_are_such_messages() -> None:
             "correct it in the step Channels",
         ),
         (
-            "assert it in the channel mapping (`drivetwin inspect LOG --write-mapping "
-            'channels.toml` begins one): time = { unit = "s" } (or "ms", "us", "min")',
+            "assert it in the channel mapping ('drivetwin inspect LOG --write-mapping "
+            "channels.toml' begins one): time = { unit = \"s\" } (or \"ms\", \"us\", \"min\")",
             "state the unit of the time column in the step Channels",
         ),
-        ("check it with `drivetwin inspect`", "check it with the step Channels"),
+        ("check it with 'drivetwin inspect'", "check it with the step Channels"),
         ("one for each gear with --gears", "one for each gear with the names of the gears"),
         ("a-b --names", "a-b --names"),
         ("nothing", "nothing"),
@@ -84,6 +84,6 @@ def test_options_become_words_of_the_page(text: str, shown: str) -> None:
 def test_names_of_columns_cost_time_by_their_length_alone() -> None:
     """A message names columns of the user's file; 80 kB of `map ` took 6 s."""
     begun = time.process_time()
-    for start in ("map ", "assert it in a channel mapping", "`drivetwin a", "choose one in ", "--"):
+    for start in ("map ", "assert it in a channel mapping", "'drivetwin a", "choose one in ", "--"):
         replace_options(start * (80_000 // len(start)))
     assert time.process_time() - begun < 2.0

@@ -155,6 +155,6 @@ def _make_open_error(questions: list[Question]) -> InputError:
     count = "1 entry is" if len(questions) == 1 else f"{len(questions)} entries are"
     return InputError(
         f"{count} of the card open, and there is no terminal for questions:{listed}",
-        "state them by these options, or run the command in a terminal; `--draft` writes a file in "
+        "state them by these options, or run the command in a terminal; '--draft' writes a file in "
         "which open entries are comments",
     )

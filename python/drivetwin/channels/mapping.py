@@ -226,8 +226,8 @@ def _refuse_unknown_elements(
             raise MappingError(
                 f"the mapping has a pressure of {element!r}, which is no element of the vehicle "
                 f"card{suggest_spelling(element, elements)}",
-                f"use the element names of the card: [channels.{table}<element>]; `drivetwin "
-                "inspect LOG --vehicle CARD --write-mapping channels.toml` writes them",
+                f"use the element names of the card: [channels.{table}<element>]; 'drivetwin "
+                "inspect LOG --vehicle CARD --write-mapping channels.toml' writes them",
                 Where(file=file),
             )
 
@@ -253,13 +253,13 @@ def _require_column(
             f"the mapping names {spec.source!r} in {spec.group!r} for {role!r}; the file has it in "
             f"{', '.join(map(repr, groups))}"
         )
-        raise MappingError(what, "correct `group`", where)
+        raise MappingError(what, "correct 'group'", where)
     names = [column.name for column in columns]
     what = (
         f"the mapping names column {spec.source!r} for {role!r}, which the file does not have"
         f"{suggest_spelling(spec.source, names)}"
     )
-    raise MappingError(what, "correct `source`, or rename the column in the file", where)
+    raise MappingError(what, "correct 'source', or rename the column in the file", where)
 
 
 def _refuse_double_use(
@@ -282,5 +282,6 @@ def _refuse_double_use(
 def _suggest_remedy(role: str) -> str:
     return (
         f"name its column in a channel mapping (--channels): channels.{role} = "
-        '{ source = "..." }; `drivetwin inspect` lists the columns'
+        '{ source = "..." }; '
+        "'drivetwin inspect' lists the columns"
     )

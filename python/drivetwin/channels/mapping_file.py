@@ -142,7 +142,7 @@ def read_mapping(path: Path) -> Mapped:
         validate_schema(document, MappingFile),
         MappingError,
         str(path),
-        "correct the channel mapping file; `drivetwin inspect --write-mapping` writes a valid one",
+        "correct the channel mapping file; 'drivetwin inspect --write-mapping' writes a valid one",
     )
     file = MappingFile.model_validate(document)
     channels = {role: table.to_spec() for role, table in file.channels.iterate_roles()}
@@ -163,6 +163,6 @@ def _refuse_blank_names(names: Mapping[str, list[str]], path: Path) -> None:
             if not normalise_name(name):
                 raise MappingError(
                     f"names.{role} has {name!r}, which has no letter or digit from a to z",
-                    f"map the column by [channels.{role}] with its `source`",
+                    f"map the column by [channels.{role}] with its 'source'",
                     Where(file=str(path)),
                 )

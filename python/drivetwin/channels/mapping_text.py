@@ -21,7 +21,7 @@ from drivetwin.channels.units import list_first_spellings
 
 _HEAD = (
     "Channel mapping: which column is what to the driveline.",
-    "value = sign * (scale * column + offset), in `unit`;",
+    "value = sign * (scale * column + offset), in 'unit';",
     "time_shift_s is added to the time stamps of the channel.",
 )
 

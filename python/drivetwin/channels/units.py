@@ -173,7 +173,7 @@ def is_unit(spelling: str) -> bool:
     return find_unit(spelling) is not None or refused or is_time_unit(spelling)
 
 
-_BEGIN = "(`drivetwin inspect LOG --write-mapping channels.toml` begins one)"
+_BEGIN = "('drivetwin inspect LOG --write-mapping channels.toml' begins one)"
 
 
 def resolve_channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit:

@@ -38,7 +38,7 @@ def find_twin(source: Path) -> Path:
     if not path.is_file():
         raise ResultFileError(
             f"there is no {TWIN} in {path.parent}",
-            "give the folder that `drivetwin identify LOG --vehicle CARD -o DIR` wrote, or its "
+            "give the folder that 'drivetwin identify LOG --vehicle CARD -o DIR' wrote, or its "
             f"{TWIN}",
             Where(file=str(source)),
         )
@@ -71,7 +71,7 @@ TwinFile = Annotated[
     Path,
     typer.Argument(
         metavar="TWIN",
-        help="Identified model: twin.toml, or the folder of `identify -o`.",
+        help="Identified model: twin.toml, or the folder of 'identify -o'.",
         callback=find_twin,
     ),
 ]
@@ -86,7 +86,7 @@ VehicleFile = Annotated[
     typer.Option(
         "--vehicle",
         metavar="CARD",
-        help="Vehicle card (TOML), as `drivetwin card new` writes it.",
+        help="Vehicle card (TOML), as 'drivetwin card new' writes it.",
         callback=require_card,
     ),
 ]

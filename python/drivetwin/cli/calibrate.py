@@ -31,6 +31,7 @@ from drivetwin.cli.output import (
     show_step,
     to_error_document,
 )
+from drivetwin.cli.outputs import Output, Shape
 from drivetwin.errors import (
     DrivetwinError,
     IdentificationError,
@@ -61,7 +62,9 @@ def calibrate(
         str, typer.Option("--shift", metavar="GEAR-GEAR", help="Shift to calibrate, such as 2-3.")
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the results.")
+        Path,
+        Output(Shape.FOLDER),
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for the results."),
     ],
     limits: Annotated[
         Path | None,

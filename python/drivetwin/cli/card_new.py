@@ -18,6 +18,7 @@ from drivetwin.cli.output import (
     print_paragraph,
     show_step,
 )
+from drivetwin.cli.outputs import Output
 from drivetwin.errors import InputError, Where
 
 if TYPE_CHECKING:
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
 
 def new(
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="CARD.toml", help="File of the new card.")
+        Path,
+        Output(),
+        typer.Option("-o", "--output", metavar="CARD.toml", help="File of the new card."),
     ],
     from_log: Annotated[
         Path | None,
@@ -50,7 +53,7 @@ def new(
     gearbox: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Built-in gearbox (listed by `drivetwin gearbox`), or none."
+            metavar="NAME", help="Built-in gearbox (listed by 'drivetwin gearbox'), or none."
         ),
     ] = None,
     ratios: Annotated[
@@ -113,7 +116,7 @@ def new(
         list[str] | None,
         typer.Option(
             metavar="ROLE=CLASS[:RANGE]",
-            help="Sensor class of a channel role, or of `pressure`; repeatable.",
+            help="Sensor class of a channel role, or of 'pressure'; repeatable.",
         ),
     ] = None,
     as_json: JsonFlag = False,
@@ -240,7 +243,7 @@ def _report(
         for question in open_:
             print_paragraph(f"{question.prompt} ({question.option})")
         print_line(
-            "next: fill them in, or state these options and --force; confirm entries with `guess:`"
+            "next: fill them in, or state these options and --force; confirm entries with 'guess:'"
         )
         return
     print_findings(findings)

@@ -87,4 +87,21 @@ def build_command(name: str, entry: Entry) -> Any:
         return entry
     single = typer.Typer(add_completion=False, **PLAIN)
     single.command(name)(protect_inputs(entry))
-    return typer.main.get_command(single)
+    command = typer.main.get_command(single)
+    for parameter in command.params:
+        vars(parameter)["display_type"] = lambda *_, one=parameter: _describe_type(one)
+    return command
+
+
+_KINDS = {int: "N", float: "NUMBER"}
+"""Words for the values of an option in place of Python types; all others are texts."""
+
+
+def _describe_type(parameter: Any) -> str:
+    """Describe the values of a parameter for help: its choices, or a word in place of a type."""
+    described = parameter.type_descriptor
+    if described.is_choice:
+        return f"<{'|'.join(str(getattr(one, 'value', one)) for one in described.choices)}>"
+    return (
+        "" if parameter.param_type_name == "argument" else _KINDS.get(described.annotation, "TEXT")
+    )

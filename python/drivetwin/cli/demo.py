@@ -16,6 +16,7 @@ from drivetwin.cli.output import (
     print_paragraph,
     print_table,
 )
+from drivetwin.cli.outputs import Output, Shape
 from drivetwin.cli.synth import NoiseOption, ScenarioOption, SeedOption
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
@@ -30,7 +31,9 @@ _METHODS = (DEFAULT_METHOD, Method.PAPER)
 
 def demo(
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for all files.")
+        Path,
+        Output(Shape.FOLDER),
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for all files."),
     ] = Path("drivetwin-demo"),
     scenario: ScenarioOption = ScenarioName.PAPER_STEPS,
     seed: SeedOption = 0,

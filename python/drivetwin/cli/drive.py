@@ -18,6 +18,7 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
+from drivetwin.cli.outputs import Output, Shape
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -53,6 +54,7 @@ def drive(
     ] = None,
     output: Annotated[
         Path | None,
+        Output(Shape.FOLDER),
         typer.Option("-o", "--output", metavar="DIR", help=f"Folder for {FIGURE} and {TRACES}."),
     ] = None,
     as_json: JsonFlag = False,

@@ -22,6 +22,7 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
+from drivetwin.cli.outputs import Output, Shape
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.parameters import get_parameter_spec
 
@@ -71,7 +72,9 @@ def examine(
         ),
     ] = False,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for the files.")
+        Path | None,
+        Output(Shape.FOLDER),
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for the files."),
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:

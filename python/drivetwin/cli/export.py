@@ -11,6 +11,7 @@ import typer
 
 from drivetwin.cli.arguments import ChannelsFile, DropPart, TwinFile, load_plant, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
+from drivetwin.cli.outputs import Output, Shape
 from drivetwin.errors import InputError, Where
 from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.parameters.names import Names
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 _Output = Annotated[
     Path | None,
+    Output(Shape.EITHER),
     typer.Option(
         "-o", "--output", metavar="PATH", help="File, or folder for c; default: ./TWIN.FORM."
     ),
@@ -65,6 +67,7 @@ _Log = Annotated[
 ]
 _Inputs = Annotated[
     Path | None,
+    Output(),
     typer.Option(
         "--inputs",
         metavar="FILE",

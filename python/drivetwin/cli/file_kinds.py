@@ -29,7 +29,7 @@ class FileKind(StrEnum):
     UNKNOWN = "unknown"
 
 
-_MAKE_TWIN = "`drivetwin identify LOG --vehicle CARD -o DIR` writes the twin, DIR/twin.toml"
+_MAKE_TWIN = "'drivetwin identify LOG --vehicle CARD -o DIR' writes the twin, DIR/twin.toml"
 _REMEDIES: dict[FileKind, dict[FileKind, str]] = {
     FileKind.TWIN: {
         FileKind.LOG: f"give the twin first, then the log; {_MAKE_TWIN}",

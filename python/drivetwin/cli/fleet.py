@@ -18,6 +18,7 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
+from drivetwin.cli.outputs import PAGE, Output, Shape
 from drivetwin.errors import INTERRUPTED
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 RUN = "run"
 
 
-StoreFolder = Annotated[Path, typer.Argument(metavar="STORE", help="Folder of `fleet -o`.")]
+StoreFolder = Annotated[Path, typer.Argument(metavar="STORE", help="Folder of 'fleet -o'.")]
 
 
 Logs = Annotated[
@@ -38,12 +39,14 @@ CardOrRules = Annotated[
     Path, typer.Option("--vehicle", metavar="CARD|RULES", help="Vehicle card, or rules (TOML).")
 ]
 StoreOption = Annotated[
-    Path, typer.Option("-o", "--output", metavar="STORE", help="Folder of the store.")
+    Path,
+    Output(Shape.FOLDER),
+    typer.Option("-o", "--output", metavar="STORE", help="Folder of the store."),
 ]
 ListFile = Annotated[
     Path | None,
     typer.Option(
-        "--list", metavar="FILE", help="CSV with a column `path`, or text with one path per line."
+        "--list", metavar="FILE", help="CSV with a column 'path', or text with one path per line."
     ),
 ]
 MethodOption = Annotated[
@@ -144,6 +147,7 @@ def report(
     store: StoreFolder,
     output: Annotated[
         Path | None,
+        Output(endings=PAGE),
         typer.Option(
             "-o",
             "--output",
@@ -270,6 +274,7 @@ def query(
     sql: Annotated[str, typer.Argument(metavar="SQL", help="SELECT over parameters, files, …")],
     output: Annotated[
         Path | None,
+        Output(endings={".csv": "text table", ".parquet": "binary table"}),
         typer.Option(
             "-o", "--output", metavar="FILE", help="Write the answer as .csv or .parquet."
         ),

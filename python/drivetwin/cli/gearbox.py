@@ -17,6 +17,7 @@ from drivetwin.cli.output import (
     print_paragraph,
     print_table,
 )
+from drivetwin.cli.outputs import Output
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -32,10 +33,11 @@ def gearbox(
     gear: Annotated[
         str | None, typer.Option("--gear", metavar="GEAR", help="Show one gear in full.")
     ] = None,
-    modelica: Annotated[
+    output: Annotated[
         Path | None,
+        Output(endings={".mo": "Modelica package"}),
         typer.Option(
-            "--modelica", metavar="FILE.mo", help="Write the gearbox as a Modelica package."
+            "-o", "--output", metavar="FILE.mo", help="Write the gearbox as a Modelica package."
         ),
     ] = None,
     as_json: JsonFlag = False,
@@ -60,8 +62,8 @@ def gearbox(
             print_line("\n".join(names))
         return
     box = load_gearbox(card)
-    if modelica is not None:
-        _write_modelica(box, modelica)
+    if output is not None:
+        _write_modelica(box, output)
     names = (gear,) if gear is not None else tuple(each.name for each in box.gears)
     gears = [solve_gear(box, name) for name in names]
     warnings = describe_ratio_differences(box, {each.gear: each.ratio for each in gears})

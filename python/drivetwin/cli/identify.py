@@ -24,6 +24,7 @@ from drivetwin.cli.output import (
     show_error,
     to_error_document,
 )
+from drivetwin.cli.outputs import Output, Shape
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.status import ModelStatus
@@ -49,6 +50,7 @@ def identify(
     ] = DEFAULT_METHOD,
     output: Annotated[
         Path | None,
+        Output(Shape.FOLDER),
         typer.Option("-o", "--output", metavar="DIR", help="Folder for result, twin and report."),
     ] = None,
     together: Annotated[

@@ -8,29 +8,32 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.atomic import protect_files, refuse_overwrite
+from drivetwin._util.atomic import protect_files
 from drivetwin._util.output_lock import lock_outputs
-
-_OUTPUTS = frozenset(("output", "figure", "html", "inputs", "write_mapping", "modelica"))
-"""Parameters of commands that name what is written; files that all others name are read."""
+from drivetwin.cli.outputs import find_outputs
 
 
 def protect_inputs(command: Callable[..., None]) -> Callable[..., None]:
     """Wrap a command: it raises InputError instead of overwriting a file that it reads.
 
-    It is also refused while another command writes to the same place.
+    Outputs are the parameters with a marker `Output`; files that all others name are read. Outputs
+    are checked before the computation. A command is also refused while another one writes to the
+    same place.
     """
+    outputs = find_outputs(command)
 
     @wraps(command)
     def careful(**given: Any) -> None:
-        read = (value for name, value in given.items() if name not in _OUTPUTS)
+        read = (value for name, value in given.items() if name not in outputs)
         with protect_files(path for value in read for path in _collect_paths(value)):
             written = [
-                path for name in _OUTPUTS & given.keys() for path in _collect_paths(given[name])
+                (path, marker)
+                for name, marker in outputs.items()
+                for path in _collect_paths(given.get(name))
             ]
-            for path in written:
-                refuse_overwrite(path)  # at once, not after the computation
-            with lock_outputs(written):
+            for path, marker in written:
+                marker.check(path)
+            with lock_outputs(path for path, _ in written):
                 command(**given)
 
     return careful

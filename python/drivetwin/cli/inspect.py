@@ -23,6 +23,7 @@ from drivetwin.cli.output import (
     show_step,
     to_error_document,
 )
+from drivetwin.cli.outputs import Output
 from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
 
@@ -46,6 +47,7 @@ def inspect(
     channels: ChannelsFile = None,
     write_mapping: Annotated[
         Path | None,
+        Output(),
         typer.Option(
             metavar="MAP",
             help="Write the channel mapping as a file to edit; open points are comments.",
@@ -62,7 +64,7 @@ def inspect(
 ) -> None:
     """List the columns of a log with unit, rate, range, gaps and proposed role.
 
-    Also list the warnings of `shifts` and `identify`, and their reason if they refuse the log.
+    Also list the warnings of shifts and identify, and their reason if they refuse the log.
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.channels.mapping_text import format_mapping

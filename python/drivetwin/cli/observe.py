@@ -28,6 +28,7 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
+from drivetwin.cli.outputs import LOG_ENDINGS, PAGE, Output, select_outputs
 from drivetwin.errors import DamagedChannelError
 from drivetwin.observer.kind import Observer
 
@@ -52,17 +53,15 @@ def observe(
         ),
     ] = Observer.SMOOTHER,
     output: Annotated[
-        Path | None,
+        list[Path] | None,
+        Output(endings=LOG_ENDINGS | PAGE),
         typer.Option(
             "-o",
             "--output",
             metavar="FILE",
-            help="File for the torques: .csv, .parquet, .mf4 or .mat.",
+            help="File for the torques: .csv, .parquet, .mf4 or .mat; page with the figures: "
+            ".html; repeatable.",
         ),
-    ] = None,
-    figure: Annotated[
-        Path | None,
-        typer.Option("--figure", metavar="FILE.html", help="Page with the figures."),
     ] = None,
     drop_part: DropPart = False,
     as_json: JsonFlag = False,
@@ -82,10 +81,10 @@ def observe(
     found, left_out = _observe_shifts(
         shifts.shifts, lambda shift: estimate_torques(model, recording, shift, by), by
     )
-    if output is not None:
-        _write_observations(output, found)
-    if figure is not None:
-        write_text(figure, render_observations(found, recording))
+    for table in select_outputs(output, *LOG_ENDINGS):
+        _write_observations(table, found)
+    for page in select_outputs(output, *PAGE):
+        write_text(page, render_observations(found, recording))
     if as_json:
         shown = [_to_document(one) for one in found]
         print_json({"observer": by, "shifts": shown, "left_out": left_out})
@@ -96,9 +95,8 @@ def observe(
             print_paragraph(text)
     for name, reason in left_out.items():
         print_paragraph(f"shift {name} is left out: {reason}")
-    for file in (output, figure):
-        if file is not None:
-            print_line(f"wrote {file}")
+    for file in output or ():
+        print_line(f"wrote {file}")
 
 
 def _observe_shifts(

@@ -11,6 +11,7 @@ import typer
 
 from drivetwin.cli.arguments import REPORT, RESULT, ChannelsFile, find_twin, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_verdict, show_step
+from drivetwin.cli.outputs import PAGE, Output
 from drivetwin.errors import InputError, ResultFileError, Where
 
 if TYPE_CHECKING:
@@ -22,11 +23,12 @@ def report(
     sources: Annotated[
         list[Path],
         typer.Argument(
-            metavar="SOURCE...", help="Folders of `identify -o`, result.json, twin.toml, or logs."
+            metavar="SOURCE...", help="Folders of 'identify -o', result.json, twin.toml, or logs."
         ),
     ],
     output: Annotated[
         Path,
+        Output(endings=PAGE),
         typer.Option("-o", "--output", metavar="FILE.html", help="Page with the comparison."),
     ] = Path("comparison.html"),
     channels: ChannelsFile = None,
@@ -42,7 +44,7 @@ def report(
     if not made:
         raise InputError(
             "this is no result of an identification",
-            "name a folder that `drivetwin identify -o` wrote, its result.json or its twin.toml",
+            "name a folder that 'drivetwin identify -o' wrote, its result.json or its twin.toml",
             Where(file=str(sources[0])),
         )
     if len(sources) == 1:
@@ -77,7 +79,7 @@ def _print_page_name(source: Path, *, as_json: bool) -> None:
     if not page.is_file():
         raise ResultFileError(
             f"{REPORT} is not in the folder of {result.name}",
-            "write all three files again with `drivetwin identify LOG --vehicle CARD -o DIR`",
+            "write all three files again with 'drivetwin identify LOG --vehicle CARD -o DIR'",
             Where(file=str(page)),
         )
     verdict = explain_result(content)

@@ -21,6 +21,7 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
+from drivetwin.cli.outputs import PAGE, Output
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -38,10 +39,12 @@ def shifts(
     log: LogFile,
     vehicle: VehicleFile,
     channels: ChannelsFile = None,
-    html: Annotated[
+    output: Annotated[
         Path | None,
+        Output(endings=PAGE),
         typer.Option(
-            "--html",
+            "-o",
+            "--output",
             metavar="FILE.html",
             help="Page with shift quality by kind of shift.",
         ),
@@ -63,8 +66,8 @@ def shifts(
         found = detect_shifts(recording, card)
     closings = detect_lock_ups(recording, card)
     seen = _estimate_from_speeds(recording, card, found.shifts)
-    if html is not None and found.shifts:
-        _write_page(html, found.shifts, log.name)
+    if output is not None and found.shifts:
+        _write_page(output, found.shifts, log.name)
     if as_json:
         remarks = {"findings": dump_findings(recording.findings)}
         print_json(_to_document(found, closings, seen) | remarks)
@@ -76,8 +79,8 @@ def shifts(
         print_paragraph(f"no gear shift; gear held: {held or 'none'}")
     _print_details(found, closings, seen)
     print_findings(recording.findings)
-    if html is not None and found.shifts:
-        print_line(f"wrote {html}")
+    if output is not None and found.shifts:
+        print_line(f"wrote {output}")
 
 
 def _write_page(path: Path, shifts: Sequence[Shift], log: str) -> None:

@@ -24,6 +24,7 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
+from drivetwin.cli.outputs import PAGE, Output, select_outputs
 from drivetwin.export.input_kind import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
@@ -37,18 +38,14 @@ def simulate(
     vehicle: OptionalVehicleFile = None,
     channels: ChannelsFile = None,
     output: Annotated[
-        Path | None,
+        list[Path] | None,
+        Output(endings={".csv": "table"} | PAGE),
         typer.Option(
             "-o",
             "--output",
-            metavar="FILE.csv",
-            help="Table of measured and simulated signals, side by side (SI).",
-        ),
-    ] = None,
-    html: Annotated[
-        Path | None,
-        typer.Option(
-            "--html", metavar="FILE.html", help="Page with plots of measured and simulated signals."
+            metavar="FILE",
+            help="Measured and simulated signals: .csv as a table side by side (SI), .html as a "
+            "page with plots; repeatable.",
         ),
     ] = None,
     step_size: Annotated[
@@ -117,11 +114,11 @@ def simulate(
         if step_size is not None or input_kind is InputKind.HOLD:
             stepping = Stepping(DEFAULT_STEP if step_size is None else step_size, input_kind)
             runs = [rerun_fixed_step(run, model, recording, stepping) for run in runs]
-    if output is not None:
-        write_text(output, format_signals(runs, recording))
-    if html is not None:
-        with show_step(f"writing {html.name}"):
-            _write_page(html, model, runs, log.name)
+    for table in select_outputs(output, ".csv"):
+        write_text(table, format_signals(runs, recording))
+    for page in select_outputs(output, *PAGE):
+        with show_step(f"writing {page.name}"):
+            _write_page(page, model, runs, log.name)
     if as_json:
         print_json({"shifts": [_to_document(run) for run in runs]})
         return
@@ -132,9 +129,8 @@ def simulate(
             )
         )
         print_findings(run.findings)
-    for file in (output, html):
-        if file is not None:
-            print_line(f"wrote {file}")
+    for file in output or ():
+        print_line(f"wrote {file}")
 
 
 def _write_page(path: Path, twin: Twin, runs: Sequence[Validation], log: str) -> None:

@@ -10,6 +10,7 @@ import typer
 
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import JsonFlag, print_json, print_line, show_step
+from drivetwin.cli.outputs import LOG_ENDINGS, Output
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.vehicle.effects import EffectId
 
@@ -38,6 +39,7 @@ NoiseOption = Annotated[
 def synth(
     output: Annotated[
         Path,
+        Output(endings=LOG_ENDINGS),
         typer.Option(
             "-o",
             "--output",

@@ -230,7 +230,7 @@ def _estimate_torqueless_log(log: PreparedLog, method: Method) -> tuple[Estimate
         raise IdentificationError(
             "the log has no output torque: inertias, load, shaft and friction share one unknown "
             f"scale without it, which the {method} method cannot leave open",
-            "map an output-shaft torque sensor as `output_torque`, or use the likelihood method",
+            "map an output-shaft torque sensor as 'output_torque', or use the likelihood method",
             Where(file=log.source),
         )
     from drivetwin.estimation.likelihood.pipeline import estimate_without_linear

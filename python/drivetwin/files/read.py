@@ -15,7 +15,7 @@ from drivetwin.files.records import Record
 
 R = TypeVar("R", bound=Record)
 
-_AGAIN = "write it again with `drivetwin identify`"
+_AGAIN = "write it again with 'drivetwin identify'"
 
 
 def read_record(path: Path | str, parse: Callable[[str], Any], schema: str, model: type[R]) -> R:
@@ -24,7 +24,7 @@ def read_record(path: Path | str, parse: Callable[[str], Any], schema: str, mode
     Raises ResultFileError where the file is missing, damaged or of a newer schema.
     """
     where = Where(file=str(path))
-    remedy = "check the path, or write it with `drivetwin identify`"
+    remedy = "check the path, or write it with 'drivetwin identify'"
     measure_regular_file(Path(path), ResultFileError, remedy, LARGEST_RECORD)
     try:
         tree = parse(Path(path).read_text(encoding="utf-8"))

@@ -38,7 +38,7 @@ from drivetwin.vehicle.spec import ElementKind
 TWIN_SCHEMA = "drivetwin/twin-2"
 _HEADER = (
     "An identified driveline model; written by drivetwin. All values in SI units:",
-    "rad, s, N*m, kg*m^2, Pa. A parameter without `value` could not be determined from the log.",
+    "rad, s, N*m, kg*m^2, Pa. A parameter without 'value' could not be determined from the log.",
 )
 
 
@@ -180,7 +180,7 @@ def read_twin_file(path: Path | str) -> TwinFile:
         find_twin_faults(content),
         ResultFileError,
         str(path),
-        "correct these entries, or write the file again with `drivetwin identify`",
+        "correct these entries, or write the file again with 'drivetwin identify'",
     )
     return content
 

@@ -248,6 +248,6 @@ def _make_quarantine_outcome(tries: int, reason: str) -> Outcome:
         State.QUARANTINED,
         error="WorkerLost",
         what=f"its worker was lost {tries} times; the last one {reason}",
-        remedy="try `drivetwin identify` on the log; run again with --retry if the machine was "
+        remedy="try 'drivetwin identify' on the log; run again with --retry if the machine was "
         "to blame",
     )

@@ -122,7 +122,7 @@ class GuardedWorker:
                 break
             sleep(pause)
         return Aborted(
-            f"no worker starts: it {why}", "see whether `drivetwin identify` runs on this machine"
+            f"no worker starts: it {why}", "see whether 'drivetwin identify' runs on this machine"
         )
 
     def _spawn(self) -> None:
@@ -197,7 +197,7 @@ def make_timeout_outcome(limits: Limits) -> Outcome:
         State.QUARANTINED,
         error="TimeLimit",
         what=f"it was not done after {limits.seconds:g} s",
-        remedy="look at the log with `drivetwin inspect`; "
+        remedy="look at the log with 'drivetwin inspect'; "
         "run again with --retry and a larger --time-limit if it is only long",
     )
 

@@ -98,7 +98,7 @@ def check_footer(path: Path) -> None:
 def _make_damage_error(fault: Exception, path: Path) -> StoreError:
     return StoreError(
         f"a part cannot be read: {str(fault).splitlines()[0]}",
-        "remove the file and run `drivetwin fleet` again: its logs are then done anew",
+        "remove the file and run 'drivetwin fleet' again: its logs are then done anew",
         Where(file=str(path)),
     )
 

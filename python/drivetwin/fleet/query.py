@@ -54,7 +54,7 @@ def query_store(store: Store, sql: str) -> Answer:
         except duckdb.Error as fault:
             raise QueryError(
                 f"the database does not take this: {fault}",
-                "try `SELECT * FROM parameters LIMIT 5`; docs/howto/fleet.md lists the tables",
+                "try 'SELECT * FROM parameters LIMIT 5'; docs/howto/fleet.md lists the tables",
             ) from None
 
 
@@ -72,7 +72,7 @@ def _refuse_changes(duckdb: Any, sql: str) -> None:
         if statement.type not in (duckdb.StatementType.SELECT, duckdb.StatementType.EXPLAIN):
             raise QueryError(
                 f"a query may only read: this is {statement.type.name}",
-                "ask with SELECT; `-o FILE` writes the answer",
+                "ask with SELECT; '-o FILE' writes the answer",
             )
 
 

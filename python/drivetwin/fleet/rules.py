@@ -114,7 +114,7 @@ class RulesFile(StrictModel):
         if found is None:
             raise RulesError(
                 f"the path does not hold a unit's id as {self.unit!r} finds it",
-                "correct `unit` in the rules, or rename the file",
+                "correct 'unit' in the rules, or rename the file",
             )
         return str(found[1])
 

@@ -108,6 +108,6 @@ def _read_list(path: Path) -> Iterator[Source]:
     except (OSError, UnicodeDecodeError, csv.Error) as fault:
         raise InputError(
             f"the list cannot be read: {fault}",
-            "give a CSV table with a column `path`, or one path a line, in UTF-8",
+            "give a CSV table with a column 'path', or one path a line, in UTF-8",
             Where(file=str(path)),
         ) from None

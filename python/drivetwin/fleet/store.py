@@ -37,7 +37,7 @@ class Store:
             self._acquire_lock()
         elif not (folder / INDEX).is_file():
             raise StoreError(
-                "this is no store of a fleet", "make one with `drivetwin fleet LOGS -o STORE`",
+                "this is no store of a fleet", "make one with 'drivetwin fleet LOGS -o STORE'",
                 Where(file=str(folder)),
             )  # fmt: skip
         try:
@@ -85,7 +85,7 @@ class Store:
         except sqlite3.Error as fault:
             if "locked" in str(fault):
                 raise StoreError(
-                    "another `drivetwin fleet` is writing this store",
+                    "another 'drivetwin fleet' is writing this store",
                     "wait until it is through, or give another -o",
                     place,
                 ) from None

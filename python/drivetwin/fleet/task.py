@@ -167,6 +167,6 @@ def make_memory_outcome(memory: int) -> Outcome:
         State.QUARANTINED,
         error="MemoryLimit",
         what=f"it needed more than {memory / 2**20:g} MiB of memory",
-        remedy="look at the log with `drivetwin inspect`; "
+        remedy="look at the log with 'drivetwin inspect'; "
         "run again with --retry and a larger --memory-limit if it is only long",
     )

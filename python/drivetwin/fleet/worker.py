@@ -83,7 +83,7 @@ def _make_error_outcome(error: DrivetwinError) -> Outcome:
 
 
 def _make_crash_outcome(fault: Exception) -> Outcome:
-    remedy = "try `drivetwin identify` on the log; please report what it shows"
+    remedy = "try 'drivetwin identify' on the log; please report what it shows"
     return Outcome(State.BAD, error=type(fault).__name__, what=str(fault), remedy=remedy)
 
 

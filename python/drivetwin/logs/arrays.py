@@ -105,7 +105,7 @@ def _list_channels(data: Any, units: Mapping[str, str], name: str) -> Iterable[R
     if not times and not hasattr(data, "index"):
         raise FileFormatError(
             f"none of the {len(columns)} columns is a time by its name",
-            "name the column of the time stamps [s] `time`",
+            "name the column of the time stamps [s] 'time'",
             Where(file=name),
         )
     stamps = data[times[0]] if times else data.index

@@ -207,6 +207,6 @@ def _describe_open_roles(
     if card is None:
         notes.append(
             "pressures are recognised by the elements of a vehicle card: give --vehicle CARD; "
-            "`drivetwin card new -o CARD.toml --from LOG` writes one"
+            "'drivetwin card new -o CARD.toml --from LOG' writes one"
         )
     return notes

@@ -78,7 +78,7 @@ class ModelRun:
         known = {_format_name(one): one for one in self.network.columns}
         hint = suggest_spelling(_format_name(output), known)
         raise InputError(
-            f"{_format_name(output)!r} is not recorded{hint}", "name it in `record` of the run"
+            f"{_format_name(output)!r} is not recorded{hint}", "name it in 'record' of the run"
         )
 
     def balance_energy(self) -> dict[str, ElementBalance]:

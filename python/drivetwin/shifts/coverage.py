@@ -155,7 +155,7 @@ def _make_gap_error(log: ShiftLog, gap: _Gap, where: str) -> DamagedChannelError
         again = (
             "keep the lock-up clutch open, or closed, from a second before the shift to a second "
             "after it; where it was open at the same speeds on both sides, map its flag as "
-            "`lockup_engaged`"
+            "'lockup_engaged'"
         )
     return DamagedChannelError(
         f"{gap}, {where}",

@@ -193,6 +193,6 @@ def refuse_without_shifts(log: ShiftLog, found: FoundShifts) -> None:
     raise NoShiftError(
         f"no usable gear shift; {reasons}" if reasons else "no gear shift: one gear throughout",
         "record from a second before the torque phase to a second after lock-up; "
-        "check the ratios on the card and the speed channels with `drivetwin inspect`",
+        "check the ratios on the card and the speed channels with 'drivetwin inspect'",
         Where(file=log.source),
     )

@@ -160,7 +160,7 @@ def require_locked_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> 
             f"and gearbox input differ by {100.0 * slip:.1f} %",
             "state the map of the converter as [converter] on the card, or record the shift with "
             "the lock-up clutch closed; phases and speeds of this one are told by "
-            "`drivetwin shifts`",
+            "'drivetwin shifts'",
             Where(file=log.source, time=shift.before[1]),
         )
 

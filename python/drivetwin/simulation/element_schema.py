@@ -112,7 +112,7 @@ def find_element_faults(elements: Sequence[Mapping[str, Any]]) -> list[str]:
             continue
         name = element.get("name")
         if not isinstance(name, str) or not name:
-            faults.append(f"element {place}: missing field `name`, a text")
+            faults.append(f"element {place}: missing field 'name', a text")
             name = f"element {place}"
         elif name in names:
             faults.append(f"{name}: two elements have this name")
@@ -160,7 +160,7 @@ def _find_faults(given: Mapping[str, Any], fields: Mapping[str, Field]) -> Itera
     for key, one in fields.items():
         if key not in given or (given[key] is None and not one.required):
             if one.required:
-                yield f"missing field `{key}`"
+                yield f"missing field '{key}'"
         elif one.kind is FieldKind.GROUP:
             yield from (f"{key}: {fault}" for fault in _find_group_faults(given[key], one))
         elif not _matches(given[key], one.kind):

@@ -44,7 +44,7 @@ class Source:
             raise InputError(
                 f"no shift {min(unknown)} to hold out: the log has "
                 f"{len(self.shifts.shifts)} usable",
-                "count from 1 as `drivetwin shifts` lists them",
+                "count from 1 as 'drivetwin shifts' lists them",
                 Where(file=self.log.source),
             )
         if not self.held:

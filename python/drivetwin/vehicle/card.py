@@ -46,7 +46,7 @@ def load_card(path: Path | str) -> VehicleCard:
         check_card(document),
         CardError,
         str(path),
-        "correct these keys of the vehicle card; in a draft, fill in the lines `# KEY = ...` and "
+        "correct these keys of the vehicle card; in a draft, fill in the lines '# KEY = ...' and "
         "remove their leading #",
     )
     file = CardFile.model_validate(document)

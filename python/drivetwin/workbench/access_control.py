@@ -152,7 +152,7 @@ def _admit(access: Access, browsers: _Browsers) -> Response | None:
     if has_key and _digest(request.cookies.get(name, "")) in browsers.cookies:
         return None
     return make_refusal(
-        403, "no access without the link -> open the link that `drivetwin app` printed when started"
+        403, "no access without the link -> open the link that 'drivetwin app' printed when started"
     )
 
 

@@ -55,7 +55,7 @@ _PHRASES = (
         r"assert it in the channel mapping[^:]*: channels\.\S+ = \{[^}]*\}",
         "correct it in the step Channels",
     ),
-    (r" \(`drivetwin inspect LOG --write-mapping[^`]*` begins one\)", ""),
+    (r" \('drivetwin inspect LOG --write-mapping[^']*' begins one\)", ""),
     (r" \(examine --friction free\)", ""),
     (
         "use --drop-part to leave that out",
@@ -69,7 +69,7 @@ _PHRASES = (
 )
 """Whole phrases that speak of options, with their replacement."""
 _OPTION = re.compile("|".join(rf"{one}(?![\w-])" for one in sorted(_FIELDS, key=len, reverse=True)))
-_COMMAND = re.compile(r"`drivetwin (?P<name>[a-z]+)[^`]*`")
+_COMMAND = re.compile(r"'drivetwin (?P<name>[a-z]+)[^']*'")
 
 
 def replace_options(text: str) -> str:

@@ -27,7 +27,7 @@ def require_compatible(logs: Sequence[ShiftLog]) -> None:
         raise InputError(
             f"{', '.join(without)} without an output torque among logs that have one: the former "
             "determine torques over η only, the latter torques themselves",
-            "map the sensor as `output_torque`, or identify the two kinds apart",
+            "map the sensor as 'output_torque', or identify the two kinds apart",
             Where(file=without[0]),
         )
 

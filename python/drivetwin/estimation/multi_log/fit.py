@@ -125,7 +125,7 @@ def _identify_single(log: PreparedLog) -> Identification:
     if found.method is not Method.LIKELIHOOD:
         raise IdentificationError(
             f"the likelihood does not explain this log by itself: {found.evidence.gave_up}",
-            "leave it out, or look at what `drivetwin identify` says of it alone",
+            "leave it out, or look at what 'drivetwin identify' says of it alone",
             Where(file=log.source),
         )
     return found

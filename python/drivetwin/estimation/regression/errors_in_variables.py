@@ -146,7 +146,7 @@ class BandedCholesky:
 def _build_weight_error() -> IdentificationError:
     return IdentificationError(
         "the noise of the channels gives the equations no finite weights",
-        "look at the channels with `drivetwin inspect`: one is damaged, or in another unit",
+        "look at the channels with 'drivetwin inspect': one is damaged, or in another unit",
     )
 
 

@@ -76,7 +76,7 @@ def _read_rows(reader: csv.DictReader[str], source: str) -> list[_Row]:
     if tuple(reader.fieldnames or ()) != _COLUMNS:
         raise FileFormatError(
             f"the columns are not {','.join(_COLUMNS)}",
-            "hand in a file as `drivetwin export` writes it",
+            "hand in a file as 'drivetwin export' writes it",
             Where(file=source),
         )
     for row in rows:

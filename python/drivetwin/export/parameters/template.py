@@ -194,7 +194,7 @@ def _convert_axis(own: Curve, form: AxisForm) -> tuple[Axis, FloatArray]:
     if form.beyond == "refuse" and outside:
         raise InputError(
             f"points {points[0]:g} to {points[-1]:g} exceed the known range {low:g} to {high:g} "
-            f'{unit}; `beyond = "hold"` keeps the last value',
+            f'{unit}; beyond = "hold" keeps the last value',
             "",
         )
     return Axis(name, tuple(points.tolist()), unit), np.interp(points * size, known, own.values)
@@ -204,7 +204,7 @@ def _get_size(unit: str | None, in_si: float | None, si: str) -> float:
     """Return one `unit` in SI. Raises InputError where it does not measure what `si` measures."""
     if in_si is not None:
         if unit is None:
-            raise InputError("`in_si` states the size of a unit, and none is named", "")
+            raise InputError("'in_si' states the size of a unit, and none is named", "")
         return in_si
     if unit is None or is_same_unit(parse_tool_unit(unit), si):
         return 1.0
@@ -214,7 +214,7 @@ def _get_size(unit: str | None, in_si: float | None, si: str) -> float:
     if found is not None and found.quantity is quantity and found.offset == 0.0:
         return found.factor
     usual = "" if quantity is None else f", such as {', '.join(list_first_spellings(quantity))}"
-    raise InputError(f"unit {unit!r} is no known unit of {si}{usual}; `in_si` states its size", "")
+    raise InputError(f"unit {unit!r} is no known unit of {si}{usual}; 'in_si' states its size", "")
 
 
 def _restore_scalar(entry: Scalar, form: EntryForm, before: Scalar | None, name: str) -> Scalar:

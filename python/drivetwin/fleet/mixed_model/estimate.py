@@ -53,7 +53,7 @@ _ALIKE = 0.98
 _ROUNDS = 5
 _MIXED = (
     "logs identified with {} different settings are taken together (card, channel mapping, method "
-    "or version of the program; the tables `logs` and `settings` contain both)"
+    "or version of the program; the tables 'logs' and 'settings' contain both)"
 )
 
 

@@ -14,7 +14,7 @@ from drivetwin.report.sections.blocks import Block, Cell, Section, TableBlock, m
 
 MOST_ROWS = 200
 """Rows of a table; the store holds them all."""
-_MAKE_THEM = " `drivetwin fleet … --reports` writes a report of each, which is linked here then."
+_MAKE_THEM = " 'drivetwin fleet … --reports' writes a report of each, which is linked here then."
 
 
 def build_single_logs_section(store: Store, folder: Path) -> Section:

@@ -30,7 +30,7 @@ _BARE = re.compile(
 )
 """A line without a time stamp."""
 
-_RECORD = "record the bus with `candump -L`"
+_RECORD = "record the bus with 'candump -L'"
 _BACKWARD, _ENOUGH = 0.1, 100
 """Share of steps back in time, of so many frames at least, from which stamps are of no clock."""
 

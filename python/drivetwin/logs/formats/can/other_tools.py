@@ -9,8 +9,8 @@ from pathlib import Path
 
 from drivetwin.errors import FileFormatError, Where
 
-_TO_ASC = "export it as ASC, BLF, MDF 4, a PEAK trace or `candump -L` text"
-_BY_PYTHON_CAN = "convert it: `python -m can.logconvert LOG log.blf` of python-can"
+_TO_ASC = "export it as ASC, BLF, MDF 4, a PEAK trace or 'candump -L' text"
+_BY_PYTHON_CAN = "convert it: 'python -m can.logconvert LOG log.blf' of python-can"
 _BY_SAVVYCAN = "open it in SavvyCAN and save it as GVRET log, Vector ASC or PEAK trace"
 
 
@@ -63,7 +63,7 @@ _TOOLS = (
             rb"|\x0a\x0d\x0d\x0a)",
             re.DOTALL,
         ),
-        "record the bus with `candump -L`, or as ASC, BLF or MDF 4",
+        "record the bus with 'candump -L', or as ASC, BLF or MDF 4",
     ),
     _Tool(
         "a CRTD log of OVMS",
@@ -87,7 +87,7 @@ _TOOLS = (
             rb"\A(?:t[0-9A-Fa-f]{3}[0-8][0-9A-Fa-f]*\r?\n?|T[0-9A-Fa-f]{8}[0-8][0-9A-Fa-f]*"
             rb"\r?\n?){3}"
         ),
-        "record the bus with `candump -L`, which has time stamps",
+        "record the bus with 'candump -L', which has time stamps",
     ),
 )
 

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""Outputs of commands: declared by a marker at the parameter, checked before the computation."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from drivetwin._util.atomic import refuse_overwrite
+from drivetwin.errors import FileFormatError, InputError, Where
+
+
+class Shape(StrEnum):
+    """Shape of an output."""
+
+    FILE = "file"
+    FOLDER = "folder"
+    EITHER = "file or folder"
+
+
+@dataclass(frozen=True)
+class Output:
+    """Marker of a parameter that names an output, as metadata of its annotation.
+
+    `endings` are the endings that a file may have, each with its kind; empty: any ending.
+    """
+
+    shape: Shape = Shape.FILE
+    endings: Mapping[str, str] | None = None
+
+    def check(self, path: Path) -> None:
+        """Raise InputError or FileFormatError if nothing can be written to `path`."""
+        where = Where(file=str(path))
+        if self.shape is not Shape.FOLDER and not path.name:
+            raise InputError("this names no file to write to", "name a file", where)
+        if self.shape is Shape.FILE and path.is_dir():
+            raise InputError("this is a folder, not a file", "name a file in it", where)
+        if self.shape is Shape.FOLDER:
+            if path.resolve() == path.resolve().parent:
+                raise InputError(
+                    "this is the root of the file system, not a folder for results",
+                    "name a folder in it",
+                    where,
+                )
+            if path.is_file():
+                raise InputError("this is a file, not a folder", "name a folder", where)
+        refuse_overwrite(path)
+        self._check_ending(path)
+        _check_place(path)
+
+    def _check_ending(self, path: Path) -> None:
+        """Raise FileFormatError if the ending of a file is of no kind that is written."""
+        if self.endings and path.suffix.casefold() not in self.endings:
+            known = ", ".join(f"{ending} ({kind})" for ending, kind in self.endings.items())
+            raise FileFormatError(
+                f"no format has the ending {path.suffix!r}", f"use {known}", Where(file=str(path))
+            )
+
+
+def _check_place(path: Path) -> None:
+    """Raise InputError if the nearest folder that exists on the way to `path` takes no files."""
+    folders = (path, *path.parents) if path.is_dir() else path.parents
+    nearest = next((one for one in folders if one.exists()), Path())
+    if not nearest.is_dir():
+        what = f"{nearest} is a file, so nothing can be in it"
+        raise InputError(what, "name another folder", Where(file=str(path)))
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        what = f"no permission to write in {nearest.resolve()}"
+        remedy = "name another folder, or change its permissions"
+        raise InputError(what, remedy, Where(file=str(path)))
+
+
+def find_outputs(command: Callable[..., None]) -> dict[str, Output]:
+    """Return the markers of a command's outputs by parameter."""
+    hints: dict[str, Any] = get_type_hints(command, include_extras=True)
+    return {
+        name: one
+        for name, hint in hints.items()
+        for one in getattr(hint, "__metadata__", ())
+        if isinstance(one, Output)
+    }
+
+
+def select_outputs(paths: Iterable[Path] | None, *endings: str) -> list[Path]:
+    """Return the outputs of some endings, in any case of letters."""
+    return [path for path in paths or () if path.suffix.casefold() in endings]
+
+
+PAGE = {".html": "page with figures"}
+"""Kind of an output that is a page alone."""
+LOG_ENDINGS = {".csv": "text", ".mf4": "MDF 4", ".parquet": "Parquet", ".mat": "MATLAB"}
+"""Kinds of an output that is a log."""
