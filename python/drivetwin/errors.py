@@ -9,6 +9,8 @@ PYTHON_WORDS = {
     "--drop-part": "Twin.drop_part()",
     "in a channel mapping file (--channels)": "in a channel mapping file (argument 'mapping')",
     "in a channel mapping (--channels)": "in a channel mapping (argument 'mapping')",
+    "(--time-limit)": "(argument 'limits')",
+    "(--memory-limit)": "(argument 'limits')",
     "with --shift, such as --shift 2-3": "by its gears",
     "'drivetwin identify'": "'drivetwin.identify'",
 }

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from drivetwin.errors import InputError, QueryError
 from drivetwin.fleet.mixed_model.observations import collect_facts
 from drivetwin.fleet.query import Answer, query_store, save_answer
 from drivetwin.fleet.store import Store
+from drivetwin.fleet.task import Limits
 from tests.fleet.toys import make_logs, run_toys
 
 
@@ -93,3 +95,36 @@ def test_answers_are_safe_for_spreadsheets(store: Store, tmp_path: Path) -> None
     save_answer(answer, tmp_path / "a.csv", store.folder)
     with (tmp_path / "a.csv").open(newline="") as file:
         assert list(csv.reader(file)) == [["'=a", "b", "c"], ["'=1+1", "-1.5", "-2.5"]]
+
+
+ENDLESS = "SELECT count(*) FROM range(1000000000) a, range(1000000000) b WHERE a.range > b.range"
+
+
+@pytest.mark.parametrize("sql", [ENDLESS, "SELECT a.range FROM range(100000000000) a"])
+def test_a_query_ends_after_its_time(store: Store, sql: str) -> None:
+    began = time.monotonic()
+    with pytest.raises(QueryError, match=r"stopped after its time limit of 0\.5 s") as caught:
+        query_store(store, sql, Limits(seconds=0.5, memory=2**36))
+    assert time.monotonic() - began < 5.0
+    assert "(--time-limit)" in caught.value.remedy
+    assert "(argument 'limits')" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "SELECT list(range) FROM range(100000000)",  # in the database
+        "SELECT range FROM range(100000000)",  # in the answer
+        "SELECT [range, range + 1] AS pair, 'a text' AS word FROM range(100000000)",
+    ],
+)
+def test_a_query_ends_beyond_its_memory(store: Store, sql: str) -> None:
+    with pytest.raises(QueryError, match="more than its memory limit of 64 MiB") as caught:
+        query_store(store, sql, Limits(seconds=60.0, memory=64 * 2**20))
+    assert "(--memory-limit)" in caught.value.remedy
+
+
+def test_a_query_cannot_change_its_limits(store: Store) -> None:
+    with pytest.raises(QueryError):
+        query_store(store, "SET memory_limit = '10GB'; SELECT 1")
+    assert query_store(store, "SELECT current_setting('temp_directory')").rows == [("",)]

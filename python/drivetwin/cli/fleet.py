@@ -279,6 +279,12 @@ def query(
             "-o", "--output", metavar="FILE", help="Write the answer as .csv or .parquet."
         ),
     ] = None,
+    time_limit: Annotated[
+        float, typer.Option(min=0.1, metavar="S", help="Time limit of the query.")
+    ] = 60.0,
+    memory_limit: Annotated[
+        int, typer.Option(min=64, metavar="MIB", help="Memory limit of the query.")
+    ] = 2048,
     as_json: JsonFlag = False,
 ) -> None:
     """Query a store in SQL (DuckDB).
@@ -287,9 +293,11 @@ def query(
     """
     from drivetwin.fleet.query import query_store, save_answer
     from drivetwin.fleet.store import Store
+    from drivetwin.fleet.task import Limits
 
+    limits = Limits(time_limit, memory_limit * 2**20)
     with show_step("asking"), Store(store) as opened:
-        answer = query_store(opened, sql)
+        answer = query_store(opened, sql, limits)
     if output is not None:
         save_answer(answer, output, store)
     if as_json:

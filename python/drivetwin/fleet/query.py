@@ -4,7 +4,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -18,6 +22,7 @@ from drivetwin.fleet.readings import to_datetime
 from drivetwin.fleet.rows import RowKind, make_schema
 from drivetwin.fleet.rules import FILE_COLUMNS, is_date
 from drivetwin.fleet.store import Store
+from drivetwin.fleet.task import Limits
 
 _VIEWS = (RowKind.PARAMETER, RowKind.FRICTION, RowKind.FIT, RowKind.QUALITY, RowKind.WARNING)
 _TABLES = ("logs", "shifts", "settings")
@@ -33,29 +38,98 @@ class Answer:
     rows: Sequence[tuple[Any, ...]]
 
 
-def query_store(store: Store, sql: str) -> Answer:
+QUERY_LIMITS = Limits(seconds=60.0, memory=2 * 2**30)
+"""Limits of a query: a question to 10,000 logs takes seconds."""
+_CHUNK = 10_000
+"""Rows that are fetched at once, between two checks of the limits."""
+
+
+def query_store(store: Store, sql: str, limits: Limits = QUERY_LIMITS) -> Answer:
     """Answer a question in SQL. The tables are
 
     `rows`, all numbers of all logs; `files`, with a column for each field; `logs`, `shifts` and
     `settings` of the index; and, with path, unit and fields of one file of the log beside each
     row, `parameters`, `frictions`, `fits`, `qualities` and `warnings`. Raises QueryError for a
-    question that DuckDB does not take, that would write or that names other files,
-    MissingExtraError without DuckDB.
+    question that DuckDB does not take, that would write, that names other files or that exceeds
+    the `limits`, MissingExtraError without DuckDB. The limit of the memory applies to the database
+    and to the answer, each by itself.
     """
     duckdb = import_extra("duckdb", "query", "a query", store.folder)
-    with duckdb.connect(config={"autoinstall_known_extensions": "false"}) as database:
-        _make_tables(database, store)
-        _close_outside(database, store)
+    config = {
+        "autoinstall_known_extensions": "false",
+        "memory_limit": f"{limits.memory}B",
+        "temp_directory": "",  # nothing is moved to the disk instead
+    }
+    with duckdb.connect(config=config) as database:
         try:
+            _make_tables(database, store)
+            _close_outside(database, store)
             _refuse_changes(duckdb, sql)
-            database.execute(sql)
-            columns = [column[0] for column in database.description or ()]
-            return Answer(columns, database.fetchall() if columns else ())
+            with _interrupt_after(limits.seconds, database):
+                return _fetch_answer(database, sql, limits)
+        except duckdb.InterruptException:
+            raise _refuse_long(limits) from None
+        except duckdb.OutOfMemoryException:
+            raise _refuse_large(limits) from None
         except duckdb.Error as fault:
             raise QueryError(
                 f"the database does not take this: {fault}",
                 "try 'SELECT * FROM parameters LIMIT 5'; docs/howto/fleet.md lists the tables",
             ) from None
+
+
+@contextmanager
+def _interrupt_after(seconds: float, database: Any) -> Iterator[None]:
+    """Interrupt the database if the block takes longer."""
+    timer = threading.Timer(seconds, database.interrupt)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _fetch_answer(database: Any, sql: str, limits: Limits) -> Answer:
+    """Execute a question and fetch its rows within the limits; raises QueryError beyond them."""
+    end = time.monotonic() + limits.seconds
+    database.execute(sql)
+    columns = [column[0] for column in database.description or ()]
+    rows: list[tuple[Any, ...]] = []
+    room = limits.memory
+    while columns and (some := database.fetchmany(_CHUNK)):
+        rows += some
+        room -= _measure(some)
+        if room < 0:
+            raise _refuse_large(limits)
+        if time.monotonic() > end:
+            raise _refuse_long(limits)
+    return Answer(columns, rows)
+
+
+def _measure(value: Any) -> int:
+    """Measure the memory [bytes] of a value with all that it contains."""
+    size = sys.getsizeof(value)
+    if isinstance(value, dict):
+        value = [*value, *value.values()]
+    return size + sum(map(_measure, value)) if isinstance(value, list | tuple) else size
+
+
+def _refuse_long(limits: Limits) -> QueryError:
+    return QueryError(
+        f"the query was stopped after its time limit of {limits.seconds:g} s",
+        f"{_ASK_LESS} or raise the time limit (--time-limit)",
+    )
+
+
+def _refuse_large(limits: Limits) -> QueryError:
+    return QueryError(
+        f"the query needs more than its memory limit of {limits.memory / 2**20:g} MiB",
+        f"{_ASK_LESS} or raise the memory limit (--memory-limit)",
+    )
+
+
+_ASK_LESS = "select fewer rows (WHERE, LIMIT), aggregate them (GROUP BY),"
 
 
 def _close_outside(database: Any, store: Store) -> None:
