@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -201,11 +202,33 @@ def test_a_log_without_units_is_described_and_its_mapping_proposes_them(
         "wheel_speed": "rpm", "pressure.B2": "bar", "pressure.B3": "bar",
     }  # fmt: skip
     assert accepted.options.time.unit == "s"
+    assert {role: one for role, (one,) in found["proposals"].items()} == {"time": "s"} | units
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "no unit" not in shown
+    assert "refuse" not in shown
     checked = ["shifts", str(log), "--vehicle", str(bench_files.card), "--channels", str(path)]
     assert main(checked) == 0
     capsys.readouterr()
     again = _inspect(capsys, str(log), *card, "--channels", str(path))
     assert (again["refusal"], len(again["notes"])) == (None, 0 if with_card else 1)
+
+
+def test_the_units_that_the_mapping_proposes_are_listed_until_they_are_stated(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, path = _unnamed(bench_files.log, tmp_path / "log.csv"), tmp_path / "map.toml"
+    command = ["inspect", str(log), "--vehicle", str(bench_files.card)]
+    assert main([*command, "--write-mapping", str(path)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "time (s), engine_torque (Nm), " in shown
+    assert "pressure.B3 (bar); state it in a channel mapping" in shown
+    assert '(or "ms"' not in shown
+    proposed = re.findall(r'^# unit = "(\w+)"', path.read_text(), re.MULTILINE)
+    assert sorted(proposed) == sorted(["s", *2 * ["Nm"], *3 * ["rpm"], *2 * ["bar"]])
+    path.write_text(path.read_text().replace('# unit = "s"', 'unit = "s"'))
+    assert main([*command, "--channels", str(path)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "proposed from the values: engine_torque (Nm)" in shown
 
 
 def test_a_mapping_is_written_of_a_log_that_cannot_be_read(

@@ -71,6 +71,12 @@ class Draft:
     accept: bool = False
     databases: tuple[str, ...] = ()
 
+    @property
+    def proposed_units(self) -> dict[str, tuple[str, ...]]:
+        """Units that the values propose, by role and for `time`, where the log names none."""
+        gaps = {**({} if self.time is None else {"time": self.time}), **self.units}
+        return {role: tuple(one.unit for one in gap.proposals) for role, gap in gaps.items()}
+
 
 _NOTHING_OPEN = Draft()
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from drivetwin.channels.mapping import Mapped
+    from drivetwin.channels.mapping_text import Draft
     from drivetwin.logs.raw import Recording
     from drivetwin.logs.survey import Column, Survey
     from drivetwin.vehicle.card import VehicleCard
@@ -67,6 +68,7 @@ def inspect(
     Also list the warnings of shifts and identify, and their reason if they refuse the log.
     """
     from drivetwin._util.atomic import write_text
+    from drivetwin.channels.mapping_file import read_mapping
     from drivetwin.channels.mapping_text import format_mapping
     from drivetwin.files.records import dump_findings
     from drivetwin.logs.formats.can.database import list_databases
@@ -84,29 +86,45 @@ def inspect(
             if write_mapping is not None:
                 _write_unread(write_mapping, card, stated, fault, list_databases(log))
             raise
-    found = seen.survey
-    if write_mapping is not None:
-        draft = draft_mapping(found, unnamed_step=seen.unnamed_step, accept=accept_proposals)
-        text = format_mapping(found.mapping, found.options, found.names, draft)
-        write_text(write_mapping, text)
+        draft = draft_mapping(seen.survey, unnamed_step=seen.unnamed_step, accept=accept_proposals)
+        if write_mapping is not None:
+            found = seen.survey
+            text = format_mapping(found.mapping, found.options, found.names, draft)
+            write_text(write_mapping, text)
+        if write_mapping is not None and accept_proposals:
+            seen = _look_at(log, card, read_mapping(write_mapping))
+            draft = draft_mapping(seen.survey, unnamed_step=seen.unnamed_step)
     if as_json:
         error = None if seen.refusal is None else to_error_document(seen.refusal)["error"]
         remarks = {"findings": dump_findings(seen.findings), "refusal": error}
-        print_json(found.to_document() | remarks)
+        print_json(seen.survey.to_document() | {"proposals": draft.proposed_units} | remarks)
         return
-    _print_columns(found.columns, log.name)
+    _print_seen(seen, draft, log.name)
+    if write_mapping is not None:
+        print_line(f"wrote {write_mapping}")
+
+
+def _print_seen(seen: _Seen, draft: Draft, name: str) -> None:
+    """Print the columns of a log, notes, open units with their proposals, and findings."""
+    found = seen.survey
+    _print_columns(found.columns, name)
     for text in found.notes:
         print_paragraph(text)
-    if found.unitless:
+    if draft.proposed_units:
+        listed = ", ".join(
+            f"{role} ({' or '.join(units) or 'no proposal'})"
+            for role, units in draft.proposed_units.items()
+        )
         print_paragraph(
-            f"no unit for {', '.join(sorted(found.unitless))}: state it in a channel mapping; "
-            "--write-mapping channels.toml --accept-proposals writes one"
+            f"no unit, proposed from the values: {listed}; state it in a channel mapping: "
+            "--write-mapping channels.toml writes one, with --accept-proposals with the units "
+            "that are the only proposal"
         )
     print_findings(one for one in seen.findings if one.names.get("text") not in found.notes)
     if seen.refusal is not None:
-        print_paragraph(f"{seen.refused_by} this log: {seen.refusal}")
-    if write_mapping is not None:
-        print_line(f"wrote {write_mapping}")
+        proposed = isinstance(seen.refusal, UnitError) and draft.proposed_units
+        reason = replace(seen.refusal, remedy="") if proposed else seen.refusal
+        print_paragraph(f"{seen.refused_by} this log: {reason}")
 
 
 @dataclass(frozen=True, eq=False)

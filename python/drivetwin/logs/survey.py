@@ -18,8 +18,8 @@ from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.recognition import infer_candidates
-from drivetwin.channels.roles import NEEDED, get_quantity
-from drivetwin.channels.shiftlog import FloatArray, Quantity
+from drivetwin.channels.roles import NEEDED
+from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.raw import RawChannel, Recording
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -60,19 +60,6 @@ class Survey:
     """Shift elements of the card; None without a card."""
     names: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """Names of the user by role."""
-
-    @property
-    def unitless(self) -> frozenset[str]:
-        """Roles of the mapping that need a unit which neither file nor mapping names."""
-        return frozenset(
-            role
-            for column in self.columns
-            for role in column.roles
-            if not (column.unit or "").strip()
-            and role in self.mapping
-            and self.mapping[role].unit is None
-            and get_quantity(role) is not Quantity.STATE
-        )
 
     def to_document(self) -> dict[str, Any]:
         """For JSON."""
