@@ -13,6 +13,7 @@ from drivetwin._util.display_units import (
     format_uncertainty,
     format_with_unit,
     get_display_unit,
+    spell_unit,
 )
 from drivetwin.parameters import SPECS
 from drivetwin.shifts.quality import QUALITY_UNITS
@@ -76,3 +77,18 @@ def test_a_sentence_has_the_units_of_the_tables(
 @pytest.mark.parametrize("unit", sorted(set(QUALITY_UNITS.values())))
 def test_no_figure_of_shift_quality_has_a_unit_in_ascii(unit: str) -> None:
     assert not set("*^") & set(get_display_unit(unit).label)
+
+
+@pytest.mark.parametrize(
+    ("unit", "spelled"),
+    [("m/s^3", "m/s³"), ("m/s^1.75", "m/s¹·⁷⁵"), ("N*m*s^2/rad^2", "Nm·s²/rad²"), ("Pa", "Pa")],
+)
+def test_an_si_unit_is_spelled_as_its_display(unit: str, spelled: str) -> None:
+    assert spell_unit(unit) == spelled
+
+
+@pytest.mark.parametrize("value", [-0.0, -1e-320])
+def test_a_negative_zero_has_no_sign(value: float) -> None:
+    assert format_uncertainty(value, 0.5)[0] == "0.00"
+    assert format_with_unit(value, "Pa", 1e3) == "0.000 ± 0.010 bar"
+    assert format_significant(-0.0) == "0"

@@ -9,9 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.keep_limits import Repair
+from drivetwin.calibration.certificate import LimitCheck
+from drivetwin.calibration.keep_limits import Repair, require_limits
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Objective
+from drivetwin.errors import InfeasibleError, InputError
 
 LIMITS = (Limit(Metric.SHIFT_TIME, 0.7), Limit(Metric.FRICTION_ENERGY, 4e4))
 OBJECTIVE = Objective(LIMITS, 0.9, 100.0)
@@ -66,3 +68,15 @@ def test_without_limits_nothing_is_polished() -> None:
         np.zeros(2), Objective((), 0.9, 1.0)
     )
     assert (kept.coordinates == 0.0).all()
+
+
+def test_a_limit_that_is_exceeded_is_stated_in_the_unit_of_the_report() -> None:
+    limit = Limit(Metric.PEAK_JERK, 10.0)
+    found, start = LimitCheck(limit, 12.0, None), LimitCheck(limit, 30.0, None)
+    with pytest.raises(InfeasibleError) as caught:
+        require_limits((found,), (start,))
+    text = caught.value.what + caught.value.remedy
+    assert "12 m/s³, limit 10: 2 m/s³ or 20.0 % above it (start: 30 m/s³)" in text
+    assert "^" not in text
+    with pytest.raises(InputError, match="number in m/s³"):
+        Limit(Metric.PEAK_JERK, -1.0)

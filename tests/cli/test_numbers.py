@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
+from drivetwin import cli
 from drivetwin.cli.numbers import format_deviation, format_estimate, format_percent, format_quantity
 
 
@@ -29,7 +33,30 @@ def test_what_is_not_known_is_a_dash() -> None:
 
 @pytest.mark.parametrize(
     ("value", "truth", "text"),
-    [(18.0, 17.5, "+2.86"), (17.5, 17.5, "+0.00"), (None, 17.5, ""), (0.01, 0.0, "")],
+    [
+        (18.0, 17.5, "+2.86"),
+        (17.5, 17.5, "+0.00"),
+        (17.4999, 17.5, "+0.00"),
+        (None, 17.5, ""),
+        (0.01, 0.0, ""),
+    ],
 )
 def test_deviation(value: float | None, truth: float, text: str) -> None:
     assert format_deviation(value, truth) == text
+
+
+def test_a_negative_zero_has_no_sign() -> None:
+    assert format_percent(-0.04) == format_percent(-0.0) == "0.0"
+    assert format_quantity(-0.0, "N*m") == "0 Nm"
+    assert format_estimate(-0.0, (-0.5, 0.5), "N*m")[0] == "0.00"
+
+
+def test_no_table_of_a_command_prints_a_negative_zero() -> None:
+    """Decimals of numbers that may be negative are formatted with `z`."""
+    signed = re.compile(r"\{[^{}]*(?:min|max|bias|start|end|low|high|torque)[^{}]*:\+?,?\.\df\}")
+    found = [
+        f"{path.name}: {text}"
+        for path in sorted(Path(cli.__file__).parent.glob("*.py"))
+        for text in signed.findall(path.read_text(encoding="utf-8"))
+    ]
+    assert found == []

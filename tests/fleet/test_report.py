@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, Points
-from drivetwin.fleet.report import build_ageing_section, write_remark
+from drivetwin.fleet.report import build_ageing_section, render_fleet, write_remark
+from drivetwin.fleet.store import Store
 from drivetwin.report.sections.blocks import FigureBlock
+from tests.fleet.toys import make_logs, run_toys
 
 
 @pytest.fixture
@@ -49,3 +52,11 @@ def test_what_drifts_most_by_its_own_error_comes_first(drifting: JointEstimate) 
     blocks = build_ageing_section([calm, drifting]).blocks
     captions = [block.caption for block in blocks if isinstance(block, FigureBlock)]
     assert [caption.split(":")[0] for caption in captions] == ["μ (B3)", "η"]
+
+
+@pytest.mark.parametrize(("units", "heading"), [(1, "Fleet of 1 unit"), (2, "Fleet of 2 units")])
+def test_the_heading_counts_its_units(tmp_path: Path, units: int, heading: str) -> None:
+    run_toys(make_logs(tmp_path / "logs", units), tmp_path / "store")
+    with Store(tmp_path / "store") as store:
+        page = render_fleet(store, [], tmp_path)
+    assert f"<h1>{heading}</h1>" in page

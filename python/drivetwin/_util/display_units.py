@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -58,6 +59,15 @@ def get_display_unit(si_unit: str) -> Display:
     """Display unit of an SI unit from the parameter table; the unit itself where none is set."""
     return _BY_SI.get(si_unit, Display(si_unit))
 
+
+def spell_unit(si_unit: str) -> str:
+    """Return an SI unit as texts spell it, m/s³ for `m/s^3`; values stay in SI."""
+    text = si_unit.replace("N*m", "Nm").replace("*", "·")
+    return re.sub(r"\^([\d.]+)", lambda power: power[1].translate(_RAISED), text)
+
+
+_RAISED = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
+"""Digits of powers, as in `_BY_SI`."""
 
 LARGE = 1e4
 """Size in Nm, Nm/rad or Nm·s/rad from which torques, stiffness and damping are shown in kNm."""

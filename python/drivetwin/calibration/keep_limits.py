@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import spell_unit
 from drivetwin.calibration.certificate import LimitCheck
 from drivetwin.calibration.metrics import METRICS
 from drivetwin.calibration.objective import Objective
@@ -72,14 +73,15 @@ def require_limits(found: Sequence[LimitCheck], start: Sequence[LimitCheck]) -> 
 
 def _describe_excess(one: LimitCheck, start: LimitCheck) -> str:
     spec, bound = METRICS[one.limit.metric], one.limit.bound
+    unit = spell_unit(spec.unit)
     return (
-        f"{spec.label} ({one.limit.statistic}) {one.value:.4g} {spec.unit}, limit {bound:.4g}: "
-        f"{one.value - bound:.2g} {spec.unit} or {100.0 * (one.value / bound - 1.0):.1f} % "
-        f"above it (start: {start.value:.4g} {spec.unit})"
+        f"{spec.label} ({one.limit.statistic}) {one.value:.4g} {unit}, limit {bound:.4g}: "
+        f"{one.value - bound:.2g} {unit} or {100.0 * (one.value / bound - 1.0):.1f} % "
+        f"above it (start: {start.value:.4g} {unit})"
     )
 
 
 def _describe_remedy(one: LimitCheck) -> str:
     spec = METRICS[one.limit.metric]
     value = one.value if one.upper is None else one.upper
-    return f"the limit of the {spec.label} to {value:.3g} {spec.unit}"
+    return f"the limit of the {spec.label} to {value:.3g} {spell_unit(spec.unit)}"

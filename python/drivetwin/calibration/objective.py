@@ -10,6 +10,7 @@ from enum import StrEnum
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import spell_unit
 from drivetwin.calibration.metrics import METRICS, Metric, Outcome
 from drivetwin.errors import InputError
 
@@ -33,7 +34,7 @@ class Limit:
         if not 0.0 < self.bound < float("inf"):
             raise InputError(
                 f"the limit of {self.metric} is {self.bound!r}",
-                f"give a finite positive number in {METRICS[self.metric].unit}",
+                f"give a finite positive number in {spell_unit(METRICS[self.metric].unit)}",
             )
 
     def compute_excess(self, outcome: Outcome) -> FloatArray:

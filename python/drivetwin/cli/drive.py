@@ -117,11 +117,11 @@ def _build_shift_table(motion: DriveRun, title: str) -> Table:
             each.action.label,
             each.action.kind,
             " ".join(work.element for work in each.work),
-            f"{each.action.start:.1f}",
+            f"{each.action.start:z.1f}",
             _format_slip_time(each),
             " ".join(f"{abs(work.work) / 1e3:.1f}" for work in each.work),
             " ".join(f"{work.peak_power / 1e3:.0f}" for work in each.work),
-            f"{low:.0f}..{high:.0f}",
+            f"{low:z.0f}..{high:z.0f}",
         )
     return table
 

@@ -236,7 +236,7 @@ def _build_bootstrap_table(one: Bootstrap, found: Identification) -> Table:
             name,
             format_half_width(linear, estimate.unit),
             format_half_width(Z95 * float(one.std[k]), estimate.unit),
-            f"{one.bias[k] / one.std[k]:+.2f} σ",
+            f"{one.bias[k] / one.std[k]:+z.2f} σ",
             format_estimate(None, None, estimate.unit)[2],
         )
     return table

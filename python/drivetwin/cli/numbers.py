@@ -44,9 +44,9 @@ def format_half_width(half: float, si_unit: str) -> str:
 
 def format_percent(value: float | None) -> str:
     """A share in percent with one decimal; a dash for None or NaN."""
-    return "-" if value is None or not isfinite(value) else f"{value:.1f}"
+    return "-" if value is None or not isfinite(value) else f"{value:z.1f}"
 
 
 def format_deviation(value: float | None, truth: float) -> str:
     """Format the deviation from the true value in percent; empty if undefined."""
-    return "" if value is None or truth == 0.0 else f"{100.0 * (value / truth - 1.0):+.2f}"
+    return "" if value is None or truth == 0.0 else f"{100.0 * (value / truth - 1.0):+z.2f}"

@@ -111,7 +111,7 @@ def _observe_shifts(
             with show_step(f"observing shift {name} by {by}"):
                 found.append(look(shift))
         except DamagedChannelError as refusal:
-            left_out[f"{name} at {shift.torque_phase[0]:.3f} s"] = refusal.what
+            left_out[f"{name} at {shift.torque_phase[0]:z.3f} s"] = refusal.what
             if len(left_out) == len(shifts):
                 raise
     return found, left_out
@@ -167,10 +167,10 @@ def _build_table(one: Observation) -> Table:
         half = band.upper - band.value
         table.add_row(
             name,
-            f"{band.value.min():.0f}",
-            f"{band.value.max():.0f}",
-            f"{half.mean():.1f}",
-            f"{half.max():.1f}",
+            f"{band.value.min():z.0f}",
+            f"{band.value.max():z.0f}",
+            f"{half.mean():z.1f}",
+            f"{half.max():z.1f}",
         )
     return table
 

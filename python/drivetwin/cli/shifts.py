@@ -183,7 +183,7 @@ def _print_remarks(found: FoundShifts) -> None:
     for candidate, count in collect_rejected(found.rejected):
         start, end = candidate.time
         more = f" (first of {count} for this reason)" if count > 1 else ""
-        print_paragraph(f"rejected, {start:.3f} s to {end:.3f} s: {candidate.reason}{more}")
+        print_paragraph(f"rejected, {start:z.3f} s to {end:z.3f} s: {candidate.reason}{more}")
 
 
 def _format_name(shift: Shift) -> str:
@@ -225,6 +225,6 @@ def _build_gear_table(gears: tuple[HeldGear, ...]) -> Table:
         value, spread, unit = format_estimate(one.value, interval, "kg*m^2")
         start, end = one.span
         table.add_row(
-            one.gear, f"{start:.2f}", f"{end:.2f}", value, spread, unit, one.verdict.value
+            one.gear, f"{start:z.2f}", f"{end:z.2f}", value, spread, unit, one.verdict.value
         )
     return table

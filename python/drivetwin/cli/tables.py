@@ -51,9 +51,9 @@ def build_shift_table(shifts: Sequence[Shift], source: str) -> Table:
             table.add_row(
                 f"{shift.start_gear}→{shift.end_gear} {shift.kind}" if index == 0 else "",
                 phase,
-                f"{start:.3f}",
+                f"{start:z.3f}",
                 "" if sigma is None else f"± {1e3 * Z95 * sigma:.1f} ms",
-                f"{end:.3f}",
+                f"{end:z.3f}",
             )
     return table
 
@@ -76,7 +76,7 @@ def build_summary_tables(groups: Sequence[ShiftGroup]) -> Iterator[Table]:
                 format_quantity(one.mean, unit),
                 "" if one.spread is None else format_quantity(one.spread, unit),
                 format_quantity(one.worst, unit),
-                f"{one.worst_time:.2f}",
+                f"{one.worst_time:z.2f}",
             )
         yield table
 
@@ -85,7 +85,7 @@ def build_quality_tables(shifts: Sequence[Shift]) -> Iterator[Table]:
     """Build tables of shift quality, one column for each shift; split if there are many."""
     for first in range(0, len(shifts), _BESIDE):
         part = shifts[first : first + _BESIDE]
-        names = [f"{one.start_gear}→{one.end_gear}, {one.lockup_time:.2f} s" for one in part]
+        names = [f"{one.start_gear}→{one.end_gear}, {one.lockup_time:z.2f} s" for one in part]
         table = make_table("Shift quality", "figure", *names, right=tuple(names))
         for figure, unit in QUALITY_UNITS.items():
             if any(figure in one.quality for one in part):
@@ -173,7 +173,7 @@ def build_friction_table(friction: Mapping[str, FrictionCurve]) -> Table:
             band = (float(curve.mu_lo[index]), float(curve.mu_hi[index]))
             value, interval, _ = format_estimate(float(curve.mu[index]), band, "1")
             first = (element, curve.verdict_text) if place == 0 else ("", "")
-            table.add_row(first[0], f"{curve.slip[index]:.1f}", value, interval, first[1])
+            table.add_row(first[0], f"{curve.slip[index]:z.1f}", value, interval, first[1])
     return table
 
 

@@ -13,15 +13,20 @@ from collections.abc import Iterable
 import numpy as np
 
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.simulation.dual_clutch import LATEST
+
+FAR = 1e5
+"""Start [s] beyond which time counts from the first stamp: a clock of the day (86,400 s) is below.
+
+A log from there on may last ten days before it reaches `LATEST` of the simulation.
+"""
 
 
 def find_origin(starts: Iterable[float]) -> float:
-    """Return the first of the stamps [s] that are beyond LATEST; 0 without any.
+    """Return the first of the stamps [s] that are beyond FAR; 0 without any.
 
     `starts` are the first stamps of all time bases of a log.
     """
-    return min((float(start) for start in starts if LATEST < abs(start) < math.inf), default=0.0)
+    return min((float(start) for start in starts if FAR < abs(start) < math.inf), default=0.0)
 
 
 def subtract_origin(time: FloatArray, origin: float) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from drivetwin._util.display_units import spell_unit
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitCheck, LimitState
 from drivetwin.calibration.closed_loop import ClosedLoop
@@ -184,11 +185,15 @@ def _build_values(found: Calibration) -> TableBlock:
     parameters = found.task.policy.parameters
     for one, old, new in zip(parameters, found.before.values, found.after.values, strict=True):
         numbers = (f"{value:.5g}" for value in (old, new, one.low, one.high))
-        rows.append((*make_cells(one.name, one.unit), *make_cells(*numbers, number=True),
+        unit = spell_unit(one.unit)
+        rows.append((*make_cells(one.name, unit), *make_cells(*numbers, number=True),
                      *make_cells(one.text if one.free else f"{one.text} (kept)")))  # fmt: skip
     return TableBlock("Parameters of the policy, SI", head, rows)
 
 
 def _build_definitions() -> TableBlock:
-    rows = [make_cells(one.label, one.unit, one.definition, one.source) for one in METRICS.values()]
+    rows = [
+        make_cells(one.label, spell_unit(one.unit), one.definition, one.source)
+        for one in METRICS.values()
+    ]
     return TableBlock("Metrics", make_cells("metric", "unit", "definition", "source"), rows)

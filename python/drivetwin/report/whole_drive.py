@@ -28,8 +28,8 @@ def render_whole_drive(shifts: Sequence[Shift], log: str) -> str:
     groups = summarize_shifts(shifts)
     return render_page(
         title=f"Shifts of {log}",
-        subtitle=f"{len(shifts)} shifts from {shifts[0].lockup_time:.1f} to "
-        f"{shifts[-1].lockup_time:.1f} s",
+        subtitle=f"{len(shifts)} shifts from {shifts[0].lockup_time:z.1f} to "
+        f"{shifts[-1].lockup_time:z.1f} s",
         sections=list(_build_sections(shifts, groups)),
     )
 
@@ -62,7 +62,7 @@ def _build_table(name: str, groups: Sequence[ShiftGroup]) -> TableBlock:
             *make_cells(group.kind.value, group.gears or "all"),
             Cell(str(one.count), number=True),
             *(format_value(value) for value in (one.mean, one.spread, one.worst)),
-            Cell(f"{one.worst_time:.2f}", number=True),
+            Cell(f"{one.worst_time:z.2f}", number=True),
         )
         for group in groups
         if (one := group.figures.get(name)) is not None

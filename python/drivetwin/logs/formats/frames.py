@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.logs.origin import find_origin, subtract_origin
+from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 
 
 @dataclass(frozen=True)
@@ -96,13 +96,14 @@ def build_frames(
     index = {name: place for place, name in enumerate(names)}
     width = max(PAYLOAD, max(map(len, payloads), default=0))
     padded = b"".join(payload.ljust(width, b"\xff") for payload in payloads)
+    origin = find_origin(time[:1])
     return Frames(
-        time=subtract_origin(time, find_origin(time[:1])),
+        time=subtract_origin(time, origin),
         identifier=np.array(identifiers, np.uint32),
         extended=np.array(extended, np.bool_),
         data=np.frombuffer(padded, np.uint8).reshape(-1, width),
         length=np.array([len(payload) for payload in payloads], np.uint8),
         bus=np.array([index[name] for name in buses], np.intp),
         buses=names,
-        warnings=warnings,
+        warnings=(*warnings, *describe_origin(origin)),
     )

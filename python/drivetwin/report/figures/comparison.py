@@ -146,7 +146,7 @@ def plot_fit_matrix(
             x=list(columns),
             y=list(rows),
             z=[[np.nan if value is None else value for value in row] for row in percent],
-            text=[["–" if value is None else f"{value:.1f}" for value in row] for row in percent],
+            text=[["–" if value is None else f"{value:z.1f}" for value in row] for row in percent],
             texttemplate="%{text}",
             zmin=0.0,
             zmax=100.0,

@@ -128,7 +128,7 @@ class Section:
 
 def make_link(shift: Shift) -> str:
     """The `link` of all figures of one shift."""
-    return f"{shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.3f} s"
+    return f"{shift.start_gear}→{shift.end_gear} at {shift.lockup_time:z.3f} s"
 
 
 def make_cells(*texts: str, number: bool = False) -> tuple[Cell, ...]:

@@ -84,7 +84,7 @@ def _build_tiles(
         if fit is not None and math.isfinite(fit.fit_percent):
             tiles.append(
                 Tile(
-                    f"fit of {one.name}", f"{fit.fit_percent:.1f} %", note="output torque, own log"
+                    f"fit of {one.name}", f"{fit.fit_percent:z.1f} %", note="output torque, own log"
                 )
             )
     return tiles

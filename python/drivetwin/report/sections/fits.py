@@ -74,7 +74,7 @@ def make_fit_cell(fit: SignalFit | None, display: Display, *, doubtful: bool = F
     if fit is None:
         return Cell("–", number=True)
     note = f"{format_significant(fit.rmse * display.factor, 3)} {display.label}"
-    text = f"{fit.fit_percent:.1f} %" if math.isfinite(fit.fit_percent) else "–"
+    text = f"{fit.fit_percent:z.1f} %" if math.isfinite(fit.fit_percent) else "–"
     tone = Tone.DOUBTFUL if doubtful else Tone.PLAIN
     return Cell(text, number=True, badge=doubtful, tone=tone, note=note)
 

@@ -168,5 +168,5 @@ def _list_correlated_pairs(found: Identification) -> Iterator[str]:
     for i, one in enumerate(ids):
         for j in range(i + 1, len(ids)):
             if abs(matrix[i, j]) >= _CLOSE:
-                number = f"{matrix[i, j]:+.2f}".replace("-", "−")
+                number = f"{matrix[i, j]:+z.2f}".replace("-", "−")
                 yield f"{get_parameter_label(one)} and {get_parameter_label(ids[j])}: r = {number}."

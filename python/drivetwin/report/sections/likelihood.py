@@ -129,7 +129,7 @@ def _make_correlation_cell(size: float | None) -> Cell:
     """Format the correlation with one input; a dash if the shift lacks that input."""
     if size is None:
         return Cell("–", number=True)
-    return _make_test_cell(f"{size:+.1f}".replace("-", "−"), good=abs(size) <= SIGNIFICANT)
+    return _make_test_cell(f"{size:+z.1f}".replace("-", "−"), good=abs(size) <= SIGNIFICANT)
 
 
 def _make_test_cell(text: str, *, good: bool) -> Cell:

@@ -90,7 +90,7 @@ def build_shift_section(found: Identification, log: ShiftLog) -> Section:
         if shift.findings:
             blocks.append(NotesBlock("About this shift", render(shift.findings), Tone.DOUBTFUL))
     if found.rejected:
-        texts = [f"{r.time[0]:.2f} to {r.time[1]:.2f} s: {r.reason}" for r in found.rejected]
+        texts = [f"{r.time[0]:z.2f} to {r.time[1]:z.2f} s: {r.reason}" for r in found.rejected]
         blocks.append(NotesBlock("Not used", texts))
     return Section(
         "shift",
@@ -114,10 +114,10 @@ def _build_phase_table(name: str, shift: Shift) -> TableBlock:
         rows.append(
             (
                 Cell(label),
-                Cell(f"{start:.3f} s", number=True),
+                Cell(f"{start:z.3f} s", number=True),
                 Cell(doubt, number=True),
-                Cell(f"{end:.3f} s", number=True),
-                Cell(f"{1e3 * (end - start):.0f} ms", number=True),
+                Cell(f"{end:z.3f} s", number=True),
+                Cell(f"{1e3 * (end - start):z.0f} ms", number=True),
             )
         )
     head = (
@@ -200,7 +200,7 @@ def build_validation_section(validations: tuple[Validation, ...]) -> Section:
 def _build_event_table(validation: Validation) -> TableBlock:
     """Changes of friction mode; filling and venting repeat with every ripple of the pressure."""
     rows = [
-        make_cells(f"{event.time:.4f} s", event.element, event.kind.replace("_", " "))
+        make_cells(f"{event.time:z.4f} s", event.element, event.kind.replace("_", " "))
         for event in validation.trajectory.events
         if event.kind not in ("fill", "vent")
     ]

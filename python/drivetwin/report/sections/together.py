@@ -135,7 +135,7 @@ def _build_shared_table(
                 Cell("–", number=True)
                 if move is None or move.z == 0.0
                 else Cell(
-                    f"{move.z:+.1f} σ".replace("-", "−"),
+                    f"{move.z:+z.1f} σ".replace("-", "−"),
                     number=True,
                     badge=True,
                     tone=Tone.DOUBTFUL if far else Tone.GOOD,
@@ -200,7 +200,7 @@ def _format_torque_fit(one: HeldOut) -> str:
     if one.validation is None:
         return "–"
     fits = one.validation.fit
-    return f"{next(iter(fits.values()))['all'].fit_percent:.1f} %"
+    return f"{next(iter(fits.values()))['all'].fit_percent:z.1f} %"
 
 
 def _build_judgement_table(found: Identification, held: Sequence[HeldOut]) -> TableBlock:

@@ -98,7 +98,7 @@ def _build_content(box: Gearbox) -> list[Component]:
             ),
             _align_right(f"{one.ratio:.4f}"),
             _align_right(f"{one.published:.4g}"),
-            _align_right(f"{100 * one.difference:+.2f} %"),
+            _align_right(f"{100 * one.difference:+z.2f} %"),
         ]
         for one in gears
     ]

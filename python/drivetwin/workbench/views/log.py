@@ -162,8 +162,8 @@ def _build_content(opened: Opened) -> list[Component]:
     facts = {
         "columns": str(len(opened.survey.columns)),
         "channels mapped": str(len(log.channels)),
-        "from": f"{first:.3f} s",
-        "to": f"{last:.3f} s",
+        "from": f"{first:z.3f} s",
+        "to": f"{last:z.3f} s",
     }
     remarks = map(replace_options, render(log.findings))
     return [build_facts_line(facts), ui.make_notes("About the log", remarks)]

@@ -255,4 +255,4 @@ def _build_fit(live: Live, remark: str) -> list[Component]:
 
 
 def _format_percent(run: Validation, name: str) -> str:
-    return f"{run.fit[name]['all'].fit_percent:.2f} %"
+    return f"{run.fit[name]['all'].fit_percent:z.2f} %"

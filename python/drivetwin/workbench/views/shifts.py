@@ -86,7 +86,7 @@ def _register_figure(page: ui.Page) -> None:
         ui.notify_topic(ui.Topic.PHASES)
         if moves:
             session.move_boundaries(work.shift, moves)
-            ui.notify("; ".join(f"{LABELS[one]} at {time:.4f} s" for one, time in moves.items()))
+            ui.notify("; ".join(f"{LABELS[one]} at {time:z.4f} s" for one, time in moves.items()))
 
 
 def _get_phase_panels(session: Session) -> list[Panel]:
@@ -174,7 +174,7 @@ def _list_rejected(work: SessionState, log: OpenLog) -> Iterator[str]:
     """Yield the gear changes of a log that are not used, with the reason."""
     where = f"{log.source.name}, " if len(work.logs) > 1 else ""
     for one in () if log.opened.found is None else log.opened.found.rejected:
-        span = f"{one.time[0]:.2f} s to {one.time[1]:.2f} s"
+        span = f"{one.time[0]:z.2f} s to {one.time[1]:z.2f} s"
         yield f"{where}{span}: {replace_options(one.reason)}"
 
 
@@ -186,8 +186,8 @@ def _build_rows(work: SessionState, at: int, log: OpenLog) -> Iterator[list[ui.C
             *([log.source.name] if len(work.logs) > 1 else []),
             one.kind.value,
             f"{one.offgoing} → {one.oncoming}",
-            f"{one.torque_phase[0]:.3f} s",
-            f"{one.lockup_time:.3f} s",
+            f"{one.torque_phase[0]:z.3f} s",
+            f"{one.lockup_time:z.3f} s",
         ]
         if len(work.all_shifts) > 1:
             name = f"use of shift {label} of {log.source.name}"
