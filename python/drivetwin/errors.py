@@ -7,8 +7,14 @@ from dataclasses import dataclass, field
 
 PYTHON_WORDS = {
     "--drop-part": "Twin.drop_part()",
-    "in a channel mapping file (--channels)": "in a channel mapping file (argument 'mapping')",
-    "in a channel mapping (--channels)": "in a channel mapping (argument 'mapping')",
+    "(--channels": "(argument 'mapping'",
+    "with --channels": "with the argument 'mapping'",
+    "--method likelihood": "method='likelihood'",
+    "a --hold-out": "a held-out shift",
+    "--engine-torque and --engine-speed": "engine_torque and engine_speed",
+    "--system-pressure": "system_pressure",
+    "another --policy": "another policy",
+    "(--effort)": "(CalibrationSettings.scale_effort)",
     "(--time-limit)": "(argument 'limits')",
     "(--memory-limit)": "(argument 'limits')",
     "with --shift, such as --shift 2-3": "by its gears",

@@ -14,9 +14,17 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import DrivetwinError, FileFormatError, MappingError, UnitError
+from drivetwin.errors import (
+    DrivetwinError,
+    FileFormatError,
+    InputError,
+    MappingError,
+    TimeError,
+    UnitError,
+)
 from drivetwin.logs.arrays import read_arrays
 from drivetwin.logs.read import read_log
+from drivetwin.shifts.detect import detect_shifts
 from tests.logs.fixtures import UNITS, card, columns, write
 
 
@@ -53,6 +61,63 @@ def test_a_table_of_arrays_is_a_log(tmp_path: Path) -> None:
 @pytest.mark.parametrize("indexed", [True, False])
 def test_a_data_frame_is_a_log(tmp_path: Path, *, indexed: bool) -> None:
     compare(read_arrays(make_frame(indexed=indexed), card(tmp_path), UNITS), tmp_path)
+
+
+def test_a_frame_with_dates_or_time_spans_as_index_is_a_log(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = make_frame(indexed=True)
+    spans = pandas.to_timedelta(np.round(frame.index * 1e9), unit="ns")
+    first = pandas.Timestamp("2024-10-27 00:59:59.9")
+    vehicle = card(tmp_path)
+    for index, start in (
+        (spans, None),
+        (spans + first, "2024-10-27T00:59:59.900000000"),
+        ((spans + first.tz_localize("UTC")).tz_convert("Europe/Berlin"), "2024-10-27T00:59:59.9"),
+    ):
+        dated = frame.set_axis(index)
+        for table in (dated, dated.rename_axis("time").reset_index()):
+            log = read_arrays(table, vehicle, UNITS)
+            compare(log, tmp_path)
+            remarks = [one.text for one in log.findings if "counts from" in one.text]
+            assert len(remarks) == (start is not None)
+            assert start is None or f"first stamp, {start}" in remarks[0]
+
+
+def test_a_missing_date_is_a_typed_error(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = make_frame(indexed=True)
+    index = pandas.Timestamp("2024-05-31") + pandas.to_timedelta(frame.index, unit="s")
+    for place in (0, 100):
+        broken = index.to_series().reset_index(drop=True)
+        broken[place] = pandas.NaT
+        with pytest.raises(TimeError, match="has no time stamp"):
+            read_arrays(frame.set_axis(pandas.DatetimeIndex(broken)), card(tmp_path), UNITS)
+
+
+def test_far_stamps_count_from_the_first_of_all_signals(tmp_path: Path) -> None:
+    far = [
+        SimpleNamespace(**vars(one) | {"timestamps": one.timestamps + 1.7e9})
+        for one in list_signals()
+    ]
+    log = read_arrays(far, card(tmp_path))
+    expected = read_arrays(list_signals(), card(tmp_path))
+    for role, channel in expected.channels.items():
+        assert log[role].time == pytest.approx(channel.time, abs=1e-9)
+    assert "time counts from the first stamp, 1700000000 s." in [one.text for one in log.findings]
+
+
+@pytest.mark.parametrize("data", [5, "log.csv", np.zeros((3, 3)), [[0.0, 1.0]], None])
+def test_what_is_neither_table_nor_signals_is_refused(data: Any) -> None:
+    with pytest.raises(FileFormatError, match="neither a table nor a list of signals"):
+        read_arrays(data, None)
+
+
+def test_a_frame_in_place_of_a_path_or_log_names_the_way(tmp_path: Path) -> None:
+    frame = make_frame(indexed=True)
+    with pytest.raises(InputError, match=r"path is a DataFrame.*\n.*read_arrays"):
+        read_log(frame, card(tmp_path))
+    with pytest.raises(InputError, match=r"log is a DataFrame.*\n.*read_arrays"):
+        detect_shifts(frame, card(tmp_path))
 
 
 def test_signals_are_a_log(tmp_path: Path) -> None:

@@ -408,3 +408,36 @@ def test_times_too_far_from_zero_are_refused() -> None:
         simulate(paper_model(), torque, pressures, start, time + far)
     with pytest.raises(InputError, match="too far for a simulation"):
         simulate_sensitivities(paper_model(), torque, pressures, start, time - far, ["eta"])
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("a", "b"), "it has texts"),
+        ((["0", "1"], [1.0, 2.0]), "it has texts"),
+        (([0.0, 1.0], [1j, 2.0]), "it has complex numbers"),
+        ((np.array(["2024-01-01", "2024-01-02"], "M8[s]"), [1.0, 2.0]), "it has dates"),
+        ((np.array([0, 1], "m8[s]"), [1.0, 2.0]), "it has time spans"),
+        ((np.zeros((1, 2)), np.zeros((1, 2))), r"shape \(1, 2\)"),
+        (([0.0, 1.0, 2.0], [1.0, 2.0]), "3 times and 2 values"),
+        ((0.0, 1.0), "1 times and 1 values"),
+        (([], []), "0 times and 0 values"),
+        (([0.0, np.nan], [1.0, 2.0]), "time of a signal: sample 1 is nan"),
+        (([0.0, 1.0], [np.inf, 2.0]), "values of a signal: sample 0 is inf"),
+        (([0.0, 1.0], [None, 2.0]), "values of a signal: sample 0 is nan"),
+        (([0.0, 1.0], np.ma.masked_array([1.0, 2.0], [0, 1])), "masked values"),
+        (([1.0, 0.0], [1.0, 2.0]), "times of a signal decrease"),
+        (([0.0, 1.0], [1.0, 2.0], "x"), "delay of a signal is 'x'"),
+        (([0.0, 1.0], [1.0, 2.0], np.nan), "delay of a signal is nan"),
+    ],
+)
+def test_a_signal_takes_finite_numbers_over_rising_time_only(given: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Signal(*given)
+
+
+def test_a_state_takes_numbers_only() -> None:
+    model, time = paper_model(), np.array([0.0, 1.0])
+    torque, pressures, start = held_second_gear()
+    with pytest.raises(InputError, match="twist is 'x', a str and not a number"):
+        simulate(model, torque, pressures, replace(start, twist="x"), time)  # type: ignore[arg-type]

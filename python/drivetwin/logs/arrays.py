@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -19,6 +19,7 @@ from drivetwin.channels.names import is_time_name
 from drivetwin.channels.roles import FOR_SHIFTS
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import Demands, assemble_log
 from drivetwin.vehicle.card import VehicleCard
@@ -58,7 +59,8 @@ def read_arrays(
     data : mapping, DataFrame, or iterable of signals
         Columns by name, one of them a time [s] by its name, as `time` or `Zeit`; or a data frame,
         whose index counts as time where no column is one; or signals with `name`, `unit`,
-        `timestamps` [s] and `samples`, as `asammdf.MDF.iter_channels` gives them.
+        `timestamps` [s] and `samples`, as `asammdf.MDF.iter_channels` gives them. A time of a table
+        may be numbers [s], time spans or dates.
     card : VehicleCard or None
         Vehicle card; without one no column is a pressure.
     units : mapping of str to str, optional
@@ -83,23 +85,22 @@ def read_arrays(
     DrivetwinError
         As `read_log`.
     """
-    channels = tuple(_list_channels(data, dict(units or {}), name))
+    channels, remarks = _count_from_start(*_list_channels(data, dict(units or {}), name))
     specs = {
         role: one if isinstance(one, ChannelSpec) else ChannelSpec(one)
         for role, one in (mapping or {}).items()
     }
-    recording = RawLog(channels, source=name)
+    recording = RawLog(channels, warnings=remarks, source=name)
     log = assemble_log(recording, name, card, Mapped(specs), Demands(needed))
     return replace(log, sha256=_compute_digest(channels))
 
 
-def _list_channels(data: Any, units: Mapping[str, str], name: str) -> Iterable[RawChannel]:
-    """Yield the columns of a table, or the signals."""
+def _list_channels(
+    data: Any, units: Mapping[str, str], name: str
+) -> tuple[list[RawChannel], tuple[str, ...]]:
+    """Return the columns of a table, or the signals, and remarks on the time."""
     if not isinstance(data, Mapping) and not hasattr(data, "columns"):
-        for one in data:
-            time = _convert_to_numbers(one.timestamps, one.name, name)
-            yield _make_channel(one.name, units.get(one.name, one.unit), time, one.samples, name)
-        return
+        return [_convert_signal(one, units, name) for one in _iterate_signals(data, name)], ()
     columns = list(data.columns if hasattr(data, "columns") else data)
     times = [column for column in columns if is_time_name(str(column))]
     if not times and not hasattr(data, "index"):
@@ -108,11 +109,56 @@ def _list_channels(data: Any, units: Mapping[str, str], name: str) -> Iterable[R
             "name the column of the time stamps [s] 'time'",
             Where(file=name),
         )
-    stamps = data[times[0]] if times else data.index
-    time = _convert_to_numbers(stamps, str(times[0]) if times else "index", name)
-    for column in columns:
-        if column not in times[:1]:
-            yield _make_channel(str(column), units.get(column), time, data[column], name)
+    stamps, label = (data[times[0]], str(times[0])) if times else (data.index, "index")
+    stamps, remarks = _count_dates(stamps)
+    time = _convert_to_numbers(stamps, label, name)
+    taken = [column for column in columns if column not in times[:1]]
+    channels = [_make_channel(str(one), units.get(one), time, data[one], name) for one in taken]
+    return channels, remarks
+
+
+def _iterate_signals(data: Any, name: str) -> Iterator[Signal]:
+    """Yield the signals. Raises FileFormatError for what is neither signal nor table."""
+    signals = data if isinstance(data, Iterable) and not isinstance(data, str | bytes) else [data]
+    for one in signals:
+        if not all(hasattr(one, part) for part in ("name", "unit", "timestamps", "samples")):
+            raise FileFormatError(
+                f"a {type(data).__name__} is neither a table nor a list of signals",
+                "give columns by name, with the time among them, a data frame, or signals with "
+                "name, unit, timestamps and samples; a file is read by drivetwin.read_log",
+                Where(file=name),
+            )
+        yield one
+
+
+def _convert_signal(one: Signal, units: Mapping[str, str], name: str) -> RawChannel:
+    time = _convert_to_numbers(one.timestamps, one.name, name)
+    return _make_channel(one.name, units.get(one.name, one.unit), time, one.samples, name)
+
+
+def _count_dates(stamps: Any) -> tuple[Any, tuple[str, ...]]:
+    """Return dates as time spans from the first, with a remark; other stamps as they are.
+
+    Dates with a time zone count in UTC, so a change of the clock is no jump.
+    """
+    if getattr(getattr(stamps, "dtype", None), "tz", None) is not None:
+        stamps = stamps.to_numpy(dtype="datetime64[ns]")
+    array = np.asarray(stamps)
+    if not np.issubdtype(array.dtype, np.datetime64) or not array.size:
+        return stamps, ()
+    known = array[~np.isnat(array)]
+    if not known.size:
+        return stamps, ()
+    return array - known[0], (f"time counts from the first stamp, {known[0]}",)
+
+
+def _count_from_start(
+    channels: Sequence[RawChannel], remarks: tuple[str, ...]
+) -> tuple[tuple[RawChannel, ...], tuple[str, ...]]:
+    """Count the time of all channels from one first stamp if they start far from zero."""
+    origin = find_origin(one.time[0] for one in channels if one.time.size)
+    shifted = (replace(one, time=subtract_origin(one.time, origin)) for one in channels)
+    return tuple(shifted), (*remarks, *describe_origin(origin))
 
 
 def _make_channel(

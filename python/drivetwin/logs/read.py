@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from drivetwin.channels.units import Unit, find_unit, list_first_spellings, reso
 from drivetwin.errors import (
     DamagedChannelError,
     DrivetwinError,
+    InputError,
     PlausibilityError,
     TimeError,
     UnitError,
@@ -88,7 +90,7 @@ def read_log(
     Raises FileFormatError, MissingExtraError, MissingChannelError, MappingError, UnitError,
     TimeError, DamagedChannelError, PlausibilityError; each contains a remedy.
     """
-    path = Path(path)
+    path = _require_path(path)
     stated = mapping or Mapped({})
     if not isinstance(stated, Mapped):
         stated = read_mapping(Path(stated))
@@ -96,6 +98,16 @@ def read_log(
         log = read_recording(recording, path, card, stated, Demands(needed, sound, gearing), window)
     mappings = {} if stated.file is None else {stated.file.name: _compute_digest(stated.file)}
     return replace(log, mappings=mappings)
+
+
+def _require_path(path: object) -> Path:
+    """Return a path. Raises InputError for a table in memory and for other objects."""
+    if isinstance(path, str | os.PathLike):
+        return Path(path)
+    raise InputError(
+        f"path is a {type(path).__name__}, not the path of a file",
+        "pass a text or a pathlib.Path; drivetwin.read_arrays(data, card) reads a table in memory",
+    )
 
 
 def read_recording(

@@ -18,7 +18,7 @@ from drivetwin._native import sensitivities as native_sensitivities
 from drivetwin._native import simulate as native_simulate
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import InputError
-from drivetwin.simulation.serialize import as_array, as_json, as_names
+from drivetwin.simulation.serialize import as_array, as_json, as_names, require_number
 
 FloatArray = NDArray[np.float64]
 LossLaw = Literal["paper", "dissipative"]
@@ -182,12 +182,28 @@ class State:
 class Signal:
     """An input, linear between its samples; `time` (n,) [s], `values` (n,) SI.
 
-    The input at time t is the sample of time t - `delay` [s].
+    The input at time t is the sample of time t - `delay` [s]. Raises InputError for anything but
+    finite numbers of one axis, as many values as times and at least two, times that do not
+    decrease, and a delay that is a finite number.
     """
 
     time: FloatArray
     values: FloatArray
     delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        time, values = as_array(self.time), as_array(self.values)
+        if time.size != values.size or time.size < 2:
+            what = f"a signal of {time.size} times and {values.size} values"
+            raise InputError(what, "give as many values as times, at least two")
+        for name, numbers in (("time", time), ("values", values)):
+            if not np.isfinite(numbers).all():
+                index = int(np.argmin(np.isfinite(numbers)))
+                what = f"{name} of a signal: sample {index} is {numbers[index]}"
+                raise InputError(what, "leave out samples that are no finite numbers")
+        if (time[1:] < time[:-1]).any():
+            raise InputError("the times of a signal decrease", "sort the samples by time")
+        require_number("delay of a signal", self.delay)
 
     @property
     def arrival(self) -> FloatArray:
@@ -445,9 +461,12 @@ def require_delays(inputs: Mapping[str, Signal], by: Sequence[str]) -> None:
 
 
 def to_core_start(start: State) -> tuple[float, float, float, float, list[str]]:
-    """A start as the core takes it. Raises InputError where `locked` is a text."""
-    speeds = (start.engine_speed, start.output_speed, start.wheel_speed)
-    return (*speeds, start.twist, as_names(start.locked))
+    """A start as the core takes it. Raises InputError for what are no numbers or names."""
+    engine, output, wheel, twist = (
+        require_number(name, getattr(start, name), finite=False)
+        for name in ("engine_speed", "output_speed", "wheel_speed", "twist")
+    )
+    return engine, output, wheel, twist, as_names(start.locked)
 
 
 def _build_trajectory(

@@ -30,7 +30,7 @@ from drivetwin.simulation.element_schema import (
     refuse_faults,
 )
 from drivetwin.simulation.network_output import Request, combine_columns, resolve_output
-from drivetwin.simulation.serialize import as_json, as_names
+from drivetwin.simulation.serialize import as_json, as_names, require_number
 
 Element = Mapping[str, Any]
 OutputKind = Literal[
@@ -66,14 +66,31 @@ class Sine:
     phase: float = 0.0
     offset: float = 0.0
 
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            require_number(f"{name} of a sine", value)
+
 
 @dataclass(frozen=True)
 class Start:
-    """Speeds of nodes [rad/s], twists of shafts [rad] (0 where absent), elements without slip."""
+    """Speeds of nodes [rad/s], twists of shafts [rad] (0 where absent), elements without slip.
+
+    Raises InputError for anything but mappings of names to finite numbers, and a list of names.
+    """
 
     speeds: Mapping[str, float]
     twists: Mapping[str, float] = field(default_factory=dict)
     locked: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for word, numbers in (("speed", self.speeds), ("twist", self.twists)):
+            if not isinstance(numbers, Mapping):
+                what = f"{word}s of a start are a {type(numbers).__name__}, not a mapping"
+                raise InputError(what, f"give each {word} by name, as {{'a': 10.0}}")
+            as_names(list(numbers))
+            for name, value in numbers.items():
+                require_number(f"{word} of {name!r} in a start", value)
+        as_names(self.locked)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,16 @@ def _iterate_leaves(path: str, value: object) -> Iterator[tuple[str, float]]:
 
 
 def as_array(values: FloatArray) -> FloatArray:
-    """Values (n,) as the core takes them: float64 without gaps. Raises InputError for others."""
+    """Values (n,) as the core takes them: float64 without gaps. Raises InputError for others.
+
+    Texts, dates and complex numbers are no numbers here, even where NumPy converts them.
+    """
+    kind = np.asarray(values).dtype.kind
+    if kind not in "fiubO":
+        given = _KINDS.get(kind, "others")
+        raise InputError(f"an array without numbers: it has {given}", "give real numbers in SI")
+    if np.ma.is_masked(values):
+        raise InputError("an array with masked values", "leave these samples out")
     try:
         column = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -68,10 +78,27 @@ def as_array(values: FloatArray) -> FloatArray:
     return column
 
 
+_KINDS = {"U": "texts", "S": "texts", "c": "complex numbers", "M": "dates", "m": "time spans"}
+"""Kinds of arrays of NumPy that are refused."""
+
+
+def require_number(name: str, value: object, *, finite: bool = True) -> float:
+    """Return a number in SI. Raises InputError for what is none, or not `finite`."""
+    plain = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    if not isinstance(plain, Real):
+        what = f"{name} is {value!r}, a {type(value).__name__} and not a number"
+        raise InputError(what, "give a number in SI")
+    if finite and not np.isfinite(float(plain)):
+        raise InputError(f"{name} is {float(plain)}", "give a finite number in SI")
+    return float(plain)
+
+
 def as_names(names: Sequence[str]) -> list[str]:
-    """Names as the core takes them. Raises InputError for a text, which is no list of names."""
+    """Names as the core takes them. Raises InputError for what is no list of texts."""
     if isinstance(names, str):
         raise InputError(
             f"the text {names!r} where a list of names is needed", f"write ({names!r},)"
         )
+    if not isinstance(names, Iterable) or not all(isinstance(one, str) for one in names):
+        raise InputError(f"{names!r} where a list of names is needed", "give a tuple of texts")
     return list(names)

@@ -56,7 +56,7 @@ _PHRASES = (
         "correct it in the step Channels",
     ),
     (r" \('drivetwin inspect LOG --write-mapping[^']*' begins one\)", ""),
-    (r" \(examine --friction free\)", ""),
+    (r" \('drivetwin examine --friction free'\)", ""),
     (
         "use --drop-part to leave that out",
         "export twin.toml; the command line exports models from it without that",

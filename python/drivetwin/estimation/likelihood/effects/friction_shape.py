@@ -84,7 +84,7 @@ EFFECT = Effect(
     0.002,
     "engineering estimate: friction curves of paper linings scatter about a Stribeck law by 1 to "
     "2 % of μ",
-    "compare with friction of free shape (examine --friction free)",
+    "compare with friction of free shape ('drivetwin examine --friction free')",
     build,
     random=True,
 )
