@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ import pytest
 
 from drivetwin.channels.read_options import BusOptions, ReadOptions
 from drivetwin.errors import DamagedChannelError, MissingChannelError
+from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.formats.frames import Message, Signal, build_frames
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
 from tests.fuzz.seeds import SEEDS, candump
@@ -55,6 +58,7 @@ def test_percent_torque_becomes_torque(log: Path) -> None:
     assert friction.values == pytest.approx(np.full(200, 200.0))
     net = found["EngNetTorque"]
     assert net.values == pytest.approx(np.full(net.values.size, 1300.0))
+    assert "1 samples without friction torque left out" in net.notes
     assert net.time.tolist() == actual.time[1:].tolist()  # before the first friction: unknown
 
 
@@ -141,3 +145,63 @@ def test_the_mapping_file_names_the_dbc(tmp_path: Path) -> None:
     path = tmp_path / "map.toml"
     path.write_text('[bus]\ndbc = ["bus.dbc"]\nreference_torque_Nm = 1109.0\n')
     assert read_mapping(path).options.bus == BusOptions((tmp_path / "bus.dbc",), 1109.0)
+
+
+WHOLE = Signal("speed", 0, 8, unit="rpm")
+SWITCH = Signal("switch", 0, 8)
+PARTS = tuple(
+    Signal(f"part{code}", 8, 8, unit="rpm", selector=(SWITCH, frozenset((code,))))
+    for code in (0, 1)
+)
+
+
+def record(
+    stamps: Sequence[float], payloads: Sequence[bytes], signals: tuple[Signal, ...] = (WHOLE,)
+) -> BusRecording:
+    """Return a recording of one message that is not J1939."""
+    count = len(stamps)
+    frames = build_frames(stamps, [0x123] * count, [False] * count, payloads, ["can0"] * count)
+    message = Message("M", 0x123, extended=False, j1939=False, signals=signals)
+    return BusRecording(frames, [message], BusOptions(), Path("bus.log"))
+
+
+def test_frames_whose_stamps_run_back_are_left_out_and_counted() -> None:
+    """The frames 10 and 11 come late, behind frame 12."""
+    order = [*range(10), 12, 10, 11, *range(13, 20)]
+    channel = record([0.01 * k for k in order], [bytes([k]) for k in order]).load(0)
+    assert channel.values.tolist() == [*range(10), 12, *range(13, 20)]
+    assert np.all(np.diff(channel.time) > 0.0)
+    assert channel.notes == ("2 frames with an earlier stamp left out",)
+
+
+def test_repeated_stamps_are_left_out_and_counted_for_each_signal() -> None:
+    stamps = np.round(0.007 * np.arange(20), 2)
+    channel = record(stamps.tolist(), [bytes([k]) for k in range(20)]).load(0)
+    count = 20 - np.unique(stamps).size
+    assert channel.notes == (f"{count} repeated frames left out",)
+    assert channel.values.size == np.unique(stamps).size
+
+
+def test_frames_of_a_multiplexer_with_one_stamp_are_no_repeats() -> None:
+    stamps = np.repeat(0.01 * np.arange(15), 2).tolist()
+    payloads = [bytes([code, k]) for k in range(15) for code in (0, 1)]
+    recording = record(stamps, payloads, PARTS)
+    for index in (0, 1):
+        channel = recording.load(index)
+        assert channel.values.tolist() == list(range(15))
+        assert channel.notes == ()
+
+
+def test_short_frames_are_left_out_and_counted() -> None:
+    payloads = [bytes([0, k]) if k % 5 else bytes([0]) for k in range(20)]
+    channel = record([0.01 * k for k in range(20)], payloads, PARTS[:1]).load(0)
+    assert channel.notes == ("4 frames too short for the signal left out",)
+    assert channel.values.size == 16
+
+
+@pytest.mark.parametrize("first", [0.0, 1e4], ids=["clock set back", "one stamp far ahead"])
+def test_a_clock_that_runs_back_for_long_refuses_the_signal(first: float) -> None:
+    stamps = [first or 5.0, *(0.01 * k for k in range(1, 300))]
+    recording = record(stamps, [bytes([k % 200]) for k in range(300)])
+    with pytest.raises(DamagedChannelError, match="299 of 300 frames have an earlier stamp"):
+        recording.load(0)

@@ -143,10 +143,15 @@ def select_valid_payloads(
 
     A multiplexer may itself be multiplexed; then only some payloads contain it.
     """
-    there: NDArray[np.bool_] = np.asarray(length >= signal.end)
-    if signal.selector is not None:
-        switch, allowed = signal.selector
-        there &= np.isin(decode_codes(data, switch), list(allowed)) & select_valid_payloads(
-            data, length, switch
-        )
-    return there
+    return np.asarray(length >= signal.end) & select_addressed_payloads(data, length, signal)
+
+
+def select_addressed_payloads(
+    data: Bytes, length: NDArray[np.uint8] | NDArray[np.intp], signal: Signal
+) -> NDArray[np.bool_]:
+    """Select the payloads (n,) whose multiplexer selects the signal, of any length."""
+    if signal.selector is None:
+        return np.ones(len(data), np.bool_)
+    switch, allowed = signal.selector
+    chosen = np.isin(decode_codes(data, switch), list(allowed))
+    return chosen & select_valid_payloads(data, length, switch)

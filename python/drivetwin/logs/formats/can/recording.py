@@ -18,6 +18,7 @@ from drivetwin.logs.formats.can.database import (
     decode_codes,
     decode_physical,
     list_databases,
+    select_addressed_payloads,
     select_valid_payloads,
 )
 from drivetwin.logs.formats.frames import Frames, Message, Signal
@@ -121,6 +122,9 @@ class BusRecording:
                 f"the database does not fit the frames: {fault}", "use the DBC of this bus", where
             ) from None
         notes = []
+        short = select_addressed_payloads(track.data, track.length, signal) & ~there
+        if short.any():
+            notes.append(f"{int(short.sum())} frames too short for the signal left out")
         if track.message.j1939 and raw is not None:
             check = check_codes(raw[there], values[there], signal)
             if check.note:
@@ -130,10 +134,8 @@ class BusRecording:
         if named.any():
             notes.append(f"{int(named.sum())} samples whose text is no number left out")
             there &= ~named
-        again = _find_repeats(track) & there
-        if again.any():
-            notes.append(f"{int(again.sum())} repeated frames, or with an earlier stamp, left out")
-            there &= ~again
+        there, order = _select_ordered(track, there, where)
+        notes += order
         if not there.any():
             raise DamagedChannelError(
                 notes[0] if notes else "no frame holds this signal", "map another channel", where
@@ -229,13 +231,42 @@ def _make_marked_column(entry: _Entry) -> Column:
         return replace(entry.column, empty=True, silent=True)
 
 
-def _find_repeats(track: Track) -> NDArray[np.bool_]:
-    """Frames (n,) that do not come after the one before, or of J1939 repeat it at once."""
-    later = np.diff(track.time)
-    again = later <= 0.0
+def _select_ordered(
+    track: Track, there: NDArray[np.bool_], where: Where
+) -> tuple[NDArray[np.bool_], list[str]]:
+    """Select, of the frames that are `there` (n,), those in order of time; return also the notes.
+
+    Frames are left out that do not come after all before, or of J1939 repeat the one before at
+    once. Raises DamagedChannelError where more than `_MOST_EARLIER` of the stamps run back, as
+    after a clock that was set: it is not known which part is right.
+    """
+    rows = np.flatnonzero(there)
+    time, data = track.time[rows], track.data[rows]
+    latest = np.maximum.accumulate(time)[:-1]
+    earlier, again = time[1:] < latest, time[1:] == latest
     if track.message.j1939:
-        again |= (later < REPEATED) & np.all(track.data[1:] == track.data[:-1], axis=1)
-    return np.concatenate(([False], again))
+        same = np.all(data[1:] == data[:-1], axis=1)
+        again |= ~earlier & (np.diff(time) < REPEATED) & same
+    counts = int(earlier.sum()), int(again.sum())
+    if counts[0] > max(_FEW_EARLIER, _MOST_EARLIER * rows.size):
+        at = float(time[1:][earlier][0])
+        raise DamagedChannelError(
+            f"{counts[0]} of {rows.size} frames have an earlier stamp than one before them",
+            "export the recordings one by one, or with a clock that runs on",
+            replace(where, time=at),
+        )
+    kept = there.copy()
+    kept[rows[1:][earlier | again]] = False
+    texts = ("frames with an earlier stamp", "repeated frames")
+    pairs = zip(counts, texts, strict=True)
+    return kept, [f"{count} {text} left out" for count, text in pairs if count]
+
+
+_MOST_EARLIER = 0.01
+"""Share of a signal's frames that may have an earlier stamp than one before: threads of a logger
+that overtake each other."""
+_FEW_EARLIER = 3
+"""Such frames that a short log may have [count]."""
 
 
 def _describe_sender(track: Track) -> tuple[int | None, int]:

@@ -59,7 +59,9 @@ def compute_net_torque(actual: RawChannel, friction: RawChannel) -> RawChannel:
     """
     values: FloatArray = actual.values - _make_channel(friction).interpolate(actual.time)
     known = np.isfinite(values)
-    notes = tuple(dict.fromkeys((*actual.notes, *friction.notes)))
+    lost = int(known.size - known.sum())
+    missing = (f"{lost} samples without friction torque left out",) if lost else ()
+    notes = tuple(dict.fromkeys((*actual.notes, *friction.notes, *missing)))
     return RawChannel(NET_TORQUE, UNIT, actual.time[known], values[known], actual.group, notes)
 
 
