@@ -425,7 +425,7 @@ def test_times_too_far_from_zero_are_refused() -> None:
         (([0.0, np.nan], [1.0, 2.0]), "time of a signal: sample 1 is nan"),
         (([0.0, 1.0], [np.inf, 2.0]), "values of a signal: sample 0 is inf"),
         (([0.0, 1.0], [None, 2.0]), "values of a signal: sample 0 is nan"),
-        (([0.0, 1.0], np.ma.masked_array([1.0, 2.0], [0, 1])), "masked values"),
+        (([0.0, 1.0], np.ma.masked_array([1.0, 2.0], np.array([False, True]))), "masked values"),
         (([1.0, 0.0], [1.0, 2.0]), "times of a signal decrease"),
         (([0.0, 1.0], [1.0, 2.0], "x"), "delay of a signal is 'x'"),
         (([0.0, 1.0], [1.0, 2.0], np.nan), "delay of a signal is nan"),

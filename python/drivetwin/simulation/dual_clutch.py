@@ -18,7 +18,13 @@ from drivetwin._native import sensitivities as native_sensitivities
 from drivetwin._native import simulate as native_simulate
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import InputError
-from drivetwin.simulation.serialize import as_array, as_json, as_names, require_number
+from drivetwin.simulation.serialize import (
+    as_array,
+    as_json,
+    as_names,
+    require_number,
+    require_samples,
+)
 
 FloatArray = NDArray[np.float64]
 LossLaw = Literal["paper", "dissipative"]
@@ -192,17 +198,7 @@ class Signal:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        time, values = as_array(self.time), as_array(self.values)
-        if time.size != values.size or time.size < 2:
-            what = f"a signal of {time.size} times and {values.size} values"
-            raise InputError(what, "give as many values as times, at least two")
-        for name, numbers in (("time", time), ("values", values)):
-            if not np.isfinite(numbers).all():
-                index = int(np.argmin(np.isfinite(numbers)))
-                what = f"{name} of a signal: sample {index} is {numbers[index]}"
-                raise InputError(what, "leave out samples that are no finite numbers")
-        if (time[1:] < time[:-1]).any():
-            raise InputError("the times of a signal decrease", "sort the samples by time")
+        require_samples(self.time, self.values)
         require_number("delay of a signal", self.delay)
 
     @property

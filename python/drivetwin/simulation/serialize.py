@@ -78,6 +78,21 @@ def as_array(values: FloatArray) -> FloatArray:
     return column
 
 
+def require_samples(time: FloatArray, values: FloatArray) -> None:
+    """Raise InputError for what are no samples of a signal: `time` (n,) [s], `values` (n,)."""
+    time, values = as_array(time), as_array(values)
+    if time.size != values.size or time.size < 2:
+        what = f"a signal of {time.size} times and {values.size} values"
+        raise InputError(what, "give as many values as times, at least two")
+    for name, numbers in (("time", time), ("values", values)):
+        if not np.isfinite(numbers).all():
+            index = int(np.argmin(np.isfinite(numbers)))
+            what = f"{name} of a signal: sample {index} is {numbers[index]}"
+            raise InputError(what, "leave out samples that are no finite numbers")
+    if (time[1:] < time[:-1]).any():
+        raise InputError("the times of a signal decrease", "sort the samples by time")
+
+
 _KINDS = {"U": "texts", "S": "texts", "c": "complex numbers", "M": "dates", "m": "time spans"}
 """Kinds of arrays of NumPy that are refused."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Help of all commands is for users: no types of Python, no marks of documents."""
+"""Help of all commands, which groups build: no types of Python, no marks of documents."""
 
 from __future__ import annotations
 
