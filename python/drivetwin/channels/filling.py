@@ -78,6 +78,10 @@ class FillingSettings:
     """Lines of the spectrum on each side that show its level [count]."""
     periods: int = 12
     """Most periods tried [count]."""
+    longest_cycle: int = 16
+    """Longest cycle of values that knots may reproduce by coincidence [count]: knots at least 2.4
+    samples apart with two unknowns each leave a cycle of 13 samples at least three numbers to meet,
+    each to a hundredth."""
     chance: float = 1e-9
     """Probability from which on chance may have made a line of the spectrum of bends."""
     exact: float = 0.01
@@ -174,6 +178,8 @@ def _find_in_window(time: FloatArray, values: FloatArray) -> KnotFit | Filling |
     Knots of half the period reproduce the record as well, so that of several rasters the longest
     is taken.
     """
+    if _is_cycle(values):
+        return None
     step = float(time[-1] - time[0]) / (time.size - 1)
     passed: list[KnotFit] = []
     for period in _list_periods(values):
@@ -193,6 +199,19 @@ def _find_in_window(time: FloatArray, values: FloatArray) -> KnotFit | Filling |
     best = min(passed, key=lambda one: one.misfit)
     enough = max(FILLING.as_good * best.misfit, FILLING.nothing * best.misfit_between)
     return max((one for one in passed if one.misfit <= enough), key=lambda one: one.period)
+
+
+def _is_cycle(values: FloatArray) -> bool:
+    """Return True if samples are nearer to those a few samples before than to their neighbours.
+
+    A sample that was interpolated lies between two knots, so it is nearer to its neighbours than to
+    samples of other knots. A cycle of values, as the numbers of parameters that a bus sends in
+    turn, is the other way round. Its residuals repeat with it: that knots reproduce one round is a
+    coincidence of a few numbers, and the other rounds are no further evidence.
+    """
+    beside = np.abs(np.diff(values)).sum() / (values.size - 1)
+    rounds = range(2, min(FILLING.longest_cycle, values.size - 1) + 1)
+    return any(np.mean(np.abs(values[lag:] - values[:-lag])) < beside for lag in rounds)
 
 
 def _list_periods(values: FloatArray) -> list[float]:

@@ -186,11 +186,10 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """An input, linear between its samples; `time` (n,) [s], `values` (n,) SI.
+    """An input, linear between its samples; `time` (n,) [s], `values` (n,) SI, n > 1.
 
     The input at time t is the sample of time t - `delay` [s]. Raises InputError for anything but
-    finite numbers of one axis, as many values as times and at least two, times that do not
-    decrease, and a delay that is a finite number.
+    finite numbers, and where time decreases.
     """
 
     time: FloatArray
@@ -198,8 +197,7 @@ class Signal:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        require_samples(self.time, self.values)
-        require_number("delay of a signal", self.delay)
+        require_samples(self.time, self.values, self.delay)
 
     @property
     def arrival(self) -> FloatArray:
@@ -458,11 +456,9 @@ def require_delays(inputs: Mapping[str, Signal], by: Sequence[str]) -> None:
 
 def to_core_start(start: State) -> tuple[float, float, float, float, list[str]]:
     """A start as the core takes it. Raises InputError for what are no numbers or names."""
-    engine, output, wheel, twist = (
-        require_number(name, getattr(start, name), finite=False)
-        for name in ("engine_speed", "output_speed", "wheel_speed", "twist")
-    )
-    return engine, output, wheel, twist, as_names(start.locked)
+    names = ("engine_speed", "output_speed", "wheel_speed", "twist")
+    engine, out, wheel, twist = (require_number(n, getattr(start, n), finite=False) for n in names)
+    return engine, out, wheel, twist, as_names(start.locked)
 
 
 def _build_trajectory(

@@ -78,8 +78,9 @@ def as_array(values: FloatArray) -> FloatArray:
     return column
 
 
-def require_samples(time: FloatArray, values: FloatArray) -> None:
-    """Raise InputError for what are no samples of a signal: `time` (n,) [s], `values` (n,)."""
+def require_samples(time: FloatArray, values: FloatArray, delay: float) -> None:
+    """Raise InputError for what is no signal: `time` (n,) [s], `values` (n,), `delay` [s]."""
+    require_number("delay of a signal", delay)
     time, values = as_array(time), as_array(values)
     if time.size != values.size or time.size < 2:
         what = f"a signal of {time.size} times and {values.size} values"
