@@ -10,11 +10,14 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch_log
 from benchmarks.estimation.rough_count import FAR
 from benchmarks.estimation.validity import judge
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
+from drivetwin.estimation.identification import Identification
 from drivetwin.findings import Code, sort_by_severity
 from drivetwin.logs.quality.consistency_checks import check_final_drive
 from drivetwin.pipeline import identify
@@ -110,6 +113,12 @@ ENTRIES = (
     WrongEntry("gain of one clutch x10", scale_gains(10.0, "B3"), r"gain of B3"),
     WrongEntry("gain of one clutch x0.1", scale_gains(0.1, "B3"), r"gain of B3"),
     WrongEntry("gain of both x10", scale_gains(10.0, "B2", "B3"), r"gain of B[23]"),
+    WrongEntry("gain of on-coming x1.4", scale_gains(1.4, "B3"), r"[gG]ain of B3|Friction of B3"),
+    WrongEntry("gain of on-coming x0.7", scale_gains(0.7, "B3"), r"[gG]ain of B3|Friction of B3"),
+    WrongEntry("gain of off-going x1.4", scale_gains(1.4, "B2"), r"Friction of B2"),
+    WrongEntry("gain of off-going x0.7", scale_gains(0.7, "B2"), r"Friction of B2"),
+    WrongEntry("gain of both x1.4", scale_gains(1.4, "B2", "B3"), r"Friction of B3"),
+    WrongEntry("gain of both x0.7", scale_gains(0.7, "B2", "B3"), r"Friction of B3"),
     WrongEntry("ratio +1 %", scale_ratio, r"ratio"),
     WrongEntry("final drive +3 %", scale_final_drive, r"final_drive"),
     WrongEntry("P0 +0.5 bar", raise_fill_pressure, r"P0"),
@@ -129,6 +138,17 @@ ENTRIES = (
 )
 
 
+def describe_product(found: Identification, made: MismatchLog) -> str:
+    """Return where the true μ times gain of B3 lies in its interval, and the verdict."""
+    law = made.recorded.truth.friction["B3"]
+    one, curve = found.estimates.get("mu_gain.B3"), found.friction.get("B3")
+    if one is None or one.value is None or not one.std_total or curve is None:
+        return "none"
+    mu = float(law.evaluate(np.array([curve.middle_slip]))[0])
+    true = made.card.elements["B3"].gain.value * mu
+    return f"{(one.value - true) / one.std_total:+.1f} std, {one.verdict.value}"
+
+
 def check_entry(number: int, seed: int) -> str:
     """Identify with one wrong entry, and return the outcome in words."""
     entry = ENTRIES[number]
@@ -144,6 +164,7 @@ def check_entry(number: int, seed: int) -> str:
         found = attach_validation(found, build_twin(found, card), log)
     except DrivetwinError as error:
         return f"{entry.name:36s} refused: {error.what}"
+    product = describe_product(found, made)
     row = judge(seed, "", 0.0, found, made.recorded.truth.parameters)
     far = [f"{name} {z:+.0f}" for name, z in row.identified.items() if abs(z) > FAR]
     suspects = [one.text for one in found.findings if one.code is Code.CARD_SUSPECT]
@@ -151,7 +172,7 @@ def check_entry(number: int, seed: int) -> str:
     place = next((k for k, text in enumerate(texts, 1) if re.search(entry.named, text)), 0)
     return (
         f"{entry.name:36s} {found.status.value:17s} identified {len(row.identified)}, far {far}, "
-        f"named at place {place} of {len(texts)}"
+        f"named at place {place} of {len(texts)}; mu_gain.B3 {product}"
     )
 
 
@@ -159,9 +180,12 @@ def main() -> None:
     """Print the outcome of every wrong entry."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=2)
+    parser.add_argument("--entries", default="", help="pattern of the names of entries; all")
+    parser.add_argument("--workers", type=int, default=None)
     given = parser.parse_args()
-    with ProcessPoolExecutor() as pool:
-        for line in pool.map(partial(check_entry, seed=given.seed), range(len(ENTRIES))):
+    chosen = [k for k, one in enumerate(ENTRIES) if re.search(given.entries, one.name)]
+    with ProcessPoolExecutor(given.workers) as pool:
+        for line in pool.map(partial(check_entry, seed=given.seed), chosen):
             print(line, flush=True)
 
 

@@ -91,6 +91,7 @@ class Code(StrEnum):
     SIMULATION_OUTSIDE_SPREAD = auto()
     GAIN_NOT_DETERMINED = auto()
     FRICTION_IMPLAUSIBLE = auto()
+    FRICTION_IMPOSSIBLE = auto()
     EFFICIENCY_IMPLAUSIBLE = auto()
     CARD_SUSPECT = auto()
     RESIDUAL_UNEXPLAINED = auto()

@@ -15,6 +15,7 @@ from drivetwin.estimation.result.spread import PredictedSpread
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Code, report
 from drivetwin.validation.gate import assess_model
+from drivetwin.vehicle.spec import PriorValue
 from tests.report.sample import TIME, identification, validation
 
 
@@ -65,3 +66,39 @@ def test_an_unexplained_residual_is_not_valid_whatever_is_missing() -> None:
 def test_only_a_valid_model_is_confirmed() -> None:
     confirmed = {one for one in ModelStatus if one.is_confirmed}
     assert confirmed == {ModelStatus.VALID, ModelStatus.LIMITED}
+
+
+ASSUMED = PriorValue(0.027, 0.005, assumed=True)
+
+
+@pytest.mark.parametrize(
+    ("factor", "gain", "status", "code"),
+    [
+        (1.0, PriorValue(0.027), ModelStatus.VALID, None),
+        (1.4, PriorValue(0.027), ModelStatus.VALID, Code.GAIN_SUSPECT),
+        (10.0, PriorValue(0.027), ModelStatus.NOT_VALID, Code.FRICTION_IMPOSSIBLE),
+        (0.1, PriorValue(0.027), ModelStatus.NOT_VALID, Code.FRICTION_IMPOSSIBLE),
+        (10.0, ASSUMED, ModelStatus.LIMITED, Code.FRICTION_IMPLAUSIBLE),
+    ],
+)
+def test_a_card_with_an_impossible_gain_makes_no_valid_model(
+    factor: float, gain: PriorValue, status: ModelStatus, code: Code | None
+) -> None:
+    """The log determines μ times gain, so that μ falls as the gain on the card rises."""
+    found, stated = _simulated(90.0, 10.0), gain.scale(factor)
+    (curve,) = found.friction.values()
+    scaled = replace(
+        curve, mu=curve.mu / factor, mu_lo=curve.mu_lo / factor, mu_hi=curve.mu_hi / factor
+    ).add_gain_spread(stated)
+    suspect = report(
+        Code.GAIN_SUSPECT, element="B3", mu=0.1, gain=stated.value, low=0.02, high=0.03
+    )
+    suspects = () if factor == 1.0 else (suspect,)
+    judged = assess_model(replace(found, friction={"B3": scaled}, findings=suspects))
+    assert judged.status is status
+    named = {Code.GAIN_SUSPECT, Code.FRICTION_IMPOSSIBLE, Code.FRICTION_IMPLAUSIBLE}
+    assert [one.code for one in judged.findings if one.code in named] == [code] * (code is not None)
+    if code is Code.FRICTION_IMPOSSIBLE:
+        numbers = next(one for one in judged.findings if one.code is code).numbers
+        assert numbers["least"].value < 0.027 < numbers["most"].value
+        assert judged.estimates["eta"].verdict is Verdict.WEAK

@@ -15,11 +15,12 @@ import numpy as np
 
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.estimation.result.friction_verdict import USUAL_FRICTION
 from drivetwin.estimation.result.spread import PredictedSpread
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.estimation.result.verdict import apply_errors
-from drivetwin.findings import Code, Finding, Row, Severity, make_row, report
+from drivetwin.findings import Code, Finding, Number, Row, Severity, Value, make_row, report
 from drivetwin.validation.starting_values import withhold_starting_values
 from drivetwin.validation.suspects import find_suspects, find_undetermined_gains
 
@@ -34,7 +35,8 @@ class GateSettings:
     largest_error: float = 5.0
     """Root mean square error of a phase over the predicted spread from which it is no chance."""
     friction: tuple[float, float] = (0.03, 0.3)
-    """Range of μ of wet clutches; outside it the clutch gain on the card is wrong."""
+    """Range of μ that a wet clutch can have: sintered linings have 0.05 to 0.1, paper 0.09 to 0.15.
+    Outside it the clutch gain on the card is wrong."""
     least_efficiency: float = 0.7
     """Least efficiency of a gearbox; the torque of an output in lb·ft taken for N·m gives 0.74 of
     the true one."""
@@ -49,13 +51,16 @@ def assess_model(found: Identification) -> Identification:
     Two questions are apart. The values may be trusted if the fit explains the log and no phase of
     the simulation leaves its predicted spread. The twin can replay the log if the simulation also
     explains most of what moves; a poor fit within its spread is a remark. A likelihood that reached
-    no plausible minimum fails too. A model that fails keeps its values, none of them identified,
-    and a finding names the entries of the card that are most likely wrong.
+    no plausible minimum fails too, and so does one with a friction that no clutch can have: its
+    card contradicts it. A model that fails keeps its values, none of them identified, and a finding
+    names the entries of the card that are most likely wrong.
     """
     found = withhold_starting_values(found)
     noisy, missing = _check_fit(found)
+    impossible, implausible = _check_friction(found)
     failures = [*missing, *_check_runs(found), *_check_spread(found), *_check_efficiency(found)]
-    doubts = [*noisy, *_check_friction(found)]
+    failures += impossible
+    doubts = [*noisy, *implausible]
     estimates = apply_errors(found.estimates, failures)
     refuted = bool(failures or found.evidence.gave_up) or _is_unexplained(found)
     suspects = find_suspects(found, friction=GATE.friction) if refuted or doubts else []
@@ -67,7 +72,13 @@ def assess_model(found: Identification) -> Identification:
     else:
         limited = bool(doubts) or _has_limits(found)
         status = ModelStatus.LIMITED if limited else ModelStatus.VALID
-    findings = (*failures, *doubts, *suspects, *found.findings)
+    named = {one.names["element"] for one in (*impossible, *implausible)}
+    rest = (
+        one
+        for one in found.findings
+        if one.code is not Code.GAIN_SUSPECT or one.names["element"] not in named
+    )
+    findings = (*failures, *doubts, *suspects, *rest)
     return replace(found, estimates=estimates, findings=findings, status=status)
 
 
@@ -152,13 +163,29 @@ def _check_phases(
             )
 
 
-def _check_friction(found: Identification) -> Iterator[Finding]:
-    """Find friction that no wet clutch has; it needs a wrong gain only."""
+def _check_friction(found: Identification) -> tuple[list[Finding], list[Finding]]:
+    """Find friction that no wet clutch has; it needs a wrong gain only.
+
+    Returns that whose band excludes every clutch, for a gain that the card states as known, and
+    other friction outside the range.
+    """
+    impossible, implausible = [], []
     low, high = GATE.friction
     for name, curve in found.friction.items():
         middle = float(np.median(curve.mu))
-        if not curve.over_eta and not curve.is_borrowed and not low <= middle <= high:
-            yield report(Code.FRICTION_IMPLAUSIBLE, element=name, mu=middle, low=low, high=high)
+        if curve.over_eta or curve.is_borrowed or low <= middle <= high:
+            continue
+        numbers: dict[str, Value] = {"mu": middle, "low": low, "high": high}
+        is_outside = float(np.median(curve.mu_hi)) < low or float(np.median(curve.mu_lo)) > high
+        if is_outside and curve.gain is not None and not curve.gain.assumed:
+            product = curve.gain.value * middle
+            least, most = (Number(product / mu, "m^3") for mu in reversed(USUAL_FRICTION))
+            gain = Number(curve.gain.value, "m^3")
+            numbers |= {"gain": gain, "least": least, "most": most}
+            impossible.append(report(Code.FRICTION_IMPOSSIBLE, element=name, **numbers))
+        else:
+            implausible.append(report(Code.FRICTION_IMPLAUSIBLE, element=name, **numbers))
+    return impossible, implausible
 
 
 def _check_efficiency(found: Identification) -> Iterator[Finding]:
