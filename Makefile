@@ -117,7 +117,8 @@ docs: $(venv)/.dev native ## build the documentation site into out/docs, warning
 	cp out/docs/README.html out/docs/index.html
 
 .PHONY: notices
-notices: $(venv)/.dev native ## write licences of crates and Python packages, and the versions for CI
+notices: $(venv)/.dev native ## write licences of crates and Python packages, versions and hashes for CI
+	$(pip) install --quiet --group lock
 	$(bin)/python -m tools.notices
 	$(bin)/python -m tools.python_packages
 

@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Write the licences and the versions of the Python packages that the project uses.
+"""Write licences, versions and hashes of the Python packages that the project uses.
 
-`python -m tools.python_packages` writes PYTHON-LICENCES.txt, with the packages that users install,
-and constraints.txt, the versions with which the build machine installs everything. It reads the
-metadata of the installed packages; call it in the development environment after a change of
-pyproject.toml or an update.
+`python -m tools.python_packages` writes PYTHON-LICENCES.txt and python-packages.cyclonedx.json with
+the packages that users install, and constraints.txt with the versions of the build machine and the
+hashes of their files. It reads the metadata of the installed packages and asks the package index
+for hashes; call it in the development environment after a change of pyproject.toml or an update.
 """
 
 from __future__ import annotations
 
+import platform
 import re
+import subprocess
 import sys
+import tempfile
 import tomllib
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from itertools import chain
 from pathlib import Path
@@ -22,28 +24,23 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from tools.sbom import Package, format_sbom
+
 ROOT = Path(__file__).resolve().parents[1]
 LICENCES = ROOT / "PYTHON-LICENCES.txt"
 CONSTRAINTS = ROOT / "constraints.txt"
+SBOM = ROOT / "python-packages.cyclonedx.json"
 _HEAD = """\
 Python packages that drivetwin installs, its extras included, with those that they need. None of
 them is part of the wheel. Written by `python -m tools.python_packages`.
 
 """
 _PINS = """\
-# Versions with which the build machine installs. Written by `python -m tools.python_packages`.
+# Versions and hashes of the files with which the build machine installs, for all platforms.
+# Written by `python -m tools.python_packages`.
 """
 _LONGEST = 80
 """Length of a licence field that is a name; longer ones are texts."""
-
-
-@dataclass(frozen=True)
-class Package:
-    """An installed package."""
-
-    name: str
-    version: str
-    licence: str
 
 
 def find_packages(requirements: Iterable[str]) -> tuple[Package, ...]:
@@ -51,11 +48,12 @@ def find_packages(requirements: Iterable[str]) -> tuple[Package, ...]:
 
     Packages for other systems or Python versions are left out; so are those that are absent.
     """
-    found: dict[str, Package] = {}
-    waiting = [(Requirement(one), "") for one in requirements]
+    found: dict[str, Distribution] = {}
+    needs: dict[str, set[str]] = {}
+    waiting = [(Requirement(one), "", "") for one in requirements]
     done: set[tuple[str, str]] = set()
     while waiting:
-        wanted, extra = waiting.pop()
+        wanted, extra, parent = waiting.pop()
         name = canonicalize_name(wanted.name)
         if wanted.marker is not None and not wanted.marker.evaluate({"extra": extra}):
             continue
@@ -63,12 +61,16 @@ def find_packages(requirements: Iterable[str]) -> tuple[Package, ...]:
             one = distribution(wanted.name)
         except PackageNotFoundError:
             continue
-        found[name] = Package(name, one.version, read_licence(one))
+        found[name] = one
+        needs.setdefault(parent, set()).add(name)
         for own in ("", *wanted.extras):
             if (name, own) not in done:
                 done.add((name, own))
-                waiting += [(Requirement(text), own) for text in one.requires or ()]
-    return tuple(found[name] for name in sorted(found))
+                waiting += [(Requirement(text), own, name) for text in one.requires or ()]
+    return tuple(
+        Package(name, one.version, read_licence(one), frozenset(needs.get(name, ())))
+        for name, one in sorted(found.items())
+    )
 
 
 def read_licence(one: Distribution) -> str:
@@ -89,7 +91,7 @@ def read_licence(one: Distribution) -> str:
 
 def list_requirements(*, development: bool) -> list[str]:
     """Return the requirements of the project with its extras, and of `development` if asked for."""
-    document: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    document = _read_project()
     project = document["project"]
     texts = [*project["dependencies"], *chain(*project["optional-dependencies"].values())]
     if development:
@@ -98,22 +100,47 @@ def list_requirements(*, development: bool) -> list[str]:
     return [text for text in texts if not re.match(r"drivetwin\b", text)]
 
 
+def _read_project() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
 def format_licences(packages: Iterable[Package]) -> str:
     """Return the table of licences."""
     return _HEAD + "".join(f"{one.name} {one.version}: {one.licence}\n" for one in packages)
 
 
-def format_constraints(packages: Iterable[Package]) -> str:
-    """Return the versions in the form of pip's constraints."""
-    return _PINS + "".join(f"{one.name}=={one.version}\n" for one in packages)
+def format_python_sbom(packages: Sequence[Package]) -> str:
+    """Return the CycloneDX list of the packages that users install."""
+    asked = list_requirements(development=False)
+    always = find_packages(_read_project()["project"]["dependencies"])
+    direct = {canonicalize_name(Requirement(text).name) for text in asked}
+    return format_sbom(packages, direct, {one.name for one in always})
+
+
+def lock_packages(packages: Iterable[Package], path: Path) -> None:
+    """Write the versions of `packages` to `path`, with the hashes of all their files.
+
+    Packages that other platforms need are resolved to versions that fit. Raises
+    subprocess.CalledProcessError if there is no solution or no package index.
+    """
+    groups = [f"--group={name}" for name in _read_project()["dependency-groups"]]
+    kind = ("--universal", "--python-version", platform.python_version(), "--generate-hashes")
+    style = ("--no-header", "--no-annotate", "--quiet")
+    with tempfile.TemporaryDirectory() as folder:
+        pins = Path(folder) / "pins.txt"
+        pins.write_text("".join(f"{one.name}=={one.version}\n" for one in packages), "utf-8")
+        command = [sys.executable, "-m", "uv", "pip", "compile", *kind, *style, "--all-extras"]
+        files = ("--constraints", str(pins), "--output-file", str(path), "pyproject.toml")
+        subprocess.run([*command, *groups, *files], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    path.write_text(_PINS + path.read_text(encoding="utf-8"), encoding="utf-8", newline="\n")
 
 
 def main() -> int:
-    """Write both files."""
+    """Write all files."""
     used = find_packages(list_requirements(development=False))
     LICENCES.write_text(format_licences(used), encoding="utf-8", newline="\n")
-    every = find_packages(list_requirements(development=True))
-    CONSTRAINTS.write_text(format_constraints(every), encoding="utf-8", newline="\n")
+    SBOM.write_text(format_python_sbom(used), encoding="utf-8", newline="\n")
+    lock_packages(find_packages(list_requirements(development=True)), CONSTRAINTS)
     return 0
 
 

@@ -29,6 +29,12 @@ run_demo() (
     done
 )
 
+for list in drivetwin-py python-packages; do
+    if ! "$python" -m zipfile --list "$wheel" | grep -q "dist-info/sboms/$list.cyclonedx.json"; then
+        printf 'the wheel has no list of parts %s\n' "$list" >&2
+        exit 1
+    fi
+done
 "$python" -m venv "$place/venv"
 run_demo
 printf 'the wheel works without Rust: %s\n' "${wheel##*/}"

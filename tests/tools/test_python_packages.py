@@ -1,22 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Licences and versions of Python packages cover what pyproject.toml asks for."""
+"""Licences, versions and hashes of Python packages cover what pyproject.toml asks for."""
 
 from __future__ import annotations
 
+import json
 import re
 
+import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from tools.python_packages import (
     CONSTRAINTS,
     LICENCES,
-    Package,
+    SBOM,
     find_packages,
-    format_constraints,
     format_licences,
+    format_python_sbom,
     list_requirements,
 )
+from tools.sbom import Package, format_sbom
 
 ASKED = ["pydantic>=2", "absent-package", "rich; python_version < '3'"]
 
@@ -36,25 +39,63 @@ def test_every_requirement_has_its_licence() -> None:
 
 def test_the_versions_of_the_build_machine_are_fixed() -> None:
     text = CONSTRAINTS.read_text(encoding="utf-8")
-    documentation = {"sphinx", "myst-parser", "furo"}
     wanted = {
         canonicalize_name(Requirement(one).name) for one in list_requirements(development=True)
     }
-    assert wanted - documentation <= read_names(text), "write them anew: make notices"
-    fixed = dict(re.findall(r"^([\w.-]+)==(\S+)$", text, re.MULTILINE))
+    assert wanted <= read_names(text), "write them anew: make notices"
+    fixed = dict(re.findall(r"^([\w.-]+)==(\S+)", text, re.MULTILINE))
     for one in map(Requirement, list_requirements(development=True)):
         name = canonicalize_name(one.name)
-        assert name not in fixed or one.specifier.contains(fixed[name], prereleases=True), one
+        assert one.specifier.contains(fixed[name], prereleases=True), one
+
+
+def test_each_fixed_version_has_hashes() -> None:
+    """A version without one would be refused, and an address would bind CI to one index."""
+    text = CONSTRAINTS.read_text(encoding="utf-8")
+    for entry in re.split(r"\n(?=\S)", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE)):
+        assert re.search(r"--hash=sha256:[0-9a-f]{64}\b", entry), entry
+    assert "://" not in text
 
 
 def test_needed_packages_are_followed() -> None:
     found = {one.name: one for one in find_packages(ASKED)}
     assert {"pydantic", "pydantic-core", "typing-extensions"} <= set(found)
     assert found["pydantic"].licence == "MIT"
+    assert {"pydantic-core", "typing-extensions"} <= found["pydantic"].needs
     assert "rich" not in found
 
 
 def test_formats() -> None:
     packages = (Package("a", "1.0", "MIT"), Package("b", "2", "BSD"))
     assert format_licences(packages).endswith("a 1.0: MIT\nb 2: BSD\n")
-    assert format_constraints(packages).endswith("a==1.0\nb==2\n")
+
+
+def test_the_list_of_parts_is_that_of_the_licences() -> None:
+    parts = json.loads(SBOM.read_text(encoding="utf-8"))["components"]
+    text = LICENCES.read_text(encoding="utf-8")
+    lines = {f"{one['name']} {one['version']}" for one in parts}
+    assert lines == set(re.findall(r"^(\S+ \S+): ", text, re.MULTILINE)), "make notices"
+    scopes = {one["name"]: one["scope"] for one in parts}
+    assert (scopes["numpy"], scopes["typing-extensions"]) == ("required", "required")
+    assert scopes["asammdf"] == "optional"
+
+
+def test_the_list_of_parts_names_who_needs_what() -> None:
+    packages = (Package("a", "1", "MIT", frozenset({"b", "absent"})), Package("b", "2", "MIT"))
+    document = json.loads(format_sbom(packages, ["a"], ["a"]))
+    needs = {one["ref"]: one["dependsOn"] for one in document["dependencies"]}
+    assert needs == {
+        "pkg:pypi/drivetwin": ["pkg:pypi/a@1"],
+        "pkg:pypi/a@1": ["pkg:pypi/b@2"],
+        "pkg:pypi/b@2": [],
+    }
+    assert [one["scope"] for one in document["components"]] == ["required", "optional"]
+
+
+def test_the_list_of_parts_obeys_its_schema() -> None:
+    schema = pytest.importorskip("cyclonedx.schema")
+    validation = pytest.importorskip("cyclonedx.validation.json")
+    check = validation.JsonStrictValidator(schema.SchemaVersion.V1_5)
+    made = format_python_sbom(find_packages(list_requirements(development=False)))
+    for text in (made, SBOM.read_text(encoding="utf-8")):
+        assert check.validate_str(text) is None
