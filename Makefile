@@ -98,13 +98,21 @@ golden: $(venv)/.dev native ## compare 72 identifications with stored results (f
 nightly: ## what takes hours: all suites, a fleet of 300, the wheel, short fuzzing of `identify`
 	$(MAKE) $(suites:%=test-%) fault_logs=1000
 	$(MAKE) fleet fleet_logs=300
-	$(MAKE) golden test-browser test-wheel docs deny
+	$(MAKE) golden test-browser test-wheel test-reproducible docs deny
+
+# The same commit gives the same bytes: times in the wheel are that of the commit.
+wheel_build = --quiet --profile $(wheel_profile) $(flags_$(wheel_profile)) --locked
+wheel test-reproducible: export SOURCE_DATE_EPOCH = $(shell git log -1 --format=%ct)
 
 .PHONY: wheel
 wheel: $(venv)/.base ## the abi3 wheel, into dist/
 	rm -f dist/drivetwin-*.whl
-	$(bin)/maturin build --quiet --profile $(wheel_profile) $(flags_$(wheel_profile)) --locked --out dist
+	$(bin)/maturin build $(wheel_build) --out dist
 	ls dist/drivetwin-*.whl
+
+.PHONY: test-reproducible
+test-reproducible: wheel ## build the wheel twice and compare the bytes
+	tools/reproduce_wheel.sh $(CURDIR)/$(bin) dist/drivetwin-*.whl $(wheel_build)
 
 .PHONY: test-wheel
 test-wheel: wheel ## run the demo from the wheel where there is no Rust
