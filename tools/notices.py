@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Write the licences of the crates that are linked into the native module.
+"""Write the licences and the list of the crates that are linked into the native module.
 
-`python -m tools.notices` writes THIRD-PARTY-NOTICES.txt, which every wheel carries beside LICENSE;
-call it after a change of Cargo.lock. It needs cargo and the sources of the crates.
+`python -m tools.notices` writes THIRD-PARTY-NOTICES.txt, which every wheel carries beside LICENSE,
+and rust-crates.cyclonedx.json, its list of crates; call it after a change of Cargo.lock. It needs
+cargo and the sources of the crates.
 """
 
 from __future__ import annotations
@@ -11,12 +12,15 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from tools.sbom import Part, format_sbom
+
 ROOT = Path(__file__).resolve().parents[1]
 NOTICES = ROOT / "THIRD-PARTY-NOTICES.txt"
+SBOM = ROOT / "rust-crates.cyclonedx.json"
 MODULE = "drivetwin-py"
 
 _HEAD = """\
@@ -41,8 +45,16 @@ class Crate:
         return f"{self.name} {self.version}"
 
 
-def find_crates() -> tuple[Crate, ...]:
-    """Return the crates that a build for any platform links, by name.
+@dataclass(frozen=True)
+class Linked:
+    """What cargo knows of the linked crates: packages, and their dependencies, by id."""
+
+    packages: dict[str, dict[str, Any]]
+    needs: dict[str, list[str]]
+
+
+def find_linked() -> Linked:
+    """Return the crates that a build for any platform links, the project's own among them.
 
     Raises subprocess.CalledProcessError if cargo cannot resolve them.
     """
@@ -52,16 +64,38 @@ def find_crates() -> tuple[Crate, ...]:
     )
     packages = {package["id"]: package for package in metadata["packages"]}
     nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
-    found: set[str] = set()
+    needs: dict[str, list[str]] = {}
     waiting = [id for id, package in packages.items() if package["name"] == MODULE]
     while waiting:
         id = waiting.pop()
-        if id in found or _is_procedural_macro(packages[id]):
+        if id in needs or _is_procedural_macro(packages[id]):
             continue
-        found.add(id)
-        waiting += [each["pkg"] for each in nodes[id]["deps"] if _is_linked(each)]
-    foreign = (packages[id] for id in found if packages[id]["source"] is not None)
+        needs[id] = [each["pkg"] for each in nodes[id]["deps"] if _is_linked(each)]
+        waiting += needs[id]
+    return Linked({id: packages[id] for id in needs}, needs)
+
+
+def find_crates(linked: Linked) -> tuple[Crate, ...]:
+    """Return the linked crates of others with their texts, by name."""
+    foreign = (one for one in linked.packages.values() if one["source"] is not None)
     return tuple(sorted(map(_read_crate, foreign), key=str))
+
+
+def format_crate_sbom(linked: Linked) -> str:
+    """Return the CycloneDX list of the linked crates."""
+    plain = {
+        id: Part("cargo", one["name"], one["version"], one["license"])
+        for id, one in linked.packages.items()
+    }
+    parts = (
+        replace(
+            part, needs=frozenset(plain[each].url for each in linked.needs[id] if each in plain)
+        )
+        for id, part in plain.items()
+    )
+    ordered = sorted(parts, key=lambda part: part.url)
+    (root,) = (part for part in ordered if part.name == MODULE)
+    return format_sbom(root, [part for part in ordered if part is not root])
 
 
 def _is_procedural_macro(package: dict[str, Any]) -> bool:
@@ -102,8 +136,10 @@ def format_notices(crates: tuple[Crate, ...]) -> str:
 
 
 def main() -> int:
-    """Write the file."""
-    NOTICES.write_text(format_notices(find_crates()), encoding="utf-8", newline="\n")
+    """Write both files."""
+    linked = find_linked()
+    NOTICES.write_text(format_notices(find_crates(linked)), encoding="utf-8", newline="\n")
+    SBOM.write_text(format_crate_sbom(linked), encoding="utf-8", newline="\n")
     return 0
 
 

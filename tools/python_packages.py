@@ -16,6 +16,7 @@ import sys
 import tempfile
 import tomllib
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from itertools import chain
 from pathlib import Path
@@ -24,7 +25,7 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from tools.sbom import Package, format_sbom
+from tools.sbom import Part, format_sbom
 
 ROOT = Path(__file__).resolve().parents[1]
 LICENCES = ROOT / "PYTHON-LICENCES.txt"
@@ -41,6 +42,16 @@ _PINS = """\
 """
 _LONGEST = 80
 """Length of a licence field that is a name; longer ones are texts."""
+
+
+@dataclass(frozen=True)
+class Package:
+    """An installed package; `needs` are the names of the packages that it requires."""
+
+    name: str
+    version: str
+    licence: str
+    needs: frozenset[str] = frozenset()
 
 
 def find_packages(requirements: Iterable[str]) -> tuple[Package, ...]:
@@ -110,11 +121,25 @@ def format_licences(packages: Iterable[Package]) -> str:
 
 
 def format_python_sbom(packages: Sequence[Package]) -> str:
-    """Return the CycloneDX list of the packages that users install."""
+    """Return the CycloneDX list of the packages that users install, by extras if optional."""
+    always = {one.name for one in find_packages(_read_project()["project"]["dependencies"])}
     asked = list_requirements(development=False)
-    always = find_packages(_read_project()["project"]["dependencies"])
     direct = {canonicalize_name(Requirement(text).name) for text in asked}
-    return format_sbom(packages, direct, {one.name for one in always})
+    urls = {one.name: f"pkg:pypi/{one.name}@{one.version}" for one in packages}
+
+    def build(one: Package) -> Part:
+        needs = frozenset(urls[name] for name in one.needs if name in urls)
+        return Part("pypi", one.name, one.version, one.licence, needs, one.name not in always)
+
+    needs = frozenset(url for name, url in urls.items() if name in direct)
+    root = Part("pypi", "drivetwin", read_version(), "MIT", needs)
+    return format_sbom(root, [build(one) for one in packages])
+
+
+def read_version() -> str:
+    """Return the version of the project, which the crates share."""
+    document = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))
+    return str(document["workspace"]["package"]["version"])
 
 
 def lock_packages(packages: Iterable[Package], path: Path) -> None:

@@ -1,72 +1,61 @@
 # SPDX-License-Identifier: MIT
-"""CycloneDX list of the Python packages that drivetwin installs, for the wheel (PEP 770)."""
+"""CycloneDX lists of parts for the wheel (PEP 770), which name no time, place or random number."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-_ROOT = "pkg:pypi/drivetwin"
-
 
 @dataclass(frozen=True)
-class Package:
-    """An installed package; `needs` are the names of the packages that it requires."""
+class Part:
+    """A crate or a package; `needs` are the URLs of the parts that it requires.
 
+    `kind` is that of a package URL: cargo or pypi. Optional parts are those that an extra brings.
+    """
+
+    kind: str
     name: str
     version: str
     licence: str
     needs: frozenset[str] = frozenset()
+    is_optional: bool = False
 
     @property
     def url(self) -> str:
         """Package URL."""
-        return f"pkg:pypi/{self.name}@{self.version}"
+        return f"pkg:{self.kind}/{self.name}@{self.version}"
 
 
-def format_sbom(packages: Sequence[Package], direct: Iterable[str], required: Iterable[str]) -> str:
-    """Return a CycloneDX 1.5 document that is the same for the same packages.
+def format_sbom(root: Part, parts: Sequence[Part]) -> str:
+    """Return a CycloneDX 1.5 document on `root` and the parts that it consists of or installs.
 
-    `direct` are the names that drivetwin asks for itself, extras included. Packages beside those of
-    `required`, which every user installs, are optional. Versions are those of the build machine.
+    Needs that are not among the parts are left out.
     """
-    by_name = {one.name: one for one in packages}
-    always = frozenset(required)
+    known = {one.url for one in parts}
     document = {
         "$schema": "http://cyclonedx.org/schema/bom-1.5.schema.json",
         "bomFormat": "CycloneDX",
         "specVersion": "1.5",
         "version": 1,
-        "metadata": {
-            "component": {
-                "type": "library",
-                "bom-ref": _ROOT,
-                "name": "drivetwin",
-                "purl": _ROOT,
-            }
-        },
-        "components": [_describe(one, is_required=one.name in always) for one in packages],
+        "metadata": {"component": _describe(root)},
+        "components": [_describe(one) for one in parts],
         "dependencies": [
-            {"ref": _ROOT, "dependsOn": _list_urls(by_name, direct)},
-            *({"ref": one.url, "dependsOn": _list_urls(by_name, one.needs)} for one in packages),
+            {"ref": one.url, "dependsOn": sorted(one.needs & known)} for one in (root, *parts)
         ],
     }
     return json.dumps(document, indent=1) + "\n"
 
 
-def _describe(one: Package, *, is_required: bool) -> dict[str, Any]:
+def _describe(one: Part) -> dict[str, Any]:
     return {
         "type": "library",
         "bom-ref": one.url,
         "name": one.name,
         "version": one.version,
-        "scope": "required" if is_required else "optional",
+        "scope": "optional" if one.is_optional else "required",
         "licenses": [{"license": {"name": one.licence}}],
         "purl": one.url,
     }
-
-
-def _list_urls(by_name: Mapping[str, Package], names: Iterable[str]) -> list[str]:
-    return [by_name[name].url for name in sorted(names) if name in by_name]

@@ -29,7 +29,7 @@ run_demo() (
     done
 )
 
-for list in drivetwin-py python-packages; do
+for list in rust-crates python-packages; do
     if ! "$python" -m zipfile --list "$wheel" | grep -q "dist-info/sboms/$list.cyclonedx.json"; then
         printf 'the wheel has no list of parts %s\n' "$list" >&2
         exit 1

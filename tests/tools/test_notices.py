@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
-from tools.notices import NOTICES, Crate, format_notices
+from tools.notices import NOTICES, SBOM, Crate, format_notices
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -36,8 +37,17 @@ def test_what_the_project_asks_for_is_named() -> None:
     assert wanted - {"drivetwin-core", "drivetwin-table"} <= {name for name, _ in named()}
 
 
+def test_the_list_of_crates_is_that_of_the_notices() -> None:
+    parts = json.loads(SBOM.read_text(encoding="utf-8"))["components"]
+    listed = {(one["name"], one["version"]) for one in parts}
+    own = {name for name, _ in listed - named()}
+    assert own == {"drivetwin-core", "drivetwin-table"}
+    assert named() <= listed, "write them anew: make notices"
+
+
 def test_wheels_carry_them() -> None:
     assert NOTICES.name in toml("pyproject.toml")["project"]["license-files"]
+    assert SBOM.name in toml("pyproject.toml")["tool"]["maturin"]["sbom"]["include"]
 
 
 def test_a_licence_stands_once_below_all_its_crates() -> None:

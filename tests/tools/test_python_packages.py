@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import re
 
-import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -14,12 +13,11 @@ from tools.python_packages import (
     CONSTRAINTS,
     LICENCES,
     SBOM,
+    Package,
     find_packages,
     format_licences,
-    format_python_sbom,
     list_requirements,
 )
-from tools.sbom import Package, format_sbom
 
 ASKED = ["pydantic>=2", "absent-package", "rich; python_version < '3'"]
 
@@ -78,24 +76,3 @@ def test_the_list_of_parts_is_that_of_the_licences() -> None:
     scopes = {one["name"]: one["scope"] for one in parts}
     assert (scopes["numpy"], scopes["typing-extensions"]) == ("required", "required")
     assert scopes["asammdf"] == "optional"
-
-
-def test_the_list_of_parts_names_who_needs_what() -> None:
-    packages = (Package("a", "1", "MIT", frozenset({"b", "absent"})), Package("b", "2", "MIT"))
-    document = json.loads(format_sbom(packages, ["a"], ["a"]))
-    needs = {one["ref"]: one["dependsOn"] for one in document["dependencies"]}
-    assert needs == {
-        "pkg:pypi/drivetwin": ["pkg:pypi/a@1"],
-        "pkg:pypi/a@1": ["pkg:pypi/b@2"],
-        "pkg:pypi/b@2": [],
-    }
-    assert [one["scope"] for one in document["components"]] == ["required", "optional"]
-
-
-def test_the_list_of_parts_obeys_its_schema() -> None:
-    schema = pytest.importorskip("cyclonedx.schema")
-    validation = pytest.importorskip("cyclonedx.validation.json")
-    check = validation.JsonStrictValidator(schema.SchemaVersion.V1_5)
-    made = format_python_sbom(find_packages(list_requirements(development=False)))
-    for text in (made, SBOM.read_text(encoding="utf-8")):
-        assert check.validate_str(text) is None
