@@ -93,10 +93,17 @@ def test_a_card_with_an_impossible_gain_makes_no_valid_model(
     suspect = report(
         Code.GAIN_SUSPECT, element="B3", mu=0.1, gain=stated.value, low=0.02, high=0.03
     )
-    suspects = () if factor == 1.0 else (suspect,)
+    before = report(
+        Code.CARD_FRICTION_UNUSUAL, element="B3", found=1.0, unit="m³", mu=0.1, shift="2-3",
+        low=0.02, high=0.03, product=1e-3,
+    )  # fmt: skip
+    suspects = () if factor == 1.0 else (suspect, before)
     judged = assess_model(replace(found, friction={"B3": scaled}, findings=suspects))
     assert judged.status is status
-    named = {Code.GAIN_SUSPECT, Code.FRICTION_IMPOSSIBLE, Code.FRICTION_IMPLAUSIBLE}
+    named = {
+        Code.GAIN_SUSPECT, Code.FRICTION_IMPOSSIBLE, Code.FRICTION_IMPLAUSIBLE,
+        Code.CARD_FRICTION_UNUSUAL,
+    }  # fmt: skip
     assert [one.code for one in judged.findings if one.code in named] == [code] * (code is not None)
     if code is Code.FRICTION_IMPOSSIBLE:
         numbers = next(one for one in judged.findings if one.code is code).numbers

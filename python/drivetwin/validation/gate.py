@@ -8,7 +8,7 @@ its interval.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +43,12 @@ class GateSettings:
 
 
 GATE = GateSettings()
+_ON_GAIN = (
+    {Code.FRICTION_IMPOSSIBLE, Code.FRICTION_IMPLAUSIBLE},
+    {Code.GAIN_SUSPECT},
+    {Code.CARD_FRICTION_IMPLAUSIBLE, Code.CARD_FRICTION_UNUSUAL, Code.CARD_FRICTION_BOUND},
+)
+"""Findings on the gain of an element; those of a row replace those of the rows below it."""
 
 
 def assess_model(found: Identification) -> Identification:
@@ -72,14 +78,22 @@ def assess_model(found: Identification) -> Identification:
     else:
         limited = bool(doubts) or _has_limits(found)
         status = ModelStatus.LIMITED if limited else ModelStatus.VALID
-    named = {one.names["element"] for one in (*impossible, *implausible)}
-    rest = (
-        one
-        for one in found.findings
-        if one.code is not Code.GAIN_SUSPECT or one.names["element"] not in named
-    )
-    findings = (*failures, *doubts, *suspects, *rest)
+    findings = (*failures, *doubts, *suspects, *found.findings)
+    findings = _merge_gains(findings)
     return replace(found, estimates=estimates, findings=findings, status=status)
+
+
+def _merge_gains(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return the findings with one on the gain of each element, by the fit if it has one.
+
+    The checks of the card before the fit know the friction less well.
+    """
+    named: set[str] = set()
+    kept = list(findings)
+    for codes in _ON_GAIN:
+        kept = [one for one in kept if one.code not in codes or one.names["element"] not in named]
+        named |= {one.names["element"] for one in kept if one.code in codes}
+    return tuple(kept)
 
 
 def _is_unexplained(found: Identification) -> bool:
