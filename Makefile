@@ -140,6 +140,7 @@ bench: $(venv)/.dev ## measure what has a stated limit
 	$(bin)/python -m benchmarks.limits
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.calibrate
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.actuator
+	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.progress # with --write: shares of the progress shown
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.calibration_points
 	$(bin)/python -m benchmarks.export_step # writes docs/export-cost.md
 	$(bin)/python -m benchmarks.speed # writes docs/benchmarks.md

@@ -8,7 +8,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.data.actuators import (
@@ -27,6 +27,10 @@ from drivetwin.plausibility.check import check_card
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.vehicle.locks import apply_locks, collect_locks
 from drivetwin.vehicle.vehicle_card import VehicleCard
+
+_STAGES = ("preparation", "estimation")
+_BY_METHOD = {one: TimedStages(f"{one.value} identification", _STAGES) for one in Method}
+_JOINT = TimedStages("joint identification", _STAGES)
 
 
 @check_arguments
@@ -78,9 +82,12 @@ def identify(
             "the paper's method takes no fixed values, priors and bounds",
             "use the integral or the likelihood method",
         )
-    actuators = identify_actuators([LogShifts(log, shifts.shifts)], card)
-    found = identify_prepared(_prepare_checked(log, apply_locks(card, locks), shifts), method)
-    found = _attach_actuators(found, actuators)
+    stages = _BY_METHOD[method]
+    with stages.enter("preparation", "preparing the log"):
+        actuators = identify_actuators([LogShifts(log, shifts.shifts)], card)
+        prepared = _prepare_checked(log, apply_locks(card, locks), shifts)
+    with stages.enter("estimation"):
+        found = _attach_actuators(identify_prepared(prepared, method), actuators)
     if not locks:
         return found
     return replace(
@@ -115,11 +122,11 @@ def identify_jointly(
     from drivetwin.estimation.multi_log.fit import identify_joint  # loads the likelihood
 
     require_compatible(logs)
-    with scale_progress(0.0, 0.05, "preparing the logs"):
+    with _JOINT.enter("preparation", "preparing the logs"):
         pairs = list(zip(logs, shifts, strict=True))
         actuators = identify_actuators([LogShifts(log, one.shifts) for log, one in pairs], card)
         prepared = [_prepare_checked(log, card, one) for log, one in pairs]
-    with scale_progress(0.05, 1.0):
+    with _JOINT.enter("estimation"):
         return _attach_actuators(identify_joint(prepared), actuators)
 
 

@@ -99,7 +99,7 @@ def test_a_moment_under_the_mouse_is_marked_in_the_other_figures(page: Page, rep
     plot = page.locator("#shift .plot").first
     plot.scroll_into_view_if_needed()
     plot.hover(position={"x": 400, "y": 300})
-    page.wait_for_function("document.querySelector('#validation .cursor').hidden === false")
+    page.wait_for_function("() => document.querySelector('#validation .cursor').hidden === false")
     assert page.locator("#validation .cursor").first.get_attribute("data-time")
     assert page.evaluate("document.querySelector('#shift .cursor').hidden")
 

@@ -77,7 +77,8 @@ def test_a_held_out_log_is_predicted(opened: Page, pictures: Path) -> None:
     show_view(page, "model")
     page.wait_for_selector("#model-plot .js-plotly-plot")
     page.select_option("#model-log", "1")
-    expect(page.locator("#model-content")).to_contain_text("no shift of second.csv was fitted")
+    expect(page.locator("#model-content")).to_contain_text("No shift of second.csv was fitted")
+    expect(page.locator("#step-model")).to_contain_text("The log shown was not fitted")
     for width in (1440, 900):
         page.set_viewport_size({"width": width, "height": 1000})
         for scheme in SCHEMES:

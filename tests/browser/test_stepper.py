@@ -58,7 +58,7 @@ def test_all_steps_by_keyboard(shown: Page, tmp_path: Path) -> None:
     for step in ("channels", "card", "shifts", "identify"):
         _press(page, f"section:not([hidden]) button[data-go={step}]")
         expect(page.locator(f"#view-{step}")).to_be_visible()
-        page.wait_for_function("document.activeElement.tagName === 'H2'")
+        page.wait_for_function("() => document.activeElement.tagName === 'H2'")
     _press(page, "#identify")
     _wait_for_states(page, *["done"] * 4, "running", "blocked", "blocked")
     expect(page.locator(".verdict")).to_have_count(0)
@@ -160,7 +160,7 @@ def test_a_card_by_the_form(shown: Page, pictures: Path) -> None:
         page.get_by_label(f"Is the gain of {element} known").fill("gain")
         page.keyboard.press("Tab")
         expect(page.get_by_label(f"Gain N·D·A·r of {element}")).to_be_visible()
-        page.wait_for_function("document.activeElement.tagName === 'INPUT'")
+        page.wait_for_function("() => document.activeElement.tagName === 'INPUT'")
     page.get_by_label("Gain N·D·A·r of B2").fill("0,03")
     page.keyboard.press("Tab")
     expect(page.locator("#form-fields")).to_contain_text("write a point instead of the comma")

@@ -41,18 +41,51 @@ def test_time_left_counts_down_between_two_shares() -> None:
     line.update(0.5, "")
     clock.now += 4.0
     assert str(line) == "identifying: 50 %, about 6 s left"
-    line.update(0.5, "")
+
+
+def test_an_estimate_that_was_too_short_is_not_shown() -> None:
+    """No "about 1 s left" for most of the time."""
+    clock = Clock()
+    line = Remaining("identifying", clock)
+    clock.now += 10.0
+    line.update(0.9, "")
     clock.now += 30.0
-    assert str(line) == "identifying: 50 %, about 1 s left"
+    assert str(line) == "identifying: 90 %, 40 s so far"
+
+
+def test_the_time_left_is_smooth() -> None:
+    """A jump of the share moves the time left by a part of the jump at first."""
+    clock = Clock()
+    line = Remaining("identifying", clock)
+    clock.now += 10.0
+    line.update(0.25, "")
+    clock.now += 0.1
+    line.update(0.5, "")
+    left = line.estimate_time_left()
+    assert left is not None
+    assert 20.0 < left < 30.0
+    clock.now += 5.0
+    line.update(0.55, "")
+    left = line.estimate_time_left()
+    assert left == pytest.approx(15.1 * 0.45 / 0.55, rel=0.1)
+
+
+def test_no_time_left_before_a_share_that_carries_it() -> None:
+    clock = Clock()
+    line = Remaining("identifying", clock)
+    clock.now += 4.0
+    line.update(0.02, "")
+    assert line.estimate_time_left() is None
+    assert str(line) == "identifying: 4 s so far"
 
 
 def test_without_a_share_the_time_passed_is_shown() -> None:
     clock = Clock()
     line = Remaining("reading", clock)
     clock.now += 4.0
-    assert str(line) == "reading: 4 s"
+    assert str(line) == "reading: 4 s so far"
     line.update(1.0, "")
-    assert str(line) == "reading: 4 s"
+    assert str(line) == "reading: 4 s so far"
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import ctypes
+import os
+import signal
 import struct
+import time
 from pathlib import Path
 
 import pytest
@@ -32,6 +35,34 @@ def test_the_compiler_is_quoted(source: Path) -> None:
     with pytest.raises(CompilerError, match="ONE"):
         compile_library([source], source.with_name("libone.so"), None)
     assert not source.with_name("libone.so").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_an_interrupt_ends_all_passes_of_the_compiler(
+    source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fake, mark = source.with_name("cc"), source.with_name("pass.pid")
+    fake.write_text(f"#!/bin/sh\nsleep 60 &\necho $! > {mark}.new\nmv {mark}.new {mark}\nwait\n")
+    fake.chmod(0o700)
+    monkeypatch.setenv("PATH", f"{source.parent}{os.pathsep}{os.environ['PATH']}")
+
+    def interrupt(_signal: int, _frame: object) -> None:
+        if mark.exists():
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.05, 0.05)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            compile_library([source], source.with_name("libone.so"), None)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    state = Path(f"/proc/{int(mark.read_text())}/stat")
+    until = time.monotonic() + 5.0
+    while state.exists() and state.read_text().rpartition(")")[2].split()[0] != "Z":
+        assert time.monotonic() < until
+        time.sleep(0.01)
 
 
 @pytest.mark.crosscompile

@@ -113,3 +113,11 @@ def test_the_head_has_the_colour_of_the_verdict(
     assert state.text.startswith(f"Model {status.value}: ")
     reopened = work.add_result(Outcome(Method.LIKELIHOOD, outcome.twins))
     assert _get(reopened, Step.IDENTIFY).tone is Tone.UNKNOWN
+
+
+def test_a_log_that_was_not_fitted_is_not_called_compared(identified: Session) -> None:
+    work = replace(identified.work, has_viewed=True)
+    assert "were compared" in _get(work, Step.MODEL).text
+    other = replace(work.require_outcome(), twins={})
+    work = replace(work, results={**work.results, Method.INTEGRAL: other})
+    assert "was not fitted" in _get(work, Step.MODEL).text

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import os
 import platform
+import re
+import shutil
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -18,6 +20,8 @@ from drivetwin.errors import InputError, Where
 _Identity = tuple[int, int]
 """Device and number of a file, by whatever path or link it is named."""
 
+FOLDER_PREFIX = ".drivetwin-"
+"""First part of the names of unfinished folders."""
 _kept: ContextVar[frozenset[_Identity]] = ContextVar("kept", default=frozenset())
 
 
@@ -70,7 +74,7 @@ def open_atomic(path: Path | str) -> Iterator[BinaryIO]:
     if not path.name:
         raise InputError("this names no file to write to", "name a file", Where(file=str(path)))
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f"{path.name}.{platform.node()}.{os.getpid()}.partial")
+    beside = path.with_name(f"{path.name}.{make_owner_name()}.partial")
     try:
         with beside.open("w+b") as file:
             yield file
@@ -79,6 +83,46 @@ def open_atomic(path: Path | str) -> Iterator[BinaryIO]:
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def make_owner_name() -> str:
+    """Return the machine and the process as part of the names of unfinished files and folders."""
+    return f"{platform.node()}.{os.getpid()}"
+
+
+def remove_unfinished(outputs: Iterable[Path]) -> None:
+    """Remove unfinished files and folders beside `outputs` whose process was killed.
+
+    Only processes of this machine are looked at. A process that ends otherwise leaves none.
+    """
+    if os.name != "posix":
+        return  # elsewhere a process cannot be looked up by its number
+    owner = rf"{re.escape(platform.node())}\.(\d{{1,9}})"
+    unfinished = re.compile(rf".+\.{owner}\.partial|{re.escape(FOLDER_PREFIX)}{owner}\..+")
+    for folder in {one for path in outputs for one in (find_existing(path), path.parent)}:
+        for path in folder.iterdir() if folder.is_dir() else ():
+            found = unfinished.fullmatch(path.name)
+            if found is None or _is_running(int(found[1] or found[2])):
+                continue
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+
+
+def find_existing(path: Path) -> Path:
+    """Return the path itself, or the nearest folder above it that exists."""
+    return next(one for one in (path, *path.absolute().parents) if one.exists())
+
+
+def _is_running(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        pass
+    return True
 
 
 def write_text(path: Path | str, text: str) -> None:

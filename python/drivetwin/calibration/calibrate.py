@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.calibration.certificate import Certificate, certify
 from drivetwin.calibration.closed_loop import Control, compute_nominal_profiles
 from drivetwin.calibration.evaluate import Plant
@@ -29,6 +29,8 @@ from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stag
 
 _COARSE = 2e-3
 """Sampling step [s] of the search."""
+_STAGES = TimedStages("calibration", ("search", "polish", "limits", "certificate"))
+_POLISH = TimedStages("polish", ("finalist", "tail"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +85,11 @@ def calibrate(task: Task, stages: Stages = NO_STAGES) -> Calibration:
     """
     settings, space = task.settings, Space(task.policy)
     quick = make_quick_plant(task)
-    with scale_progress(0.0, 0.9):
-        name = name_stage("calibration", task.maneuver.point)
-        size = (quick, len(space.free))
-        best = run_stage(stages, name, size, lambda: find_best(task, quick))
+    name = name_stage("calibration", task.maneuver.point)
+    size = (quick, len(space.free))
+    best = run_stage(stages, name, size, lambda: find_best(task, quick))
     plant = replace(quick, metrics=tuple(Metric))
-    with scale_progress(0.9, 1.0, "certifying on fresh draws"):
+    with _STAGES.enter("certificate", "certifying on fresh draws"):
         fresh = draw_for(task, settings.certificate_draws, Purpose.CERTIFICATE)
         before, after = (assess(task, plant, one, fresh) for one in (space.start, best))
     return Calibration(task, before, after, fresh, plant.count.runs)
@@ -108,11 +109,11 @@ def set_coarse_step(plant: Plant) -> Plant:
 def find_best(task: Task, plant: Plant) -> FloatArray:
     """Search, polish and keep the limits; return the best coordinates (q,)."""
     objective = build_objective(task, plant)
-    with scale_progress(0.0, 0.65, "searching"):
+    with _STAGES.enter("search", "searching"):
         found = _search(task, plant, objective)
-    with scale_progress(0.65, 0.9, "polishing"):
+    with _STAGES.enter("polish", "polishing"):
         polished = _polish(task, plant, objective, found)
-    with scale_progress(0.9, 1.0, "checking the limits"):
+    with _STAGES.enter("limits", "checking the limits"):
         return _keep_limits(task, plant, objective, polished)
 
 
@@ -171,13 +172,13 @@ def _polish(
     """Polish all finalists, then the best on more draws for its tail."""
     settings = task.settings
     run = _make_run(task, plant, draw_for(task, settings.polish_draws, Purpose.POLISH))
-    polished = []
+    polished, stages = [], _POLISH.repeat("finalist", len(found))
     for number, one in enumerate(found):
-        with scale_progress(0.5 * number / len(found), 0.5 * (number + 1) / len(found)):
+        with stages.enter("finalist", number=number):
             polished.append(polish(run, one.coordinates, objective, settings.polish_iterations))
     best = min(polished, key=lambda one: one.value)
     tail = draw_for(task, settings.tail_draws, Purpose.TAIL)
-    with scale_progress(0.5, 1.0):
+    with stages.enter("tail"):
         improve = _make_tail_polish(task, plant, tail, settings.tail_iterations)
         return improve(best.coordinates, objective)
 

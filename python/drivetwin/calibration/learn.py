@@ -60,7 +60,7 @@ def correct_twin(twin: Twin, logged: Sequence[LoggedShift], spread: Spread) -> C
     before = _Shown(unknowns, logged, first).require(z)
     for count in range(1, len(logged) + 1):
         shown = _Shown(unknowns, logged[:count], first[:count])
-        with scale_progress((count - 1) / len(logged), count / len(logged)):
+        with scale_progress(((count - 1) / len(logged)) ** 2, (count / len(logged)) ** 2):
             z, covariance = shown.fit(z)
     after = _Shown(unknowns, logged, first).require(z)
     return Correction(unknowns.build_twin(z, covariance), _compute_rms(before), _compute_rms(after))

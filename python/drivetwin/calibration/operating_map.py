@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.calibration.calibrate import (
     Assessment,
     Calibration,
@@ -98,6 +98,9 @@ class MapPoint:
         return self.found.certificate.quantiles[Metric.PEAK_JERK].share_95
 
 
+_STAGES = TimedStages("map", ("main", "point", "between"))
+
+
 @dataclass(frozen=True, eq=False)
 class OperatingMap:
     """Calibrations by place in a grid; `main` is the whole one of the start.
@@ -126,29 +129,30 @@ def calibrate_map(make_task: MakeTask, grid: Grid, stages: Stages = NO_STAGES) -
     that has no such policy.
     """
     tasks = {place: make_task(grid.get_point(place)) for place in grid.places}
-    with scale_progress(0.0, 0.6):
+    rest = grid.places[1:]
+    timed = _STAGES.repeat("point", len(rest)).repeat("between", len(grid.centres))
+    with timed.enter("main"):
         main = calibrate(tasks[grid.start], stages)
     space = Space(main.task.policy)
     coordinates = {grid.start: space.to_coordinates(main.after.values)}
     points, runs = {grid.start: MapPoint(main.task, main.after)}, main.runs
-    rest = grid.places[1:]
     for number, place in enumerate(rest):
         task, plant = tasks[place], make_quick_plant(tasks[place])
         near = min(coordinates, key=lambda one: _measure_distance(one, place))
-        share = 0.6 + 0.4 * number / len(rest)
-        with scale_progress(share, share + 0.4 / len(rest), "calibrating the map"):
+        with timed.enter("point", "calibrating the map", number):
             coordinates[place] = run_stage(
                 stages,
                 name_stage("map", grid.get_point(place)),
                 (plant, coordinates[near].size),
                 partial(_polish, task, plant, coordinates[near]),
             )
-        points[place] = _assess(task, Space(task.policy).to_values(coordinates[place]))
+            points[place] = _assess(task, Space(task.policy).to_values(coordinates[place]))
         runs += plant.count.runs
-    between = tuple(
-        _assess(make_task(one), _interpolate(grid, points, one)) for one in grid.centres
-    )
-    return OperatingMap(grid, main, points, between, runs)
+    between = []
+    for number, one in enumerate(grid.centres):
+        with timed.enter("between", "certifying between the points", number):
+            between.append(_assess(make_task(one), _interpolate(grid, points, one)))
+    return OperatingMap(grid, main, points, tuple(between), runs)
 
 
 def _polish(task: Task, plant: Plant, start: FloatArray) -> FloatArray:

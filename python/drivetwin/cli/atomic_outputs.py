@@ -11,7 +11,12 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin._util.atomic import refuse_overwrite
+from drivetwin._util.atomic import (
+    FOLDER_PREFIX,
+    find_existing,
+    make_owner_name,
+    refuse_overwrite,
+)
 from drivetwin._util.interrupts import defer_interrupts
 from drivetwin.errors import DrivetwinError, InputError
 
@@ -34,9 +39,10 @@ def write_atomically(folder: Path) -> Iterator[Path]:
     replaced. An error about a file in the empty folder names it in `folder`. Raises OSError, and
     InputError where a file would take the place of one to be kept.
     """
-    existing = next(path for path in (folder, *folder.parents) if path.exists())
+    existing = find_existing(folder)
     try:
-        beside = Path(tempfile.mkdtemp(dir=existing, prefix=".drivetwin-"))
+        prefix = f"{FOLDER_PREFIX}{make_owner_name()}."
+        beside = Path(tempfile.mkdtemp(dir=existing, prefix=prefix))
     except OSError as error:
         error.filename = str(existing)
         raise

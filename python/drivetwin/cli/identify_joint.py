@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.arguments import REPORT, RESULT, TWIN, find_mapping
+from drivetwin._util.progress import scale_progress
+from drivetwin.cli.arguments import REPORT, RESULT, TWIN
 from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
 from drivetwin.cli.holdout_args import parse_holdouts
-from drivetwin.cli.identify_run import Request
+from drivetwin.cli.identify_run import Request, read_shifts
 from drivetwin.cli.numbers import format_percent, format_quantity
 from drivetwin.cli.output import (
     make_table,
@@ -65,21 +66,20 @@ def identify_logs(
     Raises the typed errors of each stage.
     """
     from drivetwin.estimation.analysis.experiment_design import rank_experiments
-    from drivetwin.logs.read import read_log
-    from drivetwin.plausibility.check import check_card
-    from drivetwin.shifts.detect import detect_shifts, refuse_without_shifts
+    from drivetwin.shifts.detect import refuse_without_shifts
     from drivetwin.validation.multi_log import Source, identify_together
 
     refuse_same_names(logs, "rename one of them")
     card = how.load_card()
     with show_step(f"reading {len(logs)} logs"):
-        read = tuple(read_log(log, card, find_mapping(how.channels, log)) for log in logs)
-        shifts = [detect_shifts(log, card) for log in read]
-        pairs = list(zip(read, shifts, strict=True))
-        doubts = [one for log, each in pairs for one in check_card(card, log, each.shifts)]
-    show_findings(dict.fromkeys(doubts))
-    for log, each in pairs:
+        reads = []
+        for number, path in enumerate(logs):
+            with scale_progress(number / len(logs), (number + 1) / len(logs)):
+                reads.append(read_shifts(path, how, card))
+    show_findings(dict.fromkeys(one for _, _, doubts in reads for one in doubts))
+    for log, each, _ in reads:
         refuse_without_shifts(log, each)
+    read, shifts = [log for log, _, _ in reads], [each for _, each, _ in reads]
     held = parse_holdouts(wanted, logs, shifts)
     sources = [
         Source(log, found, each) for log, found, each in zip(read, shifts, held, strict=True)
@@ -88,7 +88,7 @@ def identify_logs(
         made = identify_together(sources, card, how.method)
     with show_step("comparing experiments"):
         found = rank_experiments(made.found)
-    return Joined(read, replace(made, found=found))
+    return Joined(tuple(read), replace(made, found=found))
 
 
 def write_joint(outcome: Joined, folder: Path) -> tuple[Path, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.cli.arguments import REPORT, RESULT, TWIN, find_mapping
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_findings, show_step
@@ -16,8 +17,12 @@ from drivetwin.vehicle.effects import parse_priors
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.estimation.identification import Identification
+    from drivetwin.findings import Finding
+    from drivetwin.shifts.detect import FoundShifts
     from drivetwin.twin.twin import Twin
     from drivetwin.vehicle.card import VehicleCard
+
+_READING = TimedStages("reading", ("log", "shifts", "card"))
 
 
 @dataclass(frozen=True)
@@ -28,13 +33,6 @@ class Request:
     channels: Path | None
     method: Method
     effects: tuple[str, ...] = ()
-
-    def load(self, log: Path) -> tuple[ShiftLog, VehicleCard]:
-        """Read a log and the card with these priors."""
-        from drivetwin.logs.read import read_log
-
-        card = self.load_card()
-        return read_log(log, card, find_mapping(self.channels, log)), card
 
     def load_card(self) -> VehicleCard:
         """Read the card with the priors of effects."""
@@ -54,20 +52,37 @@ class Outcome:
     twin: Twin
 
 
+def read_shifts(
+    path: Path, how: Request, card: VehicleCard
+) -> tuple[ShiftLog, FoundShifts, tuple[Finding, ...]]:
+    """Read a log and detect its shifts; the findings compare it with the card.
+
+    Raises the typed errors of the readers and of the detection.
+    """
+    from drivetwin.logs.read import read_log
+    from drivetwin.plausibility.check import check_card
+    from drivetwin.shifts.detect import detect_shifts
+
+    with _READING.enter("log"):
+        log = read_log(path, card, find_mapping(how.channels, path))
+    with _READING.enter("shifts", "looking for shifts"):
+        shifts = detect_shifts(log, card)
+    with _READING.enter("card", "checking the card"):
+        return log, shifts, tuple(check_card(card, log, shifts.shifts))
+
+
 def run_identification(log: Path, how: Request) -> Outcome:
     """Read, find shifts, identify, and validate by simulation.
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
     from drivetwin.estimation.result.method import Method
-    from drivetwin.plausibility.check import check_card
-    from drivetwin.shifts.detect import detect_shifts, refuse_without_shifts
+    from drivetwin.shifts.detect import refuse_without_shifts
     from drivetwin.validation.validated_model import identify_validated
 
     with show_step(f"reading {log.name}"):
-        recording, card = how.load(log)
-        shifts = detect_shifts(recording, card)
-        doubts = check_card(card, recording, shifts.shifts)
+        card = how.load_card()
+        recording, shifts, doubts = read_shifts(log, how, card)
     show_findings(doubts)
     refuse_without_shifts(recording, shifts)
     with show_step(f"identifying by the {how.method} method"):

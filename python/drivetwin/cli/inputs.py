@@ -8,7 +8,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.atomic import protect_files
+from drivetwin._util.atomic import protect_files, remove_unfinished
 from drivetwin._util.output_lock import lock_outputs
 from drivetwin.cli.outputs import find_outputs
 
@@ -34,6 +34,7 @@ def protect_inputs(command: Callable[..., None]) -> Callable[..., None]:
             for path, marker in written:
                 marker.check(path)
             with lock_outputs(path for path, _ in written):
+                remove_unfinished(path for path, _ in written)
                 command(**given)
 
     return careful

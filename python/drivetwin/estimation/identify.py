@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
@@ -58,6 +58,8 @@ COMMON_GAIN = (
 """Degenerate errors: the log contains nothing that shows them."""
 GROWS = "grows with the square of the wheel speed and else "
 """Clause added to the assumptions if an aerodynamic load term was estimated."""
+_LIKELIHOOD = TimedStages("likelihood estimation", ("linear", "likelihood", "paper"))
+_INTEGRAL = TimedStages("integral estimation", ("linear", "tolerances", "paper"))
 
 
 def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identification:
@@ -162,8 +164,10 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
             StageResults(paper=paper),
         )
     likely, gave_up = method is Method.LIKELIHOOD, ""
+    integral_stages = _INTEGRAL.repeat("tolerances", 1 if log.design.sensors else 0)
+    stages = _LIKELIHOOD if likely else integral_stages
     try:
-        with scale_progress(0.05, 0.2 if likely else 0.5, "linear method"):
+        with stages.enter("linear", "linear method"):
             found, integral = estimate_integral(log.signals, log.drivelines, log.design)
     except IdentificationError as error:
         if not likely:
@@ -172,7 +176,7 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
     evidence = StageResults(integral=integral)
     if likely:
         try:
-            with scale_progress(0.2, 0.9, "likelihood"):
+            with stages.enter("likelihood", "likelihood"):
                 from drivetwin.estimation.likelihood.pipeline import estimate_likelihood
 
                 linear = found, integral
@@ -182,7 +186,7 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
             method, gave_up = Method.INTEGRAL, error.what
             evidence = replace(evidence, gave_up=gave_up)
     if method is Method.INTEGRAL:
-        with scale_progress(0.9 if likely else 0.5, 0.95, "tolerances of the sensors"):
+        with integral_stages.enter("tolerances", "tolerances of the sensors"):
             found = add_tolerances(integral, log.signals, log.drivelines, log.design)
     found = _complete(found, log)
     if gave_up:
@@ -190,7 +194,8 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
         estimates = apply_errors(found.estimates, [failed])
         found = replace(found, estimates=estimates, findings=(failed, *found.findings))
     try:
-        evidence = replace(evidence, paper=_identify_paper_shifts(log))
+        with stages.enter("paper", "paper's method"):
+            evidence = replace(evidence, paper=_identify_paper_shifts(log))
     except IdentificationError as error:
         failed = report(Code.PAPER_METHOD_FAILED, why=error.what)
         found = replace(found, findings=(*found.findings, failed))
@@ -212,7 +217,7 @@ def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) ->
     from drivetwin.estimation.likelihood.pipeline import estimate_without_linear
 
     try:
-        with scale_progress(0.2, 0.95, "likelihood"):
+        with _LIKELIHOOD.enter("likelihood", "likelihood"):
             found, fit = estimate_without_linear(log.signals, log.drivelines, log.design)
     except IdentificationError:
         raise refusal from None

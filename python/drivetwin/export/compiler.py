@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -58,15 +60,41 @@ def compile_library(
         *("-o", target.name),
         *([] if windows else ["-lm"]),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
-    if done.returncode != 0:
+    status, message = _run_compiler(command, folder)
+    if status != 0:
         raise CompilerError(
-            f"{command[0]} cannot build {target.name}: {done.stderr.strip()[:500]}",
+            f"{command[0]} cannot build {target.name}: {message.strip()[:500]}",
             "check the compiler with a small program, or install the extra: "
             'pip install "drivetwin[fmu]"',
         )
     if windows:
         _clear_times(target)
+
+
+def _run_compiler(command: Sequence[str], folder: Path) -> tuple[int, str]:
+    """Run a compiler in `folder`, which takes its temporary files; return exit code and message.
+
+    An interrupt ends it with all its passes.
+    """
+    has_groups = os.name == "posix"
+    with subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "TMPDIR": str(folder.resolve())},
+        process_group=0 if has_groups else None,
+    ) as program:
+        try:
+            _, message = program.communicate()
+        except BaseException:
+            if has_groups:
+                os.killpg(program.pid, signal.SIGKILL)
+            program.kill()
+            raise
+    return program.returncode, message
 
 
 def find_native_compiler() -> tuple[str, ...]:

@@ -6,11 +6,13 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Mapping, Sequence, Set
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
@@ -47,6 +49,8 @@ from drivetwin.logs.quality.torque_delay import check_torque_delays
 from drivetwin.logs.quality.update_raster import mark_late_samples, replace_filling
 from drivetwin.logs.raw import RawChannel, RawLog, Recording, Window
 from drivetwin.vehicle.card import VehicleCard
+
+_STAGES = TimedStages("log", ("opening", "channels", "digest"))
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,9 @@ def read_log(
     stated = mapping or Mapped({})
     if not isinstance(stated, Mapped):
         stated = read_mapping(Path(stated))
-    with open_as_mapped(path, stated, card) as (recording, stated):
+    with ExitStack() as stack:
+        with _STAGES.enter("opening"):
+            recording, stated = stack.enter_context(open_as_mapped(path, stated, card))
         log = read_recording(recording, path, card, stated, Demands(needed, sound, gearing), window)
     mappings = {} if stated.file is None else {stated.file.name: _compute_digest(stated.file)}
     return replace(log, mappings=mappings)
@@ -122,9 +128,10 @@ def read_recording(
 
     See `read_log`; the log names no mapping file.
     """
-    with name_project_mapping(stated):
+    with _STAGES.enter("channels"), name_project_mapping(stated):
         log = assemble_log(recording, str(path), card, stated, demands, window)
-    return replace(log, sha256=_compute_digest(path))
+    with _STAGES.enter("digest"):
+        return replace(log, sha256=_compute_digest(path))
 
 
 def assemble_log(

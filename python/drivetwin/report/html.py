@@ -13,7 +13,8 @@ from markupsafe import Markup
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.progress import notify_progress, scale_progress
+from drivetwin._util.progress import notify_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin._util.visible_text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
@@ -33,6 +34,8 @@ from drivetwin.report.sections.summary import (
 
 _BELOW_BUTTONS = 30
 """Room above the panels [px] where the page has the zoom buttons outside the figure."""
+PAGE = TimedStages("page", ("sections", "figures"))
+"""Stages of a report."""
 
 
 @check_arguments
@@ -43,7 +46,7 @@ def save_report(path: Path | str, found: Identification, log: ShiftLog) -> None:
 
 def render_report(found: Identification, log: ShiftLog, library: str | None = None) -> str:
     """HTML text of the report; equal inputs give equal text. `library` as in `render_page`."""
-    with scale_progress(0.0, 0.5):
+    with PAGE.enter("sections"):
         sections = build_report_sections(found, log)
     shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in found.shifts)
     return render_page(
@@ -107,17 +110,18 @@ def render_page(
         return encode_figure(block, store)
 
     environment.filters["figure_json"] = as_json
-    return environment.get_template("report.html.j2").render(
-        title=title,
-        subtitle=subtitle,
-        sections=sections,
-        style=read_template("status.css") + read_template("report.css"),
-        script=read_template("report.js"),
-        samples_index=lambda: _encode_json(store.index),
-        samples=lambda: Markup(store.encode()),
-        library=library,
-        plotly_js=Markup("" if library else _load_encoded_library()),
-    )
+    with PAGE.enter("figures"):
+        return environment.get_template("report.html.j2").render(
+            title=title,
+            subtitle=subtitle,
+            sections=sections,
+            style=read_template("status.css") + read_template("report.css"),
+            script=read_template("report.js"),
+            samples_index=lambda: _encode_json(store.index),
+            samples=lambda: Markup(store.encode()),
+            library=library,
+            plotly_js=Markup("" if library else _load_encoded_library()),
+        )
 
 
 def save_library(path: Path) -> None:

@@ -7,12 +7,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from drivetwin._util.atomic import write_text
-from drivetwin._util.progress import scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.multi_log.fit import extract_log
 from drivetwin.estimation.result.multi_log import Several
-from drivetwin.report.html import build_report_sections, render_page
+from drivetwin.report.html import PAGE, build_report_sections, render_page
 from drivetwin.report.sections.blocks import Section
 from drivetwin.report.sections.identifiability import build_limits_section
 from drivetwin.report.sections.likelihood import build_likelihood_sections
@@ -42,7 +41,7 @@ def render_joint_report(found: Identification, logs: Sequence[ShiftLog]) -> str:
     """HTML text of the report; equal inputs give equal text."""
     several = found.evidence.several
     held = found.evidence.held_out
-    with scale_progress(0.0, 0.5):
+    with PAGE.enter("sections"):
         if several is None:
             sections = build_report_sections(found, logs[0])
         else:

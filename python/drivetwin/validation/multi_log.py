@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, Where
 from drivetwin.estimation.identification import Identification
@@ -57,6 +57,9 @@ class Source:
         )
 
 
+_STAGES = TimedStages("joint model", ("identification", "simulation", "prediction"))
+
+
 @dataclass(frozen=True, eq=False)
 class JointIdentification:
     """Result of a joint identification: the identification, the fitted logs, a twin by source."""
@@ -85,7 +88,7 @@ def identify_together(
             "leave out a --hold-out, or add a log",
         )
     logs, shifts = [sources[k].log for k in fitted], [splits[k][0] for k in fitted]
-    with scale_progress(0.0, 0.85):
+    with _STAGES.enter("identification"):
         if len(fitted) == 1:
             found = identify(logs[0], card, shifts[0], method)
             numbers = {fitted[0]: 0}
@@ -93,9 +96,9 @@ def identify_together(
             _require_likelihood(method)
             found = identify_jointly(logs, card, shifts)
             numbers = {k: number for number, k in enumerate(fitted, 1)}
-    with scale_progress(0.85, 0.92, "simulating the shifts"):
+    with _STAGES.enter("simulation", "simulating the shifts"):
         found, twins = _attach_simulations(found, card, logs)
-    with scale_progress(0.92, 1.0, "predicting what was held out"):
+    with _STAGES.enter("prediction", "predicting what was held out"):
         held = _predict_held_shifts(
             found, card, sources, [late.shifts for _, late in splits], numbers
         )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
@@ -19,8 +19,7 @@ from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
-_SIMULATION = 0.95
-"""Share of the time after which the shifts are simulated [ratio]."""
+_STAGES = TimedStages("validated model", ("identification", "simulation"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +63,8 @@ def identify_validated(
         As `identify`, and MissingParameterError where the model cannot be simulated.
     """
     found = detect_shifts(log, card) if shifts is None else shifts
-    with scale_progress(0.0, _SIMULATION):
+    with _STAGES.enter("identification"):
         result = identify(log, card, found, method, fixed=fixed, priors=priors, bounds=bounds)
-    with scale_progress(_SIMULATION, 1.0, "simulating the shifts"):
+    with _STAGES.enter("simulation", "simulating the shifts"):
         result = attach_validation(result, build_twin(result, card), log)
     return ValidatedModel(result, build_twin(result, card))  # with the verdicts of the gate

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.identification import Identification
@@ -16,8 +16,10 @@ from drivetwin.validation.multi_log import Source, identify_together
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.workbench.jobs import Emit, to_fault
 
-_WEIGHTS = {Method.PAPER: 1.0, Method.INTEGRAL: 30.0, Method.LIKELIHOOD: 70.0}
-"""Relative computing times of the methods."""
+_STAGES = TimedStages("methods", tuple(one.value for one in Method))
+_STEPS = {
+    one: TimedStages(f"{one.value} method", ("identification", "experiments")) for one in Method
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,19 +62,20 @@ def identify_all(emit: Emit, task: Task) -> None:
 
     Whatever ends one method, a fault of the program included, leaves the others their turn.
     """
-    whole, start = sum(_WEIGHTS[method] for method in task.methods), 0.0
+    skipped = {one.value: 0 for one in Method if one not in task.methods}
+    stages = replace(_STAGES, counts=skipped)
     for method in task.methods:
-        end = start + _WEIGHTS[method] / whole
-        with scale_progress(start, end, f"{method.value} method"):
+        with stages.enter(method.value, f"{method.value} method"):
             emit(_run_method(task, method))
-        start = end
 
 
 def _run_method(task: Task, method: Method) -> Outcome | Refusal:
     """Run one method; return its outcome, or the reason of its failure."""
     try:
-        made = identify_together(task.sources, task.card, method)
-        return Outcome(method, made.twins, rank_experiments(made.found))
+        with _STEPS[method].enter("identification"):
+            made = identify_together(task.sources, task.card, method)
+        with _STEPS[method].enter("experiments", "comparing experiments"):
+            return Outcome(method, made.twins, rank_experiments(made.found))
     except Exception as error:
         fault = to_fault(error)
         return Refusal(method, f"{fault.what} -> {fault.remedy}")

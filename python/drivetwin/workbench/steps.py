@@ -173,7 +173,10 @@ def _assess_use(work: SessionState, running: bool) -> Iterator[StepState]:
             yield StepState(step, Status.BLOCKED, text, Step.IDENTIFY)
         return
     if work.has_viewed:
-        yield StepState(Step.MODEL, Status.DONE, "Simulation and measurement were compared.")
+        text = "Simulation and measurement were compared."
+        if work.require_open_log().source.name not in work.require_outcome().twins:
+            text = "The log shown was not fitted; choose a fitted one."
+        yield StepState(Step.MODEL, Status.DONE, text)
     else:
         yield StepState(Step.MODEL, Status.OPEN, "Compare simulation and measurement.")
     if work.has_exported:

@@ -82,6 +82,18 @@ def test_the_curve_gives_the_law_of_the_simulation() -> None:
     assert np.interp(slip, curve.axis.points, curve.values) == pytest.approx(law, rel=1e-3)
 
 
+def test_friction_states_its_verdict() -> None:
+    given = twin()
+    borrowed = replace(given.friction["B3"], verdict=Verdict.DESIGN, reason="Law of B3.")
+    content = collect_parameters(replace(given, friction={**given.friction, "B2": borrowed}))
+    texts = {one.name: one.text for one in content.scalars}
+    texts |= {one.name: one.text for one in content.curves}
+    assert "; identified, " in texts["mu.B3"]
+    assert texts["mu_c.B3"].endswith("; identified")
+    assert texts["mu.B2"].endswith("; design value, Law of B3.")
+    assert texts["mu_c.B2"].endswith("; design value")
+
+
 @pytest.mark.parametrize("v_s", [1.0, 5.0, 15.0, 60.0])
 @pytest.mark.parametrize("mu_s", [0.08, 0.20])
 def test_the_curve_keeps_to_a_law_that_bends_near_zero_slip(v_s: float, mu_s: float) -> None:

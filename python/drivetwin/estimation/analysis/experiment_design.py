@@ -19,7 +19,8 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.progress import notify_progress, scale_progress
+from drivetwin._util.progress import notify_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.estimation.analysis.experiments import BaseShift, ExperimentPlan, plan_experiment
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.segments import MOMENTUM
@@ -49,6 +50,8 @@ REPEATS = (1, 2, 4)
 """Numbers of repetitions of the best experiment, tried in this order."""
 NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"
 
+_STAGES = TimedStages("experiments", ("experiments", "ranking"))
+
 
 def compute_rankings(found: Identification) -> tuple[ExperimentRanking, ...]:
     """Rank the experiments for every estimated parameter of a likelihood fit.
@@ -63,20 +66,19 @@ def compute_rankings(found: Identification) -> tuple[ExperimentRanking, ...]:
     asked = (*open_, *sorted(known, key=_compute_relative_width, reverse=True))
     places = {one.id: _find_shifts(one.id, fit) for one in asked}
     wanted = list(dict.fromkeys(k for every in places.values() for k in every))
-    gains = {}
+    gains, stages = {}, _STAGES.repeat("experiments", len(wanted))
     for number, k in enumerate(wanted):
-        with scale_progress(
-            0.9 * number / len(wanted), 0.9 * (number + 1) / len(wanted), "experiments"
-        ):
+        with stages.enter("experiments", "experiments", number):
             gains[k] = _compute_gains(fit, signals, k)
-    numbers, base = found.evidence.numbers, _linearise(found)
-    return tuple(
-        replace(
-            _rank_for_parameter(one, base, [gain for k in places[one.id] for gain in gains[k]]),
-            number=numbers.get(one.id),
+    with stages.enter("ranking", "ranking the experiments"):
+        numbers, base = found.evidence.numbers, _linearise(found)
+        return tuple(
+            replace(
+                _rank_for_parameter(one, base, [gain for k in places[one.id] for gain in gains[k]]),
+                number=numbers.get(one.id),
+            )
+            for one in asked
         )
-        for one in asked
-    )
 
 
 def _find_shifts(name: str, fit: LikelihoodFit) -> tuple[int, ...]:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivetwin._util.progress import scale_progress
 from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError
@@ -61,8 +60,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLo
     refuse_without_shifts(log, shifts)
     sampler = _Sampler()
     usable, refused = _split_usable(log, card, shifts.shifts)
-    with scale_progress(0.0, 0.05, "loads of the shifts"):
-        kept, left_out = _select(log, card, [one.shift for one in usable], sampler)
+    kept, left_out = _select(log, card, [one.shift for one in usable], sampler)
     fitted = [one for one in usable if one.shift in kept]
     first = fitted[0].log
     design = DesignData(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
@@ -46,6 +47,7 @@ class LinearStartSettings:
 
 
 LINEAR_START = LinearStartSettings()
+_STAGES = TimedStages("likelihood", ("guess", "selection", "plant", "conclusions"))
 
 
 BEHIND_GEARBOX = ("J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -63,10 +65,12 @@ def estimate_without_linear(
     log without an equation for the linear method. Raises IdentificationError if the fit does not
     reach a plausible minimum.
     """
-    guess = _compute_own_guess(signals, drivelines, design)
+    with _STAGES.enter("guess"):
+        guess = _compute_own_guess(signals, drivelines, design)
     priors = EffectPriors(design.effects, design.sensors)
     best, notes = _fit(signals, drivelines, design.loss_law, guess, priors)
-    told = build_estimates(best, signals, drivelines, {}, priors)
+    with _STAGES.enter("conclusions", "intervals"):
+        told = build_estimates(best, signals, drivelines, {}, priors)
     return replace(told, findings=(*told.findings, *notes)), best
 
 
@@ -115,10 +119,12 @@ def estimate_likelihood(
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
     found, shifts = linear
-    guess = _compute_guess(signals, drivelines, shifts, design)
+    with _STAGES.enter("guess"):
+        guess = _compute_guess(signals, drivelines, shifts, design)
     priors = EffectPriors(design.effects, design.sensors)
     best, notes = _fit(signals, drivelines, design.loss_law, guess, priors)
-    told = build_estimates(best, signals, drivelines, found.friction, priors)
+    with _STAGES.enter("conclusions", "intervals"):
+        told = build_estimates(best, signals, drivelines, found.friction, priors)
     findings = (*told.findings, *notes, *_find_disagreements(told, found))
     return replace(told, findings=findings), best
 
@@ -134,14 +140,16 @@ def _fit(
 
     Raises IdentificationError where no plant reaches a plausible minimum.
     """
-    try:
-        best, notes = select_model(signals, drivelines, loss_law, guess, priors)
-    except IdentificationError:
-        found = _search_again(signals, drivelines, loss_law, guess, priors)
-        if found is None:
-            raise
-        best, notes = found, tuple(report_modes(found.problem.kinds))
-    return select_plant(best, priors), notes
+    with _STAGES.enter("selection"):
+        try:
+            best, notes = select_model(signals, drivelines, loss_law, guess, priors)
+        except IdentificationError:
+            found = _search_again(signals, drivelines, loss_law, guess, priors)
+            if found is None:
+                raise
+            best, notes = found, tuple(report_modes(found.problem.kinds))
+    with _STAGES.enter("plant", "parts of the plant"):
+        return select_plant(best, priors), notes
 
 
 def _search_again(

@@ -20,7 +20,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.artifacts import StageResults
@@ -48,8 +48,7 @@ from drivetwin.estimation.result.prior_conflict import check_design_ranges, chec
 from drivetwin.parameters import split_log_number
 from drivetwin.vehicle.spec import SensorTolerance
 
-ALONE = 0.6
-"""Share of the time that the fits of single logs take."""
+_STAGES = TimedStages("joint estimation", ("alone", "together", "conclusions"))
 NAMED = 3
 """Largest number of differences listed in an error."""
 
@@ -60,18 +59,16 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
     `evidence.several` holds the logs; ids of what a log has of its own end in its number.
     Raises IdentificationError if one log alone, or all together, cannot be fitted.
     """
-    alone, fitted = [], []
+    alone, fitted, stages = [], [], _STAGES.repeat("alone", len(logs))
     for k, log in enumerate(logs):
-        with scale_progress(
-            ALONE * k / len(logs), ALONE * (k + 1) / len(logs), f"log {k + 1} alone"
-        ):
+        with stages.enter("alone", f"log {k + 1} alone", k):
             fitted.append(drop_unbalanced(log) if log.scale_known else log)
             alone.append(_identify_single(fitted[-1]))
     design = logs[0].design
     signals = [replace(s, log=k) for k, log in enumerate(fitted, 1) for s in log.signals]
     drivelines = [driveline for log in fitted for driveline in log.drivelines]
     priors = EffectPriors(design.effects, merge_tolerances(logs))
-    with scale_progress(ALONE, 0.95, "all logs together"):
+    with stages.enter("together", "all logs together"):
         try:
             _require_agreement(alone)
             guess = compute_start(alone)
@@ -82,8 +79,9 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
                 f"alone they give {'; '.join(find_largest_differences(alone)) or fault.what}",
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
-    told = build_estimates(fit, signals, drivelines, pool_curves(alone), priors)
-    tested = check_consistency(fit, signals, told.friction)
+    with stages.enter("conclusions", "intervals"):
+        told = build_estimates(fit, signals, drivelines, pool_curves(alone), priors)
+        tested = check_consistency(fit, signals, told.friction)
     shares = tuple(
         _build_log_share(k, log, one, fit)
         for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)

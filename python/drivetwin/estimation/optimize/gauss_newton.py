@@ -95,6 +95,8 @@ class ConstrainedSettings:
 GAUSS_NEWTON = GaussNewtonSettings()
 LINE_SEARCH = LineSearchSettings()
 CONSTRAINED = ConstrainedSettings()
+_USUAL_ITERATIONS = 10
+"""Iterations of a search from a rough start; only the progress shown depends on them."""
 
 P = TypeVar("P", bound=Objective)
 
@@ -186,7 +188,7 @@ def minimise(
             return None
         expected = _predict_decrease(problem, point, normal.information, normal.gradient)
         first = first or expected
-        notify_progress(_estimate_progress(first, expected, settings.ftol))
+        notify_progress(_estimate_progress(first, expected, settings.ftol, iteration))
         is_local = expected < settings.local_decrease
         weighting.is_frozen |= iteration + 1 >= settings.min_refreshes and is_local
         frozen = weighting.is_frozen
@@ -382,11 +384,16 @@ def _combine_subgradients(
     return np.asarray(result.x @ gradients), float(result.x @ below)
 
 
-def _estimate_progress(first: float, expected: float, ftol: float) -> float:
-    """Estimate the completed share of a search: powers of ten of the predicted decrease."""
+def _estimate_progress(first: float, expected: float, ftol: float, iteration: int) -> float:
+    """Estimate the completed share of a search.
+
+    Counts are the powers of ten of the predicted decrease. They may stand still for some iterations
+    on the way to the minimum, so each iteration completes at least a part of the rest.
+    """
     if min(first, expected) <= ftol:
         return 1.0
-    return float(np.log(first / expected) / np.log(first / ftol))
+    least = 1.0 - (1.0 - 1.0 / _USUAL_ITERATIONS) ** iteration
+    return max(least, float(np.log(first / expected) / np.log(first / ftol)))
 
 
 def _solve_bounded(

@@ -156,18 +156,21 @@ def _collect_laws(twin: Twin) -> Iterator[Scalar]:
         for field, value in law.items():
             unit, text = LAW_FIELDS[field]
             over = ", over η" if curve.over_eta and field != "v_s" else ""
-            yield Scalar(f"{field}.{name}", value, unit, text + over)
+            text = f"{text}{over}; {curve.verdict.value}"
+            yield Scalar(f"{field}.{name}", value, unit, text)
 
 
 def _collect_friction(twin: Twin) -> Iterator[Curve]:
     for name, curve in twin.friction.items():
         law = build_friction_law(curve)
+        text = f"friction coefficient of {name} over slip; {curve.verdict.value}"
+        origin = curve.reason if curve.is_borrowed else curve.method_text
         points = _select_breakpoints(law, float(curve.slip[-1]))
         yield Curve(
             f"mu.{name}",
             Axis("slip", tuple(points.tolist()), "rad/s"),
             tuple(law.evaluate(points).tolist()),
-            text=to_one_line(f"friction coefficient of {name} over slip, {curve.method_text}"),
+            text=to_one_line(f"{text}, {origin}" if origin else text),
         )
 
 

@@ -14,6 +14,7 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.parameters import build_findings_section, build_result_section
+from drivetwin.report.sections.summary import build_friction_section
 from drivetwin.report.sections.together import build_holdout_section, build_joint_section
 from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.vehicle.locks import LockKind
@@ -199,6 +200,8 @@ def _build_result(outcome: Outcome) -> list[Component]:
             content += render_section(build_findings_section(outcome.found), "findings")
         if outcome.found.fit:
             content.append(render_block(build_fit_table(outcome.found.fit), "fit"))
+        if outcome.found.friction:
+            content += render_section(build_friction_section(outcome.found), "friction")
     content.append(ui.make_notes("Assumptions", outcome.twin.assumptions, "plain"))
     return content
 

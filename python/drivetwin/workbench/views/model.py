@@ -10,7 +10,7 @@ from typing import Any
 from dash import ALL, MATCH, Input, Output, Patch, State, html, no_update
 from dash.development.base_component import Component
 
-from drivetwin.errors import InputError, MissingParameterError
+from drivetwin.errors import DrivetwinError, InputError, MissingParameterError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.report.figures.stack import Panel
@@ -79,7 +79,7 @@ def _register_bench(page: ui.Page) -> None:
         try:
             live = session.get_simulation()
         except (MissingParameterError, InputError) as incomplete:
-            return [_build_choices(work), ui.make_hint(replace_options(str(incomplete)))]
+            return [_build_choices(work), ui.make_hint(_explain(incomplete))]
         if is_first:
             ui.notify_topic(ui.Topic.STEPS)
         return _build_bench(session, live)
@@ -232,6 +232,12 @@ def _build_slider(one: Slider, work: SessionState) -> Component:
         ],
         className="slider",
     )
+
+
+def _explain(fault: DrivetwinError) -> str:
+    """Return cause and remedy as sentences in words of the page."""
+    parts = [replace_options(part) for part in (fault.what, fault.remedy) if part]
+    return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts)
 
 
 def _has_lock(one: Slider) -> bool:

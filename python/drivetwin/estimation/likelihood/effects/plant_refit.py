@@ -13,10 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Protocol
 
 import numpy as np
 
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
@@ -72,6 +74,7 @@ class PlantSettings:
 
 
 PLANT = PlantSettings()
+_STAGES = TimedStages("plant", ("expansion", "first refit", "refit"))
 
 
 class Minimum(Protocol):
@@ -103,7 +106,8 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     """
     if not fit.problem.parts[0].scale_known or fit.plant is not None:
         return fit
-    expansion = expand_effects(fit, priors)
+    with _STAGES.enter("expansion"):
+        expansion = expand_effects(fit, priors)
     if expansion is None:
         return fit
     evidence = expansion.evidence
@@ -140,13 +144,22 @@ def _iterate_refits(
         for effect in BY_EVIDENCE
         if (found := evidence.get(Group(effect))) is not None and found.nats > PLANT.evidence
     }
+    plans: list[tuple[EffectId, tuple[PriorValue, ...], list[float]]] = []
     for effect, amount in tried.items():
         stated = priors.get_prior(effect, driveline)
         if stated.std > 0.0 or stated.value:
             own = build_plant_priors(effect, priors, driveline)
             starts = _list_starts(own[0]) if amount is None else [np.log(amount * stated.std)]
-            refits = [_refit(fit, effect, own, float(start)) for start in starts]
-            yield from sorted((one for one in refits if one), key=get_nats)[-1:]
+            plans.append((effect, own, [float(start) for start in starts]))
+    stages, numbers = _STAGES.repeat("refit", sum(len(one[2]) for one in plans) - 1), count()
+    for effect, own, starts in plans:
+        refits = []
+        for start in starts:
+            number = next(numbers)
+            name = "refit" if number else "first refit"  # that from a low frequency takes longest
+            with stages.enter(name, number=max(number - 1, 0)):
+                refits.append(_refit(fit, effect, own, start))
+        yield from sorted((one for one in refits if one), key=get_nats)[-1:]
 
 
 def _list_starts(prior: PriorValue) -> list[float]:
@@ -241,13 +254,13 @@ def _build_fit(
     """Build the fit of an extended plant; it has the average over sampling modes of `fit`."""
     problem, point, normal = found.problem, found.point, found.normal
     chi2 = (normal.cost - problem.prior.compute_prior_cost(point.values)) / problem.size
-    own, count = fit.covariance - fit.noise_covariance, point.values.size - plant.index
-    values = point.values + np.append(fit.mean.values - fit.point.values, np.zeros(count))
+    own, added = fit.covariance - fit.noise_covariance, point.values.size - plant.index
+    values = point.values + np.append(fit.mean.values - fit.point.values, np.zeros(added))
     return LikelihoodFit(
         problem,
         point,
         point.replace_values(np.clip(values, problem.lower, problem.upper)),
-        compute_covariance(problem, normal, chi2) + np.pad(own, (0, count)),
+        compute_covariance(problem, normal, chi2) + np.pad(own, (0, added)),
         normal,
         chi2,
         found.iterations,

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin._util.progress import scale_progress
+from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
@@ -69,6 +69,10 @@ class SelectionSettings:
 
 
 SELECTION = SelectionSettings()
+_STAGES = TimedStages(
+    "model selection",
+    ("search", "slow outputs", "restriction", "minima", "averaging", "other outputs"),
+)
 
 
 def select_model(
@@ -88,14 +92,14 @@ def select_model(
     growing = {**guess, AERO: max(guess.get(AERO, 0.0), SELECTION.min_aero)}
     constant = {name: value for name, value in guess.items() if name != AERO}
     problem, start = build_problem(signals, drivelines, loss_law, growing, hilly=True)
-    with scale_progress(0.0, 0.45), limit_evaluations(SELECTION.max_work) as search:
+    with _STAGES.enter("search"), limit_evaluations(SELECTION.max_work) as search:
         best = fit_candidates(problem, start, shifts)
     with (
-        scale_progress(0.45, 0.5, "kinds of signals"),
+        _STAGES.enter("slow outputs", "kinds of signals"),
         limit_evaluations(SELECTION.max_sampling_mode_work),
     ):
         best = refit_slow_outputs(problem, best)
-    with scale_progress(0.5, 0.65), limit_evaluations(SELECTION.max_restricted_work):
+    with _STAGES.enter("restriction"), limit_evaluations(SELECTION.max_restricted_work):
         level = fit_common_load(best)
         point, covariance = level or (best.point, best.covariance)
         guess = growing if aero_load.is_significant(point, covariance) else constant
@@ -103,16 +107,16 @@ def select_model(
         best, problem = _restrict(best, point, narrower, shifts) or (best, problem)
     notes = aero_load.report_aero_load(best)
     with (
-        scale_progress(0.65, 0.85, "other minima"),
+        _STAGES.enter("minima", "other minima"),
         limit_evaluations(min(SELECTION.max_touch_point_work, search.left)),
     ):
         best = find_best_minimum(problem, best)
     with (
-        scale_progress(0.85, 1.0, "kinds of signals"),
+        _STAGES.enter("averaging", "kinds of signals"),
         limit_evaluations(min(SELECTION.max_sampling_mode_work, search.left)),
     ):
         best, doubts = _average_modes(problem, best, priors)
-    with limit_evaluations(SELECTION.max_sampling_mode_work):
+    with _STAGES.enter("other outputs"), limit_evaluations(SELECTION.max_sampling_mode_work):
         best, either = widen_over_modes(problem, best)
     return best, (*notes, *report_modes(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
