@@ -80,5 +80,5 @@ def test_simulated_experiments_take_the_place_of_the_general_advice() -> None:
             "–",
             "–",
         ],
-        ["η", "identified", "± 0.020", limit, "–", "P0.B3", "± 0.010"],
+        ["η", "identified", "± 0.020", limit, "–", "P0 (B3)", "± 0.010"],
     ]

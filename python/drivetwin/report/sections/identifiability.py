@@ -9,7 +9,7 @@ from math import isfinite
 from drivetwin._util.display_units import Display, format_significant, get_display_unit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.estimation.result.suggestion import ExperimentRanking
+from drivetwin.estimation.result.suggestion import CardNumber, CardNumberKind, ExperimentRanking
 from drivetwin.estimation.result.verdict import get_advice
 from drivetwin.report.figures.parameters import (
     compute_half_width_percent,
@@ -92,7 +92,7 @@ def _build_suggestion_tables(
                 Cell(_format_half_width(one.half_width, display), number=True),
                 Cell(one.text),
                 Cell("–" if then is None else _format_half_width(then, display), number=True),
-                Cell("–" if number is None else number.text),
+                Cell("–" if number is None else _name_number(number)),
                 Cell("–" if known is None else _format_half_width(known, display), number=True),
             )
         )
@@ -111,6 +111,11 @@ def _build_suggestion_tables(
         head,
         rows,
     )
+
+
+def _name_number(number: CardNumber) -> str:
+    is_parameter = number.kind is CardNumberKind.PARAMETER
+    return get_parameter_label(number.name) if is_parameter else number.text
 
 
 def _format_half_width(value: float, display: Display) -> str:
