@@ -23,6 +23,8 @@ rust_sources := Cargo.toml $(wildcard Cargo.lock) $(shell find crates -name '*.r
 # The binding crate looks for an interpreter when cargo builds it outside maturin.
 export PYO3_PYTHON := $(CURDIR)/$(bin)/python
 export PIP_REQUIRE_VIRTUALENV := 1
+# Modules are compiled at their first import; pip reads 0 as `--no-compile`.
+export PIP_NO_COMPILE := 0
 # Compiled tests are kept: pytest rewrites their assertions, which takes as long as the imports.
 unexport PYTHONDONTWRITEBYTECODE
 
