@@ -117,8 +117,9 @@ class ShiftTerm:
 
     def _is_complete(self, run: Trajectory) -> bool:
         """Return whether a run reached its end with residuals that can be squared."""
-        worst = np.max(np.abs(self.compute_residual(run)) / self.record.sigma)
-        return run.status == "completed" and bool(worst < OBJECTIVE.max_residual)
+        largest = OBJECTIVE.max_residual * self.record.sigma
+        is_small = np.abs(self.compute_residual(run)) < largest  # no quotient, which may overflow
+        return run.status == "completed" and bool(np.all(is_small))
 
     def compute_residual(self, run: Trajectory) -> FloatArray:
         """Compute measured minus simulated (n,), the latter as for the measured inputs."""
