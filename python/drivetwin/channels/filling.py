@@ -78,10 +78,12 @@ class FillingSettings:
     """Lines of the spectrum on each side that show its level [count]."""
     periods: int = 12
     """Most periods tried [count]."""
-    longest_cycle: int = 16
-    """Longest cycle of values that knots may reproduce by coincidence [count]: knots at least 2.4
-    samples apart with two unknowns each leave a cycle of 13 samples at least three numbers to meet,
-    each to a hundredth."""
+    cyclic: float = 0.25
+    """Mean distance of neighbours over the largest at any lag, above which a record that repeats is
+    a cycle of numbers: 4/N of N rising ones, about 1 in random order. An oscillation of P samples
+    has pi/P, and may be that of a filled signal."""
+    rounds: int = 4
+    """Fewest rounds of such a cycle [count]."""
     chance: float = 1e-9
     """Probability from which on chance may have made a line of the spectrum of bends."""
     exact: float = 0.01
@@ -202,16 +204,18 @@ def _find_in_window(time: FloatArray, values: FloatArray) -> KnotFit | Filling |
 
 
 def _is_cycle(values: FloatArray) -> bool:
-    """Return True if samples are nearer to those a few samples before than to their neighbours.
+    """Return True if the record goes round a few values, as parameter numbers that a bus sends.
 
-    A sample that was interpolated lies between two knots, so it is nearer to its neighbours than to
-    samples of other knots. A cycle of values, as the numbers of parameters that a bus sends in
-    turn, is the other way round. Its residuals repeat with it: that knots reproduce one round is a
-    coincidence of a few numbers, and the other rounds are no further evidence.
+    Samples that were interpolated lie between two knots, so they are nearer to their neighbours
+    than to samples of other knots. In a cycle they are nearer to those of the round before. If
+    knots reproduce one round they reproduce all, which is no further evidence; and a short round
+    has fewer numbers than knots have unknowns. Five are reproduced by two cubic knots with two
+    unknowns each and their start.
     """
-    beside = np.abs(np.diff(values)).sum() / (values.size - 1)
-    rounds = range(2, min(FILLING.longest_cycle, values.size - 1) + 1)
-    return any(np.mean(np.abs(values[lag:] - values[:-lag])) < beside for lag in rounds)
+    most = values.size // FILLING.rounds
+    apart = [float(np.mean(np.abs(values[lag:] - values[:-lag]))) for lag in range(1, most + 1)]
+    beside = apart[0]
+    return min(apart) < beside > FILLING.cyclic * max(apart)
 
 
 def _list_periods(values: FloatArray) -> list[float]:
