@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -120,3 +121,25 @@ def test_a_worker_that_is_told_a_wrong_function_says_so(tmp_path: Path) -> None:
     )
     assert isinstance(reply, Aborted)
     assert "nothing" in reply.what
+
+
+@pytest.mark.parametrize("place", ["before", "after"])
+def test_a_worker_that_starts_while_the_run_ends_is_ended_too(
+    cell: GuardedWorker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    """The end of a run may come between the decision to start a worker and its process."""
+    spawn = GuardedWorker._spawn
+
+    def spawn_at_the_end(self: GuardedWorker) -> None:
+        if place == "before":
+            self.kill()
+        spawn(self)
+        if place == "after":
+            self.kill()
+
+    monkeypatch.setattr(GuardedWorker, "_spawn", spawn_at_the_end)
+    began = time.monotonic()
+    reply = cell.run(_task(tmp_path, "hang"))
+    assert isinstance(reply, WorkerLost)
+    assert not reply.blame
+    assert time.monotonic() - began < 10.0

@@ -11,8 +11,9 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from pathlib import Path
-from time import monotonic, sleep
+from time import monotonic
 from typing import IO
 
 from drivetwin.fleet.task import (
@@ -65,7 +66,7 @@ class GuardedWorker:
         self._process: subprocess.Popen[bytes] | None = None
         self._stderr: IO[bytes] | None = None
         self._pending = b""
-        self._closed = False
+        self._closed = threading.Event()
 
     def run(self, task: Task) -> Reply:
         """Run a task within the limits. Errors of log or worker are returned, not raised."""
@@ -87,14 +88,14 @@ class GuardedWorker:
 
     def kill(self) -> None:
         """End a log in progress, from any thread; no worker is made again."""
-        self._closed = True
+        self._closed.set()  # before the look at the process, see `_start`
         process = self._process
         if process is not None:
             process.kill()
 
     def close(self) -> None:
         """End the worker, if there is one, from the thread that uses the cell."""
-        self._closed = True
+        self._closed.set()
         if self._process is not None:
             self._stop_process()
 
@@ -105,12 +106,15 @@ class GuardedWorker:
         """
         why = ""
         for pause in _PAUSES:
-            if self._closed:
+            if self._closed.is_set():
                 return WorkerLost("the run was ended", blame=False)
             if self._process is not None:
                 return None
             try:
                 self._spawn()
+                if self._closed.is_set():  # `kill` came before there was a process to end
+                    self._stop_process()
+                    continue
                 if not isinstance(self._read_line(monotonic() + _START, sys.maxsize), Outcome):
                     return None
                 why = self._stop_process()
@@ -120,7 +124,7 @@ class GuardedWorker:
                 why = str(fault.strerror)
             if why.startswith(_BY_ITSELF):
                 break
-            sleep(pause)
+            self._closed.wait(pause)
         return Aborted(
             f"no worker starts: it {why}", "see whether 'drivetwin identify' runs on this machine"
         )
