@@ -196,18 +196,23 @@ PARAMETERS = [(12, 13, 4, 17, 5), (4, 5, 12, 13, 17), (12, 12, 13, 4, 17), (214,
 """Numbers of parameters that a tester asks for in turn."""
 
 
+def count(size: int, step: float) -> FloatArray:
+    """Return even stamps [s]."""
+    return np.arange(size) * np.float64(step)
+
+
 @pytest.mark.parametrize("numbers", PARAMETERS)
 def test_numbers_that_are_sent_in_turn_are_not_filled(numbers: tuple[int, ...]) -> None:
     """Two knots in five samples, two unknowns each, and their start reproduce any five numbers."""
     values = np.tile(np.array(numbers, float), 60)
-    assert find_filling(0.02 * np.arange(values.size), values) is None
+    assert find_filling(count(values.size, 0.02), values) is None
 
 
 def test_readings_of_several_parameters_in_one_column_are_not_filled() -> None:
     index = np.arange(400)
     levels, phases = np.array([1450.0, 88.0, 40.0, 12.0, 260.0]), np.arange(5.0)
     values = (levels * (1.0 + 0.05 * np.sin(0.01 * index[:, None] + phases)))[index, index % 5]
-    assert find_filling(0.02 * index, values) is None
+    assert find_filling(count(400, 0.02), values) is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
@@ -216,7 +221,8 @@ def test_knots_of_an_oscillation_that_repeats_exactly_are_found(noise: float) ->
     knots = 0.01 * np.arange(400)
     random = np.random.default_rng(4)
     values = 100.0 * np.sin(2.0 * np.pi * 5.0 * knots) + random.normal(0.0, noise, knots.size)
-    time = 0.001 * np.arange(3990)
+    time = count(3990, 0.001)
     found = find_filling(time, np.interp(time, knots, values))
     assert found is not None
-    assert (found.kind, found.period) == (FillKind.LINEAR, pytest.approx(0.01))
+    assert found.kind is FillKind.LINEAR
+    assert found.period == pytest.approx(0.01)
