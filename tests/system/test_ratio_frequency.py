@@ -19,6 +19,7 @@ from drivetwin.vehicle.spec import Z95
 LOGS = 200
 
 
+@pytest.mark.timeout(1800)
 @pytest.mark.statistical
 @pytest.mark.parametrize("scenario", ["paper_steps", "power_on_down"])
 def test_intervals_of_ratios_contain_the_truth(scenario: str, tmp_path: Path) -> None:
