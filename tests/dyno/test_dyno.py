@@ -54,7 +54,7 @@ def test_engine_torque_is_as_old_as_te_delay_says() -> None:
     assert np.allclose(channel.values, asked, rtol=1e-9)
 
 
-@pytest.mark.parametrize("noise", [-1.0, float("nan")])
-def test_noise_factor_must_not_be_negative(noise: float) -> None:
+@pytest.mark.parametrize("noise", [-1.0, float("nan"), float("inf")])
+def test_noise_factor_must_be_finite_and_not_negative(noise: float) -> None:
     with pytest.raises(InputError, match="noise"):
         run(load_scenario("paper"), noise=noise)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Random networks: one-way clutches, prescribed speeds, starting locks, inertias of any size."""
+"""Random networks: one-way clutches, starting locks, ratios that cancel, inertias of any size."""
 
 from __future__ import annotations
 
@@ -228,3 +228,123 @@ class _Draw:
         values = self.speed() + np.where(self.rng.random() < 0.5, 0.0, steps)
         name = self.input(f"w {len(self.elements)}", np.asarray(values))
         self.add("prescribed_speed", node=str(self.rng.choice(self.nodes)), input=name)
+
+
+def draw_cancelling_network(seed: int) -> RandomNetwork:
+    """Draw a network whose ratios cancel, with a start that all its locks agree with.
+
+    Trains of gears and planetary sets lead back to the speed that they begin at, rings are fixed to
+    carriers, and clutches lock what is coupled already. Inertias lie between 1e-9 and 1e9 kg m^2.
+    """
+    return _CancellingDraw(np.random.default_rng(seed)).network()
+
+
+class _CancellingDraw(_Draw):
+    """Trains whose ratios cancel; `speeds` has the speed of every node."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        super().__init__(rng)
+        self.nodes = self.nodes[:3]
+        self.speeds = {node: self.speeds[node] for node in self.nodes}
+        self.locked: list[str] = []
+
+    def network(self) -> RandomNetwork:
+        """Draw a whole network."""
+        rng = self.rng
+        for node in self.nodes:
+            self.mass(node)
+        trains = [self.gear_train, self.ring_on_carrier, self.sun_on_ring, self.set_and_inverse]
+        for _ in range(int(rng.integers(1, 4))):
+            trains[int(rng.integers(len(trains)))](str(rng.choice(self.nodes)))
+        for _ in range(int(rng.integers(1, 5))):
+            self.clutch()
+        others = [self.load, self.torque, self.torque]
+        for _ in range(int(rng.integers(0, 4))):
+            others[int(rng.integers(len(others)))]()
+        if rng.random() < 0.1:
+            self.prescribed_speed()
+        return RandomNetwork(self.elements, self.inputs, self.speeds, tuple(self.locked))
+
+    def mass(self, node: str) -> None:
+        """Add an inertia to a node."""
+        self.add("inertia", node=node, inertia=10.0 ** float(self.rng.uniform(-9.0, 9.0)))
+
+    def member(self, speed: float, *, heavy: float = 0.5) -> str:
+        """Add a node that turns at `speed` [rad/s], with an inertia in a share of cases."""
+        node = f"m{len(self.speeds)}"
+        self.speeds[node] = speed
+        if self.rng.random() < heavy:
+            self.mass(node)
+        return node
+
+    def ratio(self) -> float:
+        """Draw a ratio of few digits or of many, of either sign."""
+        ratio = float(10.0 ** self.rng.uniform(-1.0, 1.0))
+        digits = int(self.rng.choice([1, 2, 4, 16]))
+        return float(self.rng.choice([1.0, 1.0, -1.0])) * max(round(ratio, digits), 0.1)
+
+    def close(self, a: str, b: str) -> None:
+        """Put one or two clutches between two members that turn alike, mostly locked."""
+        self.nodes.append(b)
+        for _ in range(int(self.rng.choice([1, 1, 2]))):
+            self.friction_clutch(a, b)
+            if self.rng.random() < 0.8:
+                self.locked.append(self.elements[-1]["name"])
+
+    def gear_train(self, a: str) -> None:
+        """Add gears in series whose ratios multiply to 1."""
+        node, whole = a, 1.0
+        for _ in range(int(self.rng.integers(1, 5))):
+            ratio = self.ratio()
+            node, before = self.member(self.speeds[node] / ratio), node
+            self.add("gear", a=before, b=node, ratio=ratio)
+            whole *= ratio
+        end = self.member(self.speeds[a])
+        self.add("gear", a=node, b=end, ratio=1.0 / whole)
+        self.close(a, end)
+
+    def ring_on_carrier(self, a: str) -> None:
+        """Add a planetary set whose ring is fixed to its carrier: its sun turns alike."""
+        sun = self.member(self.speeds[a])
+        self.add("planetary", sun=sun, ring=a, carrier=a, z=self.teeth())
+        self.close(a, sun)
+
+    def sun_on_ring(self, a: str) -> None:
+        """Add a planetary set whose sun is fixed to its ring: its carrier turns alike."""
+        carrier = self.member(self.speeds[a])
+        self.add("planetary", sun=a, ring=a, carrier=carrier, z=self.teeth())
+        self.close(a, carrier)
+
+    def set_and_inverse(self, a: str) -> None:
+        """Add a planetary set with a held ring and the same set the other way round."""
+        z = self.teeth()
+        carrier = self.member(self.speeds[a] / (1.0 + z))
+        sun = self.member(self.speeds[a])
+        self.add("planetary", sun=a, ring="ground", carrier=carrier, z=z)
+        self.add("planetary", sun=sun, ring="ground", carrier=carrier, z=z)
+        self.close(a, sun)
+
+    def teeth(self) -> float:
+        """Draw the ratio of teeth of a planetary set."""
+        return round(float(self.rng.uniform(1.2, 4.5)), int(self.rng.choice([1, 2, 16])))
+
+    def friction_clutch(self, a: str, b: str) -> None:
+        """Add a clutch between two nodes."""
+        name = self.input(f"P {len(self.elements)}", np.abs(self.torques()) * 10.0)
+        law = {"friction": self.friction(), "gain": 1.0, "p0": 0.0, "peak": 1.0}
+        self.add("clutch", a=a, b=b, **law, pressure=name, drum_inertia=0.0)
+
+    def clutch(self) -> None:
+        """Add a clutch between any two nodes, locked where these turn alike."""
+        a, b = self.flanges()
+        self.friction_clutch(a, b)
+        alike = self.speeds.get(a, 0.0) == self.speeds.get(b, 0.0)
+        if alike and self.rng.random() < 0.8:
+            self.locked.append(self.elements[-1]["name"])
+
+    def prescribed_speed(self) -> None:
+        """Prescribe the speed of a node, from its start on."""
+        node = str(self.rng.choice(self.nodes))
+        steps = self.rng.normal(size=self.times.size) * self.rng.uniform(0.0, 30.0)
+        name = self.input(f"w {len(self.elements)}", self.speeds[node] + steps - steps[0])
+        self.add("prescribed_speed", node=node, input=name)

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import re
 import time
+from collections import Counter
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -18,6 +21,7 @@ from drivetwin.simulation.network import NetworkRun, Output, Start, simulate
 from tests.support.random_network import (
     SECONDS,
     RandomNetwork,
+    draw_cancelling_network,
     draw_network,
     draw_plain_network,
 )
@@ -29,6 +33,8 @@ BALANCE = 1e-8
 """Largest error of the energy balance, relative to the largest energy of the run."""
 LONGEST = 10.0
 """Processor time of a run [s]."""
+START = 1e-9
+"""Largest distance of the first speeds to those stated, relative to the largest of these."""
 AGREEMENT = 5e-3
 """Distance to the regularised solution, relative to the largest speed."""
 
@@ -72,17 +78,28 @@ def check(network: RandomNetwork, done: NetworkRun, seed: int) -> None:
         assert overrun <= OVERRUN * fastest, f"seed {seed}: {name} overruns by {overrun} rad/s"
     if done.status != "completed" or done.audit is None:
         return
+    size = measure_energy(network, done)
+    assert abs(done.audit.error) <= BALANCE * size, f"seed {seed}: {done.audit}"
+    lost = sum(event.energy for event in done.events if event.kind == "impulse")
+    assert lost == pytest.approx(done.audit.impulse, rel=1e-9, abs=1e-12 * size), f"seed {seed}"
+
+
+def measure_energy(network: RandomNetwork, done: NetworkRun) -> float:
+    """Largest energy of an audited run [J]."""
+    assert done.audit is not None
+    columns = {key: column[np.isfinite(column)] for key, column in done.columns.items()}
+    speeds = {name: c for (kind, name), c in columns.items() if kind == "speed" and c.size}
+    stated = max(abs(v) for v in network.speeds.values())
+    fastest = max([stated, *(float(np.abs(c).max()) for c in speeds.values())])
     audit = done.audit
-    kinetic = sum(0.5 * network.inertias[n] * float((c**2).max()) for n, c in speeds.items())
+    inertias = network.inertias
+    kinetic = sum(0.5 * inertias.get(n, 0.0) * float((c**2).max()) for n, c in speeds.items())
     work = [audit.source, audit.stored, audit.friction, audit.load, audit.shaft, audit.impulse]
     # Loads that drive and loads that brake cancel in their account.
     pull = sum(e["constant"] for e in network.elements if e["type"] == "road_load")
     passing = (c for (kind, _), c in columns.items() if kind in ("energy", "work") and c.size)
     peaks = [float(np.abs(column).max()) for column in passing]
-    size = max([kinetic, pull * fastest * SECONDS, *map(abs, work), *peaks])
-    assert abs(audit.error) <= BALANCE * size, f"seed {seed}: {audit}"
-    lost = sum(event.energy for event in done.events if event.kind == "impulse")
-    assert lost == pytest.approx(audit.impulse, rel=1e-9, abs=1e-12 * size), f"seed {seed}"
+    return float(max([kinetic, pull * fastest * SECONDS, *map(abs, work), *peaks]))
 
 
 def survey(seeds: range) -> dict[str, int]:
@@ -99,6 +116,56 @@ def survey(seeds: range) -> dict[str, int]:
             if done is not None:
                 check(network, done, seed)
     return outcomes
+
+
+def survey_cancelling(seeds: Iterable[int]) -> Counter[str]:
+    """Run networks whose ratios cancel; count the outcomes, missed starts and missed balances."""
+    outcomes: Counter[str] = Counter()
+    for seed in seeds:
+        network = draw_cancelling_network(seed)
+        inputs = {name: Signal(*samples) for name, samples in network.inputs.items()}
+        start = Start(network.speeds, locked=tuple(network.locked))
+        outputs: list[Output] = [("speed", node) for node in network.speeds]
+        outputs += list_energies(network)
+        try:
+            done = simulate(network.elements, inputs, start, GRID, outputs, audit=True)
+        except InputError as error:
+            outcomes["refused: " + _shorten(str(error).splitlines()[0])] += 1
+            continue
+        if done.status != "completed":
+            outcomes["refused: " + _shorten(done.status)] += 1
+            continue
+        assert done.audit is not None
+        outcomes["completed"] += 1
+        stated = np.array(list(network.speeds.values()))
+        begun = np.array([done.columns["speed", node][0] for node in network.speeds])
+        missed = np.abs(begun - stated).max() > START * np.abs(stated).max()
+        outcomes["missed start"] += bool(missed)
+        size = measure_energy(network, done)
+        outcomes["missed balance"] += abs(done.audit.error) > BALANCE * size
+    return outcomes
+
+
+def _shorten(reason: str) -> str:
+    """Take numbers and names of elements and members out of a reason."""
+    names = r"(clutch|gear|planetary|torque|inertia|prescribed_speed|spring_damper|road_load) \d+"
+    reason = re.sub(names, "X", reason)
+    reason = re.sub(r"-?\d+(\.\d+)?(e[+-]?\d+)?", "N", reason)
+    return re.sub(r"\b[nm]N\b", "member", re.sub(r"X(, X)+", "X", reason))
+
+
+@pytest.mark.exhaustive
+@pytest.mark.timeout(20_000)
+def test_many_networks_whose_ratios_cancel() -> None:
+    outcomes = survey_cancelling(range(20_000))
+    assert (outcomes["missed start"], outcomes["missed balance"]) == (0, 0), outcomes
+    assert outcomes["completed"] >= 0.98 * 20_000, outcomes
+
+
+def test_networks_whose_ratios_cancel_start_as_stated_and_close_their_balance() -> None:
+    outcomes = survey_cancelling(range(150))
+    assert (outcomes["missed start"], outcomes["missed balance"]) == (0, 0), outcomes
+    assert outcomes["completed"] >= 0.98 * 150, outcomes
 
 
 def test_random_networks_end_without_overrun_and_close_their_balance() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,7 +37,7 @@ def _parse_shift(text: str, logs: Sequence[Path]) -> tuple[int, int | None]:
         return whole[0], None
     name, _, number = text.rpartition(":")
     places = _find_logs(name, logs) if name else list(range(len(logs)))
-    if not number.isdecimal() or len(places) != 1:
+    if not re.fullmatch(r"\d{1,9}", number) or len(places) != 1:
         raise InputError(
             f"{text!r} names no shift or log of {', '.join(log.name for log in logs)}",
             "give the number of a shift of the only log, a log, or LOG:NUMBER",

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -54,10 +55,10 @@ def run(
     their rates and delays stay. `effects` are the sizes, by `EffectId`, of departures from the
     dual-clutch model; the truth stays that of the model. The same arguments give the same log, bit
     for bit.
-    Raises SimulationError where the run does not complete, InputError for a negative noise and for
-    impossible effects.
+    Raises SimulationError where the run does not complete, InputError for a noise that is negative
+    or infinite and for impossible effects.
     """
-    if not noise >= 0.0:
+    if not 0.0 <= noise < math.inf:
         raise InputError(
             f"a noise factor of {noise:g}",
             "give 0 for ideal sensors, 1 for the scenario's, or another positive factor",

@@ -10,6 +10,7 @@ import numpy as np
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.network import Sine
+from drivetwin.simulation.serialize import format_value
 
 InputValue = float | Sequence[tuple[float, float]] | FloatArray | Signal | Sine
 """A constant; points (n, 2) of time [s] and value, linear between and constant beyond; samples."""
@@ -21,13 +22,13 @@ def make_input(name: str, value: InputValue, span: tuple[float, float]) -> Signa
         return value
     try:
         points = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         points = np.zeros((0, 0))
     if points.ndim == 0:
         points = np.array([[span[0], float(points)]])
     if points.ndim != 2 or points.shape[1] != 2 or not len(points):
         raise InputError(
-            f"the input of {name} is {value!r}",
+            f"the input of {name} is {format_value(value)}",
             "give a number, points [(time, value), ...], a Signal or a Sine",
         )
     first, last = points[0], points[-1]

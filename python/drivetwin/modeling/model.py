@@ -25,6 +25,7 @@ from drivetwin.modeling.run import ModelRun
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
 from drivetwin.simulation.network import Output, Sine, Start, simulate
+from drivetwin.simulation.serialize import as_array, require_number
 
 _SAMPLING = 1e-3
 """Interval of the samples of a run that states its end only, s."""
@@ -102,24 +103,23 @@ class Model(ElementMethods):
         refuse_faults(self._find_faults())
         run = None
         if time is not None:
-            span = (0.0, float(time))
+            span = (0.0, require_number("end time", time))
             run = Run(self._make_inputs(span), self._resolve_start(), span)
         return format_package(self.name, [part.element for part in self.parts], run)
 
     def _make_grid(self, time: float | FloatArray) -> FloatArray:
         if np.ndim(time) > 0:
-            return np.asarray(time, dtype=np.float64)
-        end = float(time)
-        count = round(end / _SAMPLING) if np.isfinite(end) else 0
-        return np.linspace(0.0, end, max(count, 1) + 1)
+            return as_array(time)
+        end = require_number("end time", time)
+        return np.linspace(0.0, end, max(round(end / _SAMPLING), 1) + 1)
 
     def _make_inputs(self, span: tuple[float, float]) -> dict[str, Signal | Sine]:
         return {name: make_input(name, value, span) for name, value in self.inputs.items()}
 
     def _resolve_start(self) -> Start:
         refuse_faults(self._find_faults())
-        speeds = {self._get_node(at).name: float(speed) for at, speed in self._speeds.items()}
-        twists = {_get_name(part): float(twist) for part, twist in self._twists.items()}
+        speeds = {self._get_node(at).name: speed for at, speed in self._speeds.items()}
+        twists = {_get_name(part): twist for part, twist in self._twists.items()}
         return Start(speeds, twists, tuple(_get_name(part) for part in self._locked))
 
     def _find_faults(self) -> list[str]:

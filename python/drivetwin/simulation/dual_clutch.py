@@ -224,14 +224,14 @@ class Accuracy:
     order: int | None = None
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.tolerance < math.inf:
+        if not 0.0 < require_number("tolerance", self.tolerance, finite=False) < math.inf:
             fault, remedy = f"tolerance is {self.tolerance!r}", "give a finite positive number"
-        elif not self.max_step > 0.0:
+        elif not require_number("max_step", self.max_step, finite=False) > 0.0:
             fault, remedy = f"max_step is {self.max_step!r}", "give a positive time [s], or inf"
         elif self.order is not None and not (
             isinstance(self.order, int | np.integer) and self.order in ORDERS
         ):
-            fault = f"order is {self.order!r}"
+            fault = f"order is {require_number('order', self.order, finite=False):g}"
             remedy = f"give an integer from {ORDERS[0]} to {ORDERS[-1]}, or None"
         elif self.order is not None and math.isinf(self.max_step):
             fault = f"order is {self.order} and max_step inf: nothing limits the error of a step"

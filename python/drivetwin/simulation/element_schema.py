@@ -15,6 +15,7 @@ import numpy as np
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import InputError
+from drivetwin.simulation.serialize import format_value, is_number
 
 GROUND = "ground"
 
@@ -108,7 +109,7 @@ def find_element_faults(elements: Sequence[Mapping[str, Any]]) -> list[str]:
     names: set[str] = set()
     for place, element in enumerate(elements):
         if not isinstance(element, Mapping):
-            faults.append(f"element {place}: {element!r} is no mapping")
+            faults.append(f"element {place}: {format_value(element)} is no mapping")
             continue
         name = element.get("name")
         if not isinstance(name, str) or not name:
@@ -164,7 +165,7 @@ def _find_faults(given: Mapping[str, Any], fields: Mapping[str, Field]) -> Itera
         elif one.kind is FieldKind.GROUP:
             yield from (f"{key}: {fault}" for fault in _find_group_faults(given[key], one))
         elif not _matches(given[key], one.kind):
-            yield f"{key} = {given[key]!r} is no {_MEANINGS[one.kind]}"
+            yield f"{key} = {format_value(given[key])} is no {_MEANINGS[one.kind]}"
 
 
 def _find_group_faults(given: object, field: Field) -> list[str]:
@@ -172,7 +173,7 @@ def _find_group_faults(given: object, field: Field) -> list[str]:
     if is_dataclass(given) and not isinstance(given, type):
         given = vars(given)
     if not isinstance(given, Mapping):
-        return [f"{given!r} is no mapping of {', '.join(field.group[0])}"]
+        return [f"{format_value(given)} is no mapping of {', '.join(field.group[0])}"]
     best = max(field.group, key=lambda fields: len(set(fields) & set(given)))
     return list(_find_faults(given, best))
 
@@ -195,17 +196,12 @@ def _matches(value: Any, kind: FieldKind) -> bool:
         case FieldKind.FLAG:
             return isinstance(value, bool | np.bool_)
         case FieldKind.NUMBER:
-            return _is_number(value)
+            return is_number(value)
         case FieldKind.NUMBERS:
-            return _is_list(value) and all(map(_is_number, value))
+            return _is_list(value) and all(map(is_number, value))
         case _:
             return _is_list(value) and all(_matches(row, FieldKind.NUMBERS) for row in value)
 
 
 def _is_list(value: object) -> bool:
     return isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim > 0)
-
-
-def _is_number(value: Any) -> bool:
-    number = isinstance(value, int | float | np.integer | np.floating)
-    return number and not isinstance(value, bool) and bool(np.isfinite(value))

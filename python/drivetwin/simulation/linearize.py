@@ -21,7 +21,7 @@ from drivetwin.simulation.dual_clutch import DualClutch, FloatArray
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
 from drivetwin.simulation.network import Element
 from drivetwin.simulation.network_output import Request, combine_columns, resolve_output
-from drivetwin.simulation.serialize import as_json, as_names
+from drivetwin.simulation.serialize import as_json, as_names, require_number
 
 Output = tuple[str, str]
 """A quantity and the name of its node or element, such as ("shaft_torque", "output shaft")."""
@@ -159,7 +159,14 @@ def linearise(
         matrices, states, inputs = native_linearise(
             as_json(driveline if elements is None else elements),
             locked,
-            [(name, p.slip, p.pressure) for name, p in points.items()],
+            [
+                (
+                    name,
+                    require_number(f"slip of {name!r}", p.slip, finite=False),
+                    require_number(f"pressure of {name!r}", p.pressure, finite=False),
+                )
+                for name, p in points.items()
+            ],
             [one for request in requests for one in request.native],
         )
     except ValueError as error:

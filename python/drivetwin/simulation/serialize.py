@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import reprlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from numbers import Real
@@ -25,7 +26,11 @@ def as_json(description: object) -> str:
     try:
         return json.dumps(description, default=_to_json_types, allow_nan=False)
     except ValueError:
+        pass
+    try:
         plain = json.loads(json.dumps(description, default=_to_json_types))
+    except ValueError as error:
+        raise InputError(f"an integer is too long: {error}", "give numbers in SI") from None
     bad = [key for key, value in _iterate_leaves("", plain) if not np.isfinite(value)]
     raise InputError(
         f"not a finite number: {', '.join(bad)}", "give every parameter of the model a value"
@@ -34,6 +39,8 @@ def as_json(description: object) -> str:
 
 def _to_json_types(value: object) -> object:
     """Convert a value to JSON-serialisable types."""
+    if isinstance(value, np.floating):
+        return float(value)
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if is_dataclass(value):
@@ -58,7 +65,7 @@ def _iterate_leaves(path: str, value: object) -> Iterator[tuple[str, float]]:
         yield path, value
 
 
-def as_array(values: FloatArray) -> FloatArray:
+def as_array(values: float | FloatArray) -> FloatArray:
     """Values (n,) as the core takes them: float64 without gaps. Raises InputError for others.
 
     Texts, dates and complex numbers are no numbers here, even where NumPy converts them.
@@ -71,7 +78,7 @@ def as_array(values: FloatArray) -> FloatArray:
         raise InputError("an array with masked values", "leave these samples out")
     try:
         column = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"an array without numbers: {error}", "give numbers in SI") from error
     if column.ndim != 1:
         raise InputError(f"an array of shape {column.shape}", "give one with a single axis")
@@ -102,11 +109,38 @@ def require_number(name: str, value: object, *, finite: bool = True) -> float:
     """Return a number in SI. Raises InputError for what is none, or not `finite`."""
     plain = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     if not isinstance(plain, Real):
-        what = f"{name} is {value!r}, a {type(value).__name__} and not a number"
+        what = f"{name} is {format_value(value)}, a {type(value).__name__} and not a number"
         raise InputError(what, "give a number in SI")
-    if finite and not np.isfinite(float(plain)):
-        raise InputError(f"{name} is {float(plain)}", "give a finite number in SI")
-    return float(plain)
+    try:
+        number = float(plain)
+    except OverflowError:
+        what = f"{name} is {format_value(value)}, beyond 64-bit numbers"
+        raise InputError(what, "give a number in SI") from None
+    if finite and not np.isfinite(number):
+        raise InputError(f"{name} is {number}", "give a finite number in SI")
+    return number
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value is a finite number that a float64 can hold."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    try:
+        return bool(np.isfinite(float(value)))
+    except OverflowError:
+        return False
+
+
+def format_value(value: object) -> str:
+    """Write a value of any kind, shortened, for a message."""
+    try:
+        return _SHORT.repr(value)
+    except ValueError:  # an integer with more digits than Python writes
+        return "an integer of too many digits"
+
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
 
 
 def as_names(names: Sequence[str]) -> list[str]:

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 //! From the stated mechanism to matrices in minimal coordinates.
 
-use super::constraints::{Coordinates, Followers, coordinates};
+use super::constraints::{Coordinates, Followers, SpeedForm, coordinates};
 use super::error::CompileError;
 use super::linalg::{Matrix, independent_rows, is_nothing, solve};
 use super::mode::{ModeKey, Motion};
-use super::nonlinear_torque::{NonlinearTorque, TorqueLaw};
+use super::nonlinear_torque::{NonlinearTorque, TorqueLaw, form};
 use super::table_loss::TableLoss;
 use crate::model::mechanism::{Account, ForceLaw, Loss, Mechanism, Normal, Row, SpringLaw};
 use crate::model::{Driveline, FrictionLaw, Name};
@@ -24,7 +24,7 @@ pub struct FrictionElement<T> {
     /// Name for messages and events.
     pub element: Name,
     /// Slip over the independent speeds.
-    pub slip: Vec<T>,
+    pub slip: SpeedForm<T>,
     /// Slip over the nodes; its negative is the direction of the torque.
     pub nodes: Row<T>,
     /// μ over |slip|.
@@ -47,7 +47,7 @@ pub struct LossyGear<T> {
     /// Its loss.
     pub loss: Loss<T>,
     /// Speed of the driving side over the independent speeds.
-    pub speed: Vec<T>,
+    pub speed: SpeedForm<T>,
 }
 
 /// A torque that is a channel or a lagging state.
@@ -94,7 +94,7 @@ pub struct Network<T> {
     /// Gears with tables of losses.
     pub table_losses: Vec<TableLoss>,
     /// Prescribed speeds over the independent speeds, and their inputs.
-    pub prescribed: Vec<(Vec<T>, usize)>,
+    pub prescribed: Vec<(SpeedForm<T>, usize)>,
     /// Scalar channels: frictions first.
     pub channels: Vec<NonlinearTorque<T>>,
     /// Torques that are channels other than friction, or lagging states.
@@ -104,6 +104,8 @@ pub struct Network<T> {
     /// Node torques of everything but rigid couplings and stuck friction, over the basis: nodes ×
     /// basis.
     pub node_torques: Matrix<T>,
+    /// Independent speeds of members without mass between friction elements, which got [`MASSLESS`].
+    pub massless: Vec<usize>,
     /// Members without mass between compliances, where there are any.
     pub followers: Option<Followers<T>>,
     /// Matrices shared by all modes if no gear loss depends on its state.
@@ -140,15 +142,20 @@ impl<T: Number> Network<T> {
             channels: Vec::new(),
             applied_torques: Vec::new(),
             lags: Vec::new(),
+            massless: Vec::new(),
             followers: None,
             motion: None,
         };
         network.count_states();
         network.set_mass();
-        if network.give_mass_between_frictions() {
+        let given = network.give_mass_between_frictions();
+        if !given.is_empty() {
             network.set_mass();
         }
         network.eliminate_massless()?;
+        let places = network.coordinates.independent.iter().enumerate();
+        network.massless =
+            places.filter(|(_, node)| given.contains(node)).map(|(j, _)| j).collect();
         network.refuse_massless()?;
         network.add_rows();
         network.refuse_prescribed_twice()?;
@@ -211,16 +218,13 @@ impl<T: Number> Network<T> {
     }
 
     /// A linear form over nodes, expressed over the independent speeds.
-    pub fn over_speeds(&self, row: &[(usize, T)]) -> Vec<T> {
-        let n = &self.coordinates.speeds;
-        (0..n.cols)
-            .map(|j| row.iter().fold(T::zero_(), |sum, &(node, c)| sum + c * n[(node, j)]))
-            .collect()
+    pub fn over_speeds(&self, row: &[(usize, T)]) -> SpeedForm<T> {
+        self.coordinates.form(row)
     }
 
     /// A linear form over nodes, expressed over the basis as far as it has terms.
     pub fn over_basis(&self, row: &[(usize, T)]) -> Vec<T> {
-        let mut form = self.over_speeds(row);
+        let mut form = self.over_speeds(row).to_vec();
         if let Some(Followers { speeds, .. }) = &self.followers {
             form.resize(speeds.cols, T::zero_());
             for &(node, c) in row {
@@ -228,6 +232,12 @@ impl<T: Number> Network<T> {
             }
         }
         form
+    }
+
+    /// Speed of a node at an instant, rad/s.
+    pub fn node_speed_at(&self, node: usize, basis: &[T]) -> T {
+        let own = form(self.coordinates.speeds.row(node), basis);
+        self.followers.as_ref().map_or(own, |f| own + form(f.speeds.row(node), basis))
     }
 
     /// Return true if the speed of a node is no state: it follows from the balance of torques.
@@ -244,7 +254,7 @@ impl<T: Number> Network<T> {
         }
     }
 
-    fn node_speed(&self, node: usize) -> Vec<T> {
+    fn node_speed(&self, node: usize) -> SpeedForm<T> {
         self.over_speeds(&[(node, T::of(1.0))])
     }
 
@@ -263,11 +273,11 @@ impl<T: Number> Network<T> {
         solve(self.mass.clone(), Matrix::zeros(self.mass.rows, 0)).err()
     }
 
-    /// Members without mass between friction elements get a negligible one; whether there are any. Behind one
-    /// element alone there is nothing to follow while it is open.
-    fn give_mass_between_frictions(&mut self) -> bool {
+    /// Members without mass between friction elements get a negligible one; their nodes. Behind one element alone
+    /// there is nothing to follow while it is open.
+    fn give_mass_between_frictions(&mut self) -> Vec<usize> {
         let floor = T::promote(self.inertia.max_abs() * MASSLESS);
-        let mut given = false;
+        let mut given = Vec::new();
         for j in (0..self.speeds()).filter(|&j| is_nothing(self.mass[(j, j)])) {
             let node = self.coordinates.independent[j];
             let touches = |row: &Row<T>| {
@@ -277,7 +287,7 @@ impl<T: Number> Network<T> {
             let sprung = self.mechanism.springs.iter().any(|s| touches(&s.row));
             if rubbed && !sprung {
                 self.inertia[(node, node)] += floor;
-                given = true;
+                given.push(node);
             }
         }
         given
@@ -297,7 +307,8 @@ impl<T: Number> Network<T> {
         for (i, (speed, _)) in self.prescribed.iter().enumerate() {
             rows.row_mut(i).copy_from_slice(speed);
         }
-        if independent_rows(&rows).len() == rows.rows {
+        let sizes: Vec<T> = self.prescribed.iter().map(|(speed, _)| speed.size).collect();
+        if independent_rows(&rows, &sizes).len() == rows.rows {
             return Ok(());
         }
         let elements = self.mechanism.prescribed.iter().map(|p| p.element.to_string()).collect();

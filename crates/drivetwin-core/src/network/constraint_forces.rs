@@ -17,6 +17,8 @@ pub struct ConstraintSolver<'a, T> {
     pub acting: Option<Matrix<T>>,
     /// G: what is held, over the speeds, rows × speeds; those prescribed come last.
     pub rows: Matrix<T>,
+    /// Magnitudes of the terms that the entries of each row are sums of.
+    pub sizes: Vec<T>,
     /// Number of rows at rest; the others are prescribed.
     pub resting: usize,
     /// Rows at rest that no torque overcomes (one-way clutches).
@@ -79,7 +81,8 @@ impl<T: Number> ConstraintSolver<'_, T> {
         let firm = self.firm.iter().copied();
         let order: Vec<usize> =
             (self.resting..self.rows.rows).chain(firm).chain(yielding).collect();
-        let found = independent_rows(&self.rows.select_rows(&order));
+        let sizes: Vec<T> = order.iter().map(|&row| self.sizes[row]).collect();
+        let found = independent_rows(&self.rows.select_rows(&order), &sizes);
         found.into_iter().map(|i| order[i]).collect()
     }
 
@@ -90,9 +93,15 @@ impl<T: Number> ConstraintSolver<'_, T> {
         f: &Matrix<T>,
         g: Option<&Matrix<T>>,
     ) -> Option<(Coordinates<T>, Matrix<T>)> {
-        let left = Coordinates::under(self.rows.select_rows(kept), &self.lightest_first())?;
+        let rows = self.rows.select_rows(kept);
+        let sizes = rows.magnitudes();
+        let left = Coordinates::under(rows, sizes, &self.lightest_first())?;
         let forces = match &self.acting {
-            Some(_) => force_map(self.acting(kept).transposed(), &left)?.transposed(),
+            Some(_) => {
+                let acting = self.acting(kept).transposed();
+                let sizes = acting.magnitudes();
+                force_map(acting, sizes, &left)?.transposed()
+            }
             None => left.speeds.transposed(),
         };
         let mass = forces.times(self.inertia).times(&left.speeds);

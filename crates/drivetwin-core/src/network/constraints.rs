@@ -2,9 +2,10 @@
 //! Minimal coordinates: some node speeds are independent, the rest follow from the constraints.
 
 use super::error::CompileError;
-use super::linalg::{Matrix, eliminate, independent_rows};
+use super::linalg::{Matrix, eliminate, independent_rows, without_residue};
 use crate::model::mechanism::Mechanism;
 use crate::number::{Number, Values};
+use std::ops::Deref;
 
 /// Split of the nodes and the map `ω = N v`.
 #[derive(Clone, Debug)]
@@ -15,6 +16,25 @@ pub struct Coordinates<T> {
     pub dependent: Vec<usize>,
     /// `ω = N v`, nodes × speeds.
     pub speeds: Matrix<T>,
+    /// Magnitudes of the terms that the entries of N are sums of, without derivatives.
+    pub sizes: Matrix<T>,
+}
+
+/// A linear form over the independent speeds.
+#[derive(Clone, Debug)]
+pub struct SpeedForm<T> {
+    coefficients: Vec<T>,
+    /// Largest magnitude of the terms that a coefficient is the sum of, without derivatives: the scale of their
+    /// rounding.
+    pub size: T,
+}
+
+impl<T> Deref for SpeedForm<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.coefficients
+    }
 }
 
 /// Speeds and twists that members without mass follow.
@@ -27,19 +47,38 @@ pub struct Followers<T> {
 }
 
 impl<T: Number> Coordinates<T> {
-    /// Coordinates under `C ω = 0`; of the nodes the first in `order` are made dependent. `None` where rows of C
-    /// depend on each other.
-    pub fn under(mut c: Matrix<T>, order: &[usize]) -> Option<Self> {
-        let dependent = eliminate(&mut c, order);
+    /// Coordinates under `C ω = 0`; of the nodes the first in `order` are made dependent. `sizes` as for
+    /// [`eliminate`]. `None` where rows of C depend on each other.
+    pub fn under(mut c: Matrix<T>, mut sizes: Matrix<T::Values>, order: &[usize]) -> Option<Self> {
+        let dependent = eliminate(&mut c, &mut sizes, order);
         let independent: Vec<usize> = (0..c.cols).filter(|i| !dependent.contains(i)).collect();
-        let speeds = over_independent(&c, &independent, &dependent);
-        (dependent.len() == c.rows).then_some(Self { independent, dependent, speeds })
+        let speeds = over_independent(&independent, &dependent, |i, j| -c[(i, j)], c.cols);
+        let size = |i, j| T::promote(sizes[(i, j)]);
+        let sizes = over_independent(&independent, &dependent, size, c.cols);
+        (dependent.len() == c.rows).then_some(Self { independent, dependent, speeds, sizes })
+    }
+
+    /// A linear form over nodes, expressed over the independent speeds.
+    pub fn form(&self, row: &[(usize, T)]) -> SpeedForm<T> {
+        let (mut coefficients, mut largest) =
+            (Vec::with_capacity(self.speeds.cols), T::Values::zero_());
+        for j in 0..self.speeds.cols {
+            let (mut sum, mut size) = (T::zero_(), T::Values::zero_());
+            for &(node, c) in row {
+                sum += c * self.speeds[(node, j)];
+                size += c.re().magnitude() * self.sizes[(node, j)].re();
+            }
+            coefficients.push(without_residue(sum, size));
+            largest = largest.larger(size);
+        }
+        SpeedForm { coefficients, size: T::promote(largest) }
     }
 }
 
 /// Choose coordinates for `C ω = 0`; faults name the elements.
 pub fn coordinates<T: Number>(m: &Mechanism<T>) -> Result<Coordinates<T>, CompileError> {
-    let found = Coordinates::under(constraint_matrix(m, |_| None), &massless_first(m));
+    let (rows, sizes) = (constraint_matrix(m, |_| None), constraint_sizes(m));
+    let found = Coordinates::under(rows, sizes, &massless_first(m));
     let dependent = || CompileError::DependentConstraints { elements: dependent_elements(m) };
     let found = found.ok_or_else(dependent)?;
     if found.independent.is_empty() {
@@ -50,14 +89,16 @@ pub fn coordinates<T: Number>(m: &Mechanism<T>) -> Result<Coordinates<T>, Compil
 }
 
 /// The map from node torques to generalised forces, `Kᵀ f`, like N, but built from the force rows: the
-/// constraints as their forces act on the nodes, see [`constraint_matrix`]. `None` where the efficiencies
-/// make the force balance singular (self-locking).
+/// constraints as their forces act on the nodes, see [`constraint_matrix`]; `sizes` as for [`eliminate`]. `None`
+/// where the efficiencies make the force balance singular (self-locking).
 pub fn force_map<T: Number>(
     mut force_rows: Matrix<T>,
+    mut sizes: Matrix<T::Values>,
     Coordinates { independent, dependent, .. }: &Coordinates<T>,
 ) -> Option<Matrix<T>> {
-    let determined = eliminate(&mut force_rows, dependent).len() == dependent.len();
-    determined.then(|| over_independent(&force_rows, independent, dependent))
+    let determined = eliminate(&mut force_rows, &mut sizes, dependent).len() == dependent.len();
+    let entry = |i, j| -force_rows[(i, j)];
+    determined.then(|| over_independent(independent, dependent, entry, force_rows.cols))
 }
 
 /// Rows of all constraints over the nodes; `efficiency` of a constraint by its index, where it has one,
@@ -76,17 +117,30 @@ pub fn constraint_matrix<T: Number>(
     c
 }
 
-/// `[I; -C_dep⁻¹ C_ind]` in node order, where `C_dep` has been brought to unity.
+/// Magnitudes of the terms that the entries of [`constraint_matrix`] are sums of: a constraint can have a node
+/// twice.
+pub fn constraint_sizes<T: Number>(m: &Mechanism<T>) -> Matrix<T::Values> {
+    let mut sizes = Matrix::zeros(m.constraints.len(), m.nodes.len());
+    for (i, constraint) in m.constraints.iter().enumerate() {
+        for &(node, coefficient) in &constraint.row {
+            sizes[(i, node)] += coefficient.re().magnitude();
+        }
+    }
+    sizes
+}
+
+/// `[I; -C_dep⁻¹ C_ind]` of `nodes` in their order, by the entries of `-C_dep⁻¹ C`: row and node.
 fn over_independent<T: Number>(
-    c: &Matrix<T>,
     independent: &[usize],
     dependent: &[usize],
+    entry: impl Fn(usize, usize) -> T,
+    nodes: usize,
 ) -> Matrix<T> {
-    let mut map = Matrix::zeros(c.cols, independent.len());
+    let mut map = Matrix::zeros(nodes, independent.len());
     for (j, &node) in independent.iter().enumerate() {
         map[(node, j)] = T::of(1.0);
         for (i, &tied) in dependent.iter().enumerate() {
-            map[(tied, j)] = -c[(i, node)];
+            map[(tied, j)] = entry(i, node);
         }
     }
     map
@@ -106,8 +160,12 @@ fn massless_first<T: Number>(m: &Mechanism<T>) -> Vec<usize> {
 
 /// Elements of a smallest set of dependent rows.
 fn dependent_elements<T: Number>(m: &Mechanism<T>) -> Vec<String> {
-    let c = constraint_matrix(m, |_| None);
-    let deficient = |rows: &[usize]| independent_rows(&c.select_rows(rows)).len() < rows.len();
+    let (c, sizes) = (constraint_matrix(m, |_| None), constraint_sizes(m));
+    let deficient = |rows: &[usize]| {
+        let sizes = sizes.select_rows(rows).row_sizes();
+        let sizes: Vec<T> = sizes.into_iter().map(T::promote).collect();
+        independent_rows(&c.select_rows(rows), &sizes).len() < rows.len()
+    };
     let mut rows: Vec<usize> = (0..c.rows).collect();
     let mut i = 0;
     while i < rows.len() {

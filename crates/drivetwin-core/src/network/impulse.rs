@@ -298,5 +298,7 @@ fn is_independent<T: Number>(
         all.row_mut(i).copy_from_slice(hold.rows.row(i));
     }
     all.row_mut(held).copy_from_slice(own.rows.row(0));
-    independent_rows(&all).last() == Some(&held)
+    let mut sizes = hold.sizes.clone();
+    sizes.push(own.sizes[0]);
+    independent_rows(&all, &sizes).last() == Some(&held)
 }

@@ -4,9 +4,14 @@
 //! Written here because the library routines need a field of floats, while derivatives must pass
 //! through the solve.
 
-use crate::number::{Number, Values};
+use crate::number::{KernelFloat, Number, Values};
 use smallvec::SmallVec;
 use std::ops::Range;
+
+/// What is left of terms that cancel counts as rounding up to this share of their magnitudes.
+const CANCELLATION_RTOL: f64 = 1e-12;
+/// What is left of a row that depends on others, relative to its largest entry.
+const RANK_RTOL: f64 = 1e-9;
 
 /// A dense row-major matrix.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,6 +112,17 @@ impl<T: Number> Matrix<T> {
         self.data.iter().fold(T::Values::zero_(), |m, a| a.re().magnitude().larger(m))
     }
 
+    /// Magnitudes of the entries.
+    pub fn magnitudes(&self) -> Matrix<T::Values> {
+        let data = self.data.iter().map(|v| v.re().magnitude()).collect();
+        Matrix { rows: self.rows, cols: self.cols, data }
+    }
+
+    /// Largest magnitude of every row, above zero and without derivatives.
+    pub fn row_sizes(&self) -> Vec<T> {
+        (0..self.rows).map(|i| T::promote(largest(self.row(i)))).collect()
+    }
+
     fn swap_rows(&mut self, i: usize, j: usize) {
         if i != j {
             for c in 0..self.cols {
@@ -201,8 +217,17 @@ pub fn solve<T: Number>(mut a: Matrix<T>, b: Matrix<T>) -> Result<Matrix<T>, usi
 /// Bring `a` to a form in which those of the columns `order` that are linearly independent of the ones
 /// before them, to `1e-9` of the size of their row, are unit vectors: number i of those that are returned has
 /// its 1 in row i. Sparse matrices take fewer operations.
-pub fn eliminate<T: Number>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
-    let mut least: SmallVec<[_; 8]> = (0..a.rows).map(|i| largest(a.row(i)) * 1e-9).collect();
+///
+/// `sizes` are the magnitudes of the terms that the entries are sums of. They grow as the errors of the entries
+/// do, and an entry that is only their rounding becomes zero (running error analysis; Higham, Accuracy and
+/// Stability of Numerical Algorithms, section 3.3).
+pub fn eliminate<T: Number>(
+    a: &mut Matrix<T>,
+    sizes: &mut Matrix<T::Values>,
+    order: &[usize],
+) -> Vec<usize> {
+    let mut least: SmallVec<[_; 8]> = (0..a.rows).map(|i| largest(a.row(i)) * RANK_RTOL).collect();
+    a.data.iter_mut().zip(&sizes.data).for_each(|(v, &size)| *v = without_residue(*v, size));
     let mut units = Vec::with_capacity(a.rows);
     for &column in order {
         let row = units.len();
@@ -216,26 +241,41 @@ pub fn eliminate<T: Number>(a: &mut Matrix<T>, order: &[usize]) -> Vec<usize> {
         }
         least.swap(row, pivot);
         a.swap_rows(row, pivot);
+        sizes.swap_rows(row, pivot);
         let inverse = a[(row, column)].recip();
+        let scale = inverse.re().magnitude();
         for r in 0..a.rows {
             let entry = a[(r, column)];
             if r != row && !is_zero(entry) {
-                subtract_row(a, r, row, 0, entry * inverse);
+                let factor = entry * inverse;
+                subtract_row(a, r, row, 0, factor);
+                let share = factor.re().magnitude();
+                let error = (sizes[(r, column)] + share * sizes[(row, column)]) * scale;
+                for j in 0..a.cols {
+                    let grown = share * sizes[(row, j)] + error * a[(row, j)].re().magnitude();
+                    sizes[(r, j)] += grown;
+                    a[(r, j)] = without_residue(a[(r, j)], sizes[(r, j)]);
+                }
             }
         }
-        a.row_mut(row).iter_mut().for_each(|v| *v *= inverse);
+        let error = sizes[(row, column)] * scale;
+        for j in 0..a.cols {
+            sizes[(row, j)] = (sizes[(row, j)] + error * a[(row, j)].re().magnitude()) * scale;
+            a[(row, j)] *= inverse;
+        }
         units.push(column);
     }
     units
 }
 
-/// Rows of `a` that are linearly independent of those before them, to `1e-9` of their size.
-pub fn independent_rows<T: Number>(a: &Matrix<T>) -> Vec<usize> {
+/// Rows of `a` that are linearly independent of those before them, to `1e-9` of their largest entry and to the
+/// rounding of the terms that their entries are sums of: of each row the magnitude of these, as `sizes`.
+pub fn independent_rows<T: Number>(a: &Matrix<T>, sizes: &[T]) -> Vec<usize> {
     let most = a.rows.min(a.cols);
     let mut kept = Vec::with_capacity(most);
     // What is left of each kept row, with 1 as its largest entry, and where that stands.
     let mut left = Matrix::<T::Values>::zeros(most, a.cols);
-    let mut pivots = SmallVec::<[usize; 8]>::new();
+    let mut pivots = SmallVec::<[(usize, T::Values); 8]>::new();
     for i in 0..a.rows {
         let k = kept.len();
         if k == most {
@@ -248,21 +288,24 @@ pub fn independent_rows<T: Number>(a: &Matrix<T>) -> Vec<usize> {
             *to = from.re();
             scale = to.magnitude().larger(scale);
         }
-        for (basis, &pivot) in before.chunks_exact(a.cols).zip(&pivots) {
+        let mut terms = sizes[i].re();
+        for (basis, &(pivot, size)) in before.chunks_exact(a.cols).zip(&pivots) {
             let factor = row[pivot];
             if !is_zero(factor) {
                 row.iter_mut().zip(basis).for_each(|(v, &b)| *v -= factor * b);
+                terms += factor.magnitude() * size;
             }
         }
+        let least = (scale * RANK_RTOL).larger(terms * CANCELLATION_RTOL);
         let size = |j: usize| row[j].magnitude();
         let larger = |j: usize, k: usize| {
             if size(k).decide_with(size(j), |of_k, of_j| of_k > of_j) { k } else { j }
         };
         let pivot = (1..a.cols).fold(0, larger);
-        if size(pivot).decide_with(scale, |size, scale| size > 1e-9 * scale) {
+        if size(pivot).decide_with(least, |size, least| size > least) {
             let inverse = row[pivot].recip();
             row.iter_mut().for_each(|v| *v *= inverse);
-            pivots.push(pivot);
+            pivots.push((pivot, terms * inverse.magnitude()));
             kept.push(i);
         }
     }
@@ -357,6 +400,18 @@ fn subtract_row<T: Number>(
     target[from..].iter_mut().zip(&source[from..]).for_each(|(t, &s)| *t -= s * factor);
 }
 
+/// A sum of terms of the magnitude `size`; zero, but for its derivatives, in the runs in which it is only their
+/// rounding.
+pub fn without_residue<T: Number>(sum: T, size: T::Values) -> T {
+    let value = sum.re();
+    let left = value.magnitude() - size * CANCELLATION_RTOL;
+    let rounding = left.mask_where(|left| left <= 0.0);
+    if rounding == 0 {
+        return sum;
+    }
+    sum - T::promote(T::Values::zero_().replace_where(rounding, value))
+}
+
 /// True if a number is zero in every run and with all its derivatives. Its products may then be left out.
 pub fn is_zero<T: Number>(value: T) -> bool {
     value.re().mask_where(|v| v != 0.0) == 0 && value.is_constant()
@@ -366,4 +421,61 @@ pub fn is_zero<T: Number>(value: T) -> bool {
 /// [`Values::decide`](crate::number::Values::decide).
 pub fn is_nothing<T: Number>(value: T) -> bool {
     value.re().decide(|v| v == 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn matrix(rows: &[&[f64]]) -> Matrix<f64> {
+        let mut all = Matrix::zeros(rows.len(), rows[0].len());
+        rows.iter().enumerate().for_each(|(i, row)| all.row_mut(i).copy_from_slice(row));
+        all
+    }
+
+    #[test]
+    fn what_is_left_of_terms_that_cancel_is_measured_by_these_terms() {
+        assert_eq!(without_residue(1.0 + 2e-16 - 1.0, 2.0), 0.0);
+        assert_eq!(without_residue(1e-11, 1.0), 1e-11);
+        assert_eq!(without_residue(1e-20, 1e-20), 1e-20);
+    }
+
+    #[test]
+    fn a_row_of_rounding_is_independent_of_none() {
+        let residue = matrix(&[&[1e-17, -2e-17]]);
+        assert_eq!(independent_rows(&residue, &[1.0]), Vec::<usize>::new());
+        assert_eq!(independent_rows(&residue, &[1e-17]), [0]);
+    }
+
+    #[test]
+    fn the_rounding_of_a_row_grows_where_others_are_subtracted() {
+        // The second row is 1e7 times the first, which is what is left of terms of size 1.
+        let rows = matrix(&[&[1e-7, 2e-7 + 1e-15], &[1.0, 2.0]]);
+        assert_eq!(independent_rows(&rows, &[1e-7, 1.0]), [0, 1]);
+        assert_eq!(independent_rows(&rows, &[1.0, 1.0]), [0]);
+    }
+
+    proptest! {
+        /// A train of gears to and fro, with a last row that states anew what follows from the others.
+        #[test]
+        fn ratios_that_cancel_leave_nothing(
+            ratios in prop::collection::vec((0.01..100.0_f64, any::<bool>()), 1..8),
+            share in 0.1..10.0_f64,
+        ) {
+            let nodes = ratios.len() + 2;
+            let signed = |&(size, positive): &(f64, bool)| if positive { size } else { -size };
+            let ratios: Vec<f64> = ratios.iter().map(signed).collect();
+            let whole: f64 = ratios.iter().product();
+            let mut c = Matrix::zeros(nodes, nodes);
+            for (i, ratio) in ratios.iter().copied().chain([1.0 / whole]).enumerate() {
+                (c[(i, i)], c[(i, i + 1)]) = (1.0, -ratio);
+            }
+            (c[(nodes - 1, 0)], c[(nodes - 1, nodes - 1)]) = (share, -share);
+            let (mut sizes, order) = (c.magnitudes(), (0..nodes).collect::<Vec<_>>());
+            let units = eliminate(&mut c, &mut sizes, &order);
+            prop_assert_eq!(units.len(), nodes - 1);
+            prop_assert!((0..nodes).all(|j| c[(nodes - 1, j)] == 0.0));
+        }
+    }
 }

@@ -32,6 +32,7 @@ impl<T: Number> Network<T> {
         let all = self.coordinates.clone();
         self.coordinates.independent = heavy.iter().map(|&j| all.independent[j]).collect();
         self.coordinates.speeds = all.speeds.select_columns(&heavy);
+        self.coordinates.sizes = all.sizes.select_columns(&heavy);
         self.count_states();
         let mut rates = Matrix::zeros(self.mechanism.springs.len(), all.speeds.cols);
         for (i, spring) in self.mechanism.springs.iter().enumerate() {

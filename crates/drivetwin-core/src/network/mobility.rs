@@ -107,7 +107,7 @@ impl<T: Real> EngagedMechanism<T> {
         let connected = connected(m, &rows, free);
         rows.retain(|r| r.row.iter().any(|(node, _)| connected.contains(node)));
         let matrix = row_matrix(&rows, m.nodes.len());
-        let rank = independent_rows(&matrix).len();
+        let rank = independent_rows(&matrix, &row_sizes(&rows)).len();
         if rank < rows.len() {
             return Err(EngagedError::Dependent { elements: dependent(&rows, &matrix) });
         }
@@ -161,6 +161,14 @@ fn row_matrix<T: Real>(rows: &[RigidRow<T>], nodes: usize) -> Matrix<T> {
     matrix
 }
 
+/// Largest coefficient of every row.
+fn row_sizes<T: Real>(rows: &[RigidRow<T>]) -> Vec<T> {
+    let size = |rigid: &RigidRow<T>| {
+        rigid.row.iter().fold(0.0, |size: f64, (_, c)| size.max(c.re().abs()))
+    };
+    rows.iter().map(|rigid| T::of(size(rigid))).collect()
+}
+
 /// Solve the rows for the connected nodes that are not free; `None` where these do not determine
 /// them.
 fn in_free_coordinates<T: Real>(
@@ -185,7 +193,11 @@ fn in_free_coordinates<T: Real>(
 
 /// Elements of a smallest set of dependent rows.
 fn dependent<T: Real>(rows: &[RigidRow<T>], matrix: &Matrix<T>) -> Vec<String> {
-    let deficient = |kept: &[usize]| independent_rows(&matrix.select_rows(kept)).len() < kept.len();
+    let sizes = row_sizes(rows);
+    let deficient = |kept: &[usize]| {
+        let sizes: Vec<T> = kept.iter().map(|&i| sizes[i]).collect();
+        independent_rows(&matrix.select_rows(kept), &sizes).len() < kept.len()
+    };
     let mut kept: Vec<usize> = (0..rows.len()).collect();
     let mut i = 0;
     while i < kept.len() {

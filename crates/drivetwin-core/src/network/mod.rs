@@ -32,6 +32,7 @@ mod table_loss;
 
 pub use branch::Branch;
 pub use compile::{FrictionElement, LossyGear, Network};
+pub use constraints::SpeedForm;
 pub use error::CompileError;
 pub use impulse::{Demand, Impulse, ImpulseFault};
 pub use mode::{GearBounds, GearState, Mode, ModeKey, RowId};

@@ -4,7 +4,7 @@
 
 use super::compile::Network;
 use super::constraint_forces::{ConstraintForces, ConstraintSolver};
-use super::constraints::{constraint_matrix, force_map};
+use super::constraints::{SpeedForm, constraint_matrix, constraint_sizes, force_map};
 use super::linalg::{Matrix, SparseRows, is_nothing, is_zero, least_norm, solve};
 use super::spectral_radius::spectral_radius_bound;
 use crate::model::mechanism::{self, Loss, LossLaw};
@@ -173,7 +173,7 @@ impl<T: Number> Loss<T> {
 
 impl<T: Number> Network<T> {
     /// Speed that a row keeps at zero, over the independent speeds.
-    pub fn slip_of(&self, row: RowId) -> &[T] {
+    pub fn slip_of(&self, row: RowId) -> &SpeedForm<T> {
         match row {
             RowId::Friction(j) => &self.frictions[j].slip,
             RowId::Gear(i) => &self.losses[i].speed,
@@ -227,23 +227,26 @@ impl<T: Number> Network<T> {
         motion: &'m Motion<T>,
         rows: &[RowId],
     ) -> ConstraintSolver<'m, T> {
-        let (speeds, nodes) = self.held_speeds(rows);
-        let acting = (!self.losses.is_empty()).then(|| motion.force_map.times_columns(&nodes));
-        let firm = (0..rows.len()).filter(|&i| self.is_one_way(rows[i])).collect();
-        ConstraintSolver { inertia: &motion.mass, acting, rows: speeds, resting: rows.len(), firm }
+        self.solver(&motion.mass, (!self.losses.is_empty()).then_some(&motion.force_map), rows)
     }
 
     /// Rows at rest and prescribed speeds of the mass matrix alone, whatever gears lose.
     pub fn hold_by_mass(&self, rows: &[RowId]) -> ConstraintSolver<'_, T> {
-        let (speeds, _) = self.held_speeds(rows);
+        self.solver(&self.mass, None, rows)
+    }
+
+    fn solver<'m>(
+        &self,
+        inertia: &'m Matrix<T>,
+        force_map: Option<&Matrix<T>>,
+        rows: &[RowId],
+    ) -> ConstraintSolver<'m, T> {
+        let (speeds, nodes) = self.held_speeds(rows);
+        let acting = force_map.map(|map| map.times_columns(&nodes));
         let firm = (0..rows.len()).filter(|&i| self.is_one_way(rows[i])).collect();
-        ConstraintSolver {
-            inertia: &self.mass,
-            acting: None,
-            rows: speeds,
-            resting: rows.len(),
-            firm,
-        }
+        let sizes = rows.iter().map(|&row| self.slip_of(row).size);
+        let sizes = sizes.chain(self.prescribed.iter().map(|(speed, _)| speed.size)).collect();
+        ConstraintSolver { inertia, acting, rows: speeds, sizes, resting: rows.len(), firm }
     }
 
     /// Accelerations of held speeds over the basis, where some behind those at rest are prescribed.
@@ -269,7 +272,8 @@ impl<T: Number> Network<T> {
 
     /// `None` if the efficiencies leave the accelerations undetermined.
     pub(super) fn motion(&self, key: ModeKey) -> Option<Motion<T>> {
-        let kt = force_map(self.force_rows(key), &self.coordinates)?.transposed();
+        let sizes = constraint_sizes(&self.mechanism);
+        let kt = force_map(self.force_rows(key), sizes, &self.coordinates)?.transposed();
         let mass = kt.times(&self.inertia).times(&self.coordinates.speeds);
         let forces = kt.times(&self.with_drag(key));
         let free = solve(mass.clone(), forces.clone()).ok()?;
@@ -307,7 +311,7 @@ impl<T: Number> Network<T> {
     }
 
     /// Speeds kept at zero or prescribed, over the independent speeds and over the nodes.
-    pub(super) fn held_speeds(&self, stuck: &[RowId]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
+    pub fn held_speeds(&self, stuck: &[RowId]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
         let count = stuck.len() + self.prescribed.len();
         let mut speeds = Matrix::zeros(count, self.speeds());
         let mut nodes = Vec::with_capacity(count);

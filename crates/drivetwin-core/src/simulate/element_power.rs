@@ -54,7 +54,7 @@ pub(super) fn visit_powers<T: Number>(
 ) {
     let network = state.network;
     let wanted = |element: &Name| only.is_none_or(|name| name == element);
-    let speed = |node| form(&network.over_basis(&[(node, T::of(1.0))]), basis);
+    let speed = |node| network.node_speed_at(node, basis);
     for (j, row) in network.frictions.iter().enumerate().filter(|(_, f)| wanted(&f.element)) {
         let torque = basis[network.first_channel() + j];
         add(PowerKind::Friction, torque * form(&row.slip, basis));

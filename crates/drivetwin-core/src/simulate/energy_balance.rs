@@ -36,12 +36,15 @@ pub struct EnergyAudit {
 pub(super) struct EnergyBalance {
     audit: EnergyAudit,
     start: f64,
+    /// Largest energy stored and largest work of an account so far, J.
+    largest: f64,
 }
 
 impl EnergyBalance {
     /// Begin at state `x`.
     pub fn new<T: Real>(network: &Network<T>, x: &[T]) -> Self {
-        Self { audit: EnergyAudit::default(), start: stored_energy(network, x) }
+        let start = stored_energy(network, x);
+        Self { audit: EnergyAudit::default(), start, largest: start }
     }
 
     /// Add the work of one step.
@@ -51,6 +54,10 @@ impl EnergyBalance {
             run.state.expansion.basis_at(run.state.network, step.length * node, &mut basis);
             self.add_powers(run, &basis, weight * step.length.re());
         }
+        let a = &self.audit;
+        let works = [a.source, a.friction, a.gear_loss, a.shaft, a.load, a.converter];
+        let stored = stored_energy(run.state.network, &run.state.x);
+        self.largest = works.iter().fold(self.largest.max(stored), |most, w| most.max(w.abs()));
     }
 
     fn add_powers<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
@@ -71,8 +78,8 @@ impl EnergyBalance {
         });
     }
 
-    /// Close the balance at the state reached.
-    pub fn close<T: Real>(mut self, state: &HybridState<'_, T>) -> EnergyAudit {
+    /// Close the balance at the state reached; return it and the largest energy of the run, J.
+    pub fn close<T: Real>(mut self, state: &HybridState<'_, T>) -> (EnergyAudit, f64) {
         let a = &mut self.audit;
         a.source += state.starting_impulse.source.re();
         a.impulse = state.starting_impulse.lost.re();
@@ -80,7 +87,8 @@ impl EnergyBalance {
         let taken =
             a.stored + a.friction + a.gear_loss + a.shaft + a.load + a.converter + a.impulse;
         a.error = a.source - taken;
-        self.audit
+        let impulse = a.impulse.abs().max(state.starting_impulse.source.re().abs());
+        (self.audit, self.largest.max(impulse))
     }
 }
 

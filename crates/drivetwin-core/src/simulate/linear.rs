@@ -119,7 +119,7 @@ fn channel_slopes(
             .expect("friction is smooth in a branch");
         let m = point.slip.abs() * law.unit;
         let torque = law.expand_at::<false>(m, law.stiction::<false>(m)).value_at_center(normal);
-        for (entry, &c) in channels.row_mut(j).iter_mut().zip(&row.slip) {
+        for (entry, &c) in channels.row_mut(j).iter_mut().zip(row.slip.iter()) {
             *entry += torque.by_argument * law.unit * c;
         }
         if let Some((input, gain)) = input.filter(|_| normal > 0.0) {

@@ -123,6 +123,15 @@ impl<T: Real> Plan<T> {
         x
     }
 
+    /// Refuse an energy balance that does not close to the accuracy of the run.
+    fn check_audit(&self, time: f64, error: f64, energy: f64) -> Result<(), Status> {
+        let rtol = self.settings.audit_rtol();
+        if rtol.is_infinite() || error.abs() <= rtol * energy {
+            return Ok(());
+        }
+        Err(Status::OpenBalance { time, error, energy })
+    }
+
     /// One run. If it fails on the way it ends with its status, and with NaN from there on.
     pub fn run(&self, network: &Network<T>, start: &State<T>) -> Trajectory<T> {
         self.run_again(&mut SolverCache::new(network), start)
@@ -146,8 +155,9 @@ impl<T: Real> Plan<T> {
                 let mut auditor = EnergyBalance::new(network, &x);
                 let outcome =
                     recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
-                balance = Some(auditor.close(&run.state));
-                outcome
+                let (audit, largest) = auditor.close(&run.state);
+                balance = Some(audit);
+                outcome.and_then(|()| self.check_audit(run.time().re(), audit.error, largest))
             } else {
                 recorder.run_to_end(&mut run)
             };

@@ -2,9 +2,9 @@
 //! The state a run starts from, stated by names.
 
 use crate::model::Name;
-use crate::network::Network;
 use crate::network::linalg::{Matrix, independent_rows, is_nothing, least_norm, solve};
 use crate::network::nonlinear_torque::form;
+use crate::network::{Network, SpeedForm};
 use crate::number::{Number, Values};
 use thiserror::Error;
 
@@ -120,10 +120,10 @@ impl<T: Number> State<T> {
     /// and is not zero.
     pub fn check_locks(&self, network: &Network<T>, prescribed: &[T]) -> Result<(), StartError> {
         let count = prescribed.len();
-        let speeds = network.prescribed.iter().map(|(speed, _)| &speed[..]);
-        let slips = self.locked.iter().map(|&j| &network.frictions[j].slip[..]);
-        let rows: Vec<&[T]> = speeds.chain(slips).collect();
-        let kept = independent_rows(&matrix(&rows, network.speeds()));
+        let speeds = network.prescribed.iter().map(|(speed, _)| speed);
+        let slips = self.locked.iter().map(|&j| &network.frictions[j].slip);
+        let rows: Vec<&SpeedForm<T>> = speeds.chain(slips).collect();
+        let kept = independent(&rows, network.speeds());
         let largest = prescribed.iter().fold(0.0, |l: f64, w| l.max(w.re().leading().abs()));
         for (i, &j) in (count..rows.len()).zip(&self.locked).filter(|(i, _)| !kept.contains(i)) {
             let weights = combination(&kept.iter().map(|&k| rows[k]).collect::<Vec<_>>(), rows[i]);
@@ -153,7 +153,7 @@ impl<T: Number> State<T> {
 }
 
 /// Weights of `rows` in `row`, which is a combination of them; rows × 1.
-fn combination<T: Number>(rows: &[&[T]], row: &[T]) -> Matrix<T> {
+fn combination<T: Number>(rows: &[&SpeedForm<T>], row: &SpeedForm<T>) -> Matrix<T> {
     let target = matrix(&[row], row.len()).transposed();
     least_norm(&matrix(rows, row.len()).transposed(), &target)
 }
@@ -216,22 +216,21 @@ fn speeds_of<T: Number>(
     locked: &[usize],
 ) -> Result<(Vec<T>, Matrix<T>), StartError> {
     let nodes = &network.mechanism.nodes;
-    let n = &network.coordinates.speeds;
     let mut stated = Vec::with_capacity(speeds.len());
     for &(name, speed) in speeds {
         let node = find("node", name, nodes.iter())?;
         // The speed of a follower is no state.
         if !network.is_follower(node) {
-            stated.push((name, n.row(node), speed));
+            stated.push((name, network.over_speeds(&[(node, T::of(1.0))]), speed));
         }
     }
-    let given = stated.iter().map(|(_, row, _)| *row);
-    let locked = locked.iter().map(|&j| &network.frictions[j].slip[..]);
-    let prescribed = network.prescribed.iter().map(|(speed, _)| &speed[..]);
+    let given = stated.iter().map(|(_, row, _)| row);
+    let locked = locked.iter().map(|&j| &network.frictions[j].slip);
+    let prescribed = network.prescribed.iter().map(|(speed, _)| speed);
     let first_prescribed = stated.len() + locked.len();
-    let rows: Vec<&[T]> = given.chain(locked).chain(prescribed).collect();
+    let rows: Vec<&SpeedForm<T>> = given.chain(locked).chain(prescribed).collect();
     let all = matrix(&rows, network.speeds());
-    let keep = independent_rows(&all);
+    let keep = independent(&rows, network.speeds());
     if keep.len() < network.speeds() {
         return Err(StartError::Undetermined { missing: missing(network, &rows) });
     }
@@ -245,7 +244,7 @@ fn speeds_of<T: Number>(
     let v = v.map_err(|_| StartError::Undetermined { missing: missing(network, &rows) })?;
     let mut x = Vec::with_capacity(network.states());
     x.extend((0..v.rows).map(|i| v[(i, 0)]));
-    for &(name, row, speed) in &stated {
+    for &(name, ref row, speed) in &stated {
         let (stated_speed, implied) = (speed.re(), form(row, &x).re());
         let contradicts =
             |stated: f64, implied: f64| (stated - implied).abs() > 1e-6 * (1.0 + stated.abs());
@@ -261,7 +260,13 @@ fn speeds_of<T: Number>(
     Ok((x, v.select_columns(&(1..=count).collect::<Vec<_>>())))
 }
 
-fn matrix<T: Number>(rows: &[&[T]], width: usize) -> Matrix<T> {
+/// Rows that are independent of those before them.
+fn independent<T: Number>(rows: &[&SpeedForm<T>], width: usize) -> Vec<usize> {
+    let sizes: Vec<T> = rows.iter().map(|row| row.size).collect();
+    independent_rows(&matrix(rows, width), &sizes)
+}
+
+fn matrix<T: Number>(rows: &[&SpeedForm<T>], width: usize) -> Matrix<T> {
     let mut all = Matrix::zeros(rows.len(), width);
     for (i, row) in rows.iter().enumerate() {
         all.row_mut(i).copy_from_slice(row);
@@ -270,19 +275,24 @@ fn matrix<T: Number>(rows: &[&[T]], width: usize) -> Matrix<T> {
 }
 
 /// Nodes whose speeds determine all together with rows over the speeds.
-fn missing<T: Number>(network: &Network<T>, rows: &[&[T]]) -> Vec<String> {
+fn missing<T: Number>(network: &Network<T>, rows: &[&SpeedForm<T>]) -> Vec<String> {
     let nodes = &network.coordinates.independent;
-    let mut all = rows.to_vec();
-    all.extend(nodes.iter().map(|&node| network.coordinates.speeds.row(node)));
-    let kept = independent_rows(&matrix(&all, network.speeds())).into_iter();
+    let own: Vec<_> =
+        nodes.iter().map(|&node| network.over_speeds(&[(node, T::of(1.0))])).collect();
+    let all: Vec<&SpeedForm<T>> = rows.iter().copied().chain(&own).collect();
+    let kept = independent(&all, network.speeds()).into_iter();
     let names = kept.filter_map(|row| nodes.get(row.checked_sub(rows.len())?));
     names.map(|&node| network.mechanism.nodes[node].to_string()).collect()
 }
 
 /// Of the nodes with stated speeds that were kept, those that a row is a combination of.
-fn determining<T: Number>(stated: &[(&str, &[T], T)], keep: &[usize], row: &[T]) -> Vec<String> {
+fn determining<T: Number>(
+    stated: &[(&str, SpeedForm<T>, T)],
+    keep: &[usize],
+    row: &SpeedForm<T>,
+) -> Vec<String> {
     let kept: Vec<_> = keep.iter().filter_map(|&i| stated.get(i)).collect();
-    let weights = combination(&kept.iter().map(|(_, row, _)| *row).collect::<Vec<_>>(), row);
+    let weights = combination(&kept.iter().map(|(_, row, _)| row).collect::<Vec<_>>(), row);
     let counts = |i: &usize| weights[(*i, 0)].re().decide(|weight| weight.abs() > 1e-9);
     (0..kept.len()).filter(counts).map(|i| format!("that of {:?}", kept[i].0)).collect()
 }

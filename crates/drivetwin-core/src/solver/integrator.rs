@@ -16,7 +16,7 @@ use crate::solver::interrupt::is_interrupted;
 use crate::solver::settings::{Settings, Step};
 use crate::solver::single::SampleSink;
 use crate::solver::status::Status;
-use crate::solver::tolerances::STALL_NUDGE;
+use crate::solver::tolerances::{RUNAWAY, STALL_NUDGE};
 use std::sync::Arc;
 
 /// A run in progress.
@@ -32,6 +32,8 @@ pub struct Integrator<'a, T: Real> {
     /// Working space of fixed steps.
     pub(crate) trail: Vec<SampleColumn<T>>,
     pub(crate) segment: usize,
+    /// Speed of the fastest member at the start, rad/s.
+    fastest: f64,
     /// True until the run advances with other inputs.
     continued: bool,
     /// Propagators, including those of this run.
@@ -57,6 +59,8 @@ impl<'a, T: Real> Integrator<'a, T> {
         state.remaining = T::of(to - from);
         inputs.expand(0, state.t, &mut state.expansion.inputs);
         state.engage_initial(locked)?;
+        let speeds = state.x[..network.speeds()].iter();
+        let fastest = speeds.fold(0.0, |fastest: f64, v| fastest.max(v.re().abs()));
         Ok(Self {
             grazing: None,
             propagators,
@@ -68,6 +72,7 @@ impl<'a, T: Real> Integrator<'a, T> {
             state,
             trail: Vec::new(),
             segment: 0,
+            fastest,
             continued: false,
             pending: None,
             progress: StallDetector::from(from),
@@ -106,7 +111,7 @@ impl<'a, T: Real> Integrator<'a, T> {
         if self.settings.exponential_steps {
             self.run_fixed_steps(sink)?;
             if self.is_at_end() {
-                return Ok(None);
+                return self.check_massless().map(|()| None);
             }
         }
         self.expand_step().map(Some)
@@ -208,11 +213,28 @@ impl<'a, T: Real> Integrator<'a, T> {
         state.remaining = T::of(self.inputs.span(self.segment).1 - state.t.re());
     }
 
+    /// Refuse the motion of a member without mass that no friction element follows.
+    fn check_massless(&self) -> Result<(), Status> {
+        let HybridState { network, x, .. } = &self.state;
+        let speed = |i: usize| x[i].re().abs();
+        for &j in &network.massless {
+            let others = (0..network.speeds()).filter(|i| !network.massless.contains(i));
+            let fastest = others.map(speed).fold(self.fastest, f64::max);
+            if speed(j) > RUNAWAY * (1.0 + fastest) {
+                let member = &network.mechanism.nodes[network.coordinates.independent[j]];
+                let (time, member) = (self.state.time(), member.to_string());
+                return Err(Status::Runaway { time, member });
+            }
+        }
+        Ok(())
+    }
+
     fn check_progress(&mut self, length: f64) -> Result<(), Status> {
         let time = self.state.t.re();
         if !self.state.x.iter().all(|v| v.re().is_finite()) {
             return Err(Status::NotFinite { time });
         }
+        self.check_massless()?;
         self.progress.note(time, length, self.pending.is_some()).map_err(|lack| match lack {
             Stall::TooSmall => Status::StepTooSmall { time },
             Stall::Zeno => {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 //! Accuracy settings of a run.
 
-use crate::solver::tolerances::{TAYLOR_TOL, TAYLOR_TOL_BETWEEN_SAMPLES};
+use crate::solver::tolerances::{
+    AUDIT_PER_TRUNCATION, AUDIT_RTOL, TAYLOR_TOL, TAYLOR_TOL_BETWEEN_SAMPLES,
+};
 
 /// Accuracy of the integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +26,15 @@ impl Settings {
     pub(crate) fn accuracy(&self, uses_fixed_step: bool) -> Accuracy {
         let least = if uses_fixed_step { TAYLOR_TOL_BETWEEN_SAMPLES } else { 0.0 };
         Accuracy { tolerance: self.tolerance.max(least), order: self.order }
+    }
+
+    /// Error of the energy balance that a completed run may have, relative to its largest energy; any in
+    /// convergence studies.
+    pub(crate) fn audit_rtol(&self) -> f64 {
+        match self.order {
+            Some(_) => f64::INFINITY,
+            None => AUDIT_RTOL.max(self.tolerance * AUDIT_PER_TRUNCATION),
+        }
     }
 
     /// Round-off accuracy throughout.

@@ -46,6 +46,33 @@ pub enum Status {
         /// Members.
         members: Vec<String>,
     },
+    /// An impulse on elements does not close the energy balance, or takes energy where their slip is round-off.
+    Unbalanced {
+        /// Time, s.
+        time: f64,
+        /// Elements brought to rest, then prescribed speeds.
+        elements: Vec<String>,
+        /// Error of the balance, J.
+        error: f64,
+        /// Energy of the members, J.
+        energy: f64,
+    },
+    /// The energy balance of the run does not close.
+    OpenBalance {
+        /// Time, s.
+        time: f64,
+        /// Error of the balance, J.
+        error: f64,
+        /// Largest energy of the run, J.
+        energy: f64,
+    },
+    /// The torque on a member without mass exceeds what its friction elements take.
+    Runaway {
+        /// Time, s.
+        time: f64,
+        /// The member.
+        member: String,
+    },
     /// The caller asked for the end.
     Interrupted {
         /// Time, s.
@@ -87,6 +114,23 @@ impl fmt::Display for Status {
                 "the inertias leave the motion of {} undetermined at {time:.9} s; they differ \
                  by too many decades",
                 members.join(", ")
+            ),
+            Self::Unbalanced { time, elements, error, energy } => write!(
+                f,
+                "locking {} at {time:.9} s changes the kinetic energy of {energy:.3e} J by \
+                 {error:.3e} J that nothing accounts for; ratios nearly cancel, or inertias differ by \
+                 too many decades",
+                elements.join(", ")
+            ),
+            Self::OpenBalance { time, error, energy } => write!(
+                f,
+                "the energy balance misses {error:.3e} J of {energy:.3e} J at {time:.9} s; inertias or \
+                 stiffnesses differ by too many decades"
+            ),
+            Self::Runaway { time, member } => write!(
+                f,
+                "the torque on {member}, which has no inertia, exceeds what its clutches take before \
+                 {time:.9} s; give {member} an inertia"
             ),
             Self::Interrupted { time } => write!(f, "interrupted at {time:.9} s"),
             Self::StepTooSmall { time } => write!(f, "step too small at {time:.9} s"),

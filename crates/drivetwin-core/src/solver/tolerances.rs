@@ -24,6 +24,8 @@ pub(crate) const ACCELERATION_ATOL: f64 = 1e-9;
 /// Acceleration of an element at rest that is round-off, relative to 1 rad/s² plus the largest
 /// prescribed acceleration.
 pub(crate) const FORCED_ACCELERATION_RTOL: f64 = 1e-9;
+/// The same, relative to the sum of the magnitudes of its terms.
+pub(crate) const FORCED_SUM_RTOL: f64 = 1e-13;
 /// Slip of an element at rest by which a prescribed speed has moved it, relative to the largest of its
 /// terms and 1 rad/s.
 pub(crate) const FORCED_SLIP_RTOL: f64 = 1e-10;
@@ -31,14 +33,27 @@ pub(crate) const FORCED_SLIP_RTOL: f64 = 1e-10;
 pub(crate) const T_PLUS: f64 = 1e-10;
 /// Largest distance of t⁺, relative to the rest of the input segment.
 pub(crate) const T_PLUS_SHARE: f64 = 1e-4;
+/// Largest change of a state up to t⁺, relative to its size and 1: light members move within less than
+/// [`T_PLUS`].
+pub(crate) const T_PLUS_CHANGE: f64 = 1e-4;
 /// Slip that counts as zero, relative to the largest of its terms and 1 rad/s.
 pub(crate) const ZERO_SLIP_RTOL: f64 = 1e-11;
 
 // Mode transitions.
 
-/// Speed of an initially locked element that is round-off of the start state, relative to the
-/// fastest member.
+/// Speed of an initially locked element that is round-off of the start state, relative to its fastest
+/// member and [`SPEED_FLOOR`].
 pub(crate) const START_SPEED_RTOL: f64 = 1e-9;
+/// Speed of members that counts as none beside their round-off, rad/s.
+pub(crate) const SPEED_FLOOR: f64 = 1e-3;
+/// Change of the kinetic energy by an impulse that only removes round-off, relative to this energy.
+pub(crate) const JUMP_ENERGY_RTOL: f64 = 1e-8;
+/// Speed of a member without mass that nothing holds, relative to 1 rad/s plus the fastest other member.
+pub(crate) const RUNAWAY: f64 = 1e4;
+/// Error of the energy balance of a run, relative to its largest energy.
+pub(crate) const AUDIT_RTOL: f64 = 1e-8;
+/// The same per truncation error of a step, where a larger one is asked for.
+pub(crate) const AUDIT_PER_TRUNCATION: f64 = 1e4;
 /// Slip that a stalled run can have gained within [`STALL_NUDGE`], rad/s.
 pub(crate) const STALLED_SLIP: f64 = 1e-6;
 /// Time before the end of a normal load within which the load counts as gone, s.
@@ -53,6 +68,8 @@ pub(crate) const GUARD_RTOL: f64 = 1e-13;
 pub(crate) const GRAZING_RTOL: f64 = 1e-6;
 /// Slip rate of a released element that is round-off, relative to the next Taylor term, 1/s.
 pub(crate) const RELEASE_RATE_RTOL: f64 = 1e-9;
+/// Largest slip rate that can be such, relative to the sum of the magnitudes of its terms.
+pub(crate) const RELEASE_SUM_RTOL: f64 = 1e-6;
 
 // Stall detection.
 

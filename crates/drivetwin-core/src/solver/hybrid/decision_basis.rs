@@ -8,7 +8,7 @@ use crate::solver::hybrid::active_set::ActiveSet;
 use crate::solver::hybrid::event::FrictionState;
 use crate::solver::hybrid::state::HybridState;
 use crate::solver::status::Status;
-use crate::solver::tolerances::{T_PLUS, T_PLUS_SHARE};
+use crate::solver::tolerances::{T_PLUS, T_PLUS_CHANGE, T_PLUS_SHARE};
 use std::sync::Arc;
 
 impl<T: Number> HybridState<'_, T> {
@@ -28,7 +28,9 @@ impl<T: Number> HybridState<'_, T> {
         let mode = Arc::clone(&self.mode);
         self.settle_losses(&mode, &mut basis)?;
         for (i, ahead) in self.x_plus.iter_mut().enumerate() {
-            *ahead += form(self.mode.derivative.row(i), &basis) * moment;
+            let change = form(self.mode.derivative.row(i), &basis) * moment;
+            let most = (ahead.re().magnitude() + T::Values::of(1.0)) * T_PLUS_CHANGE;
+            *ahead += change * T::promote(most / change.re().magnitude().larger(most));
         }
         Ok(())
     }

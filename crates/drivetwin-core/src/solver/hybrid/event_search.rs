@@ -11,8 +11,8 @@ use crate::solver::hybrid::zero_crossing::first_zero_crossing;
 use crate::solver::lane_mask::lanes_in;
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::tolerances::{
-    ACCELERATION_ATOL, BOUND_RTOL, FORCED_SLIP_RTOL, GRAZING_RTOL, RELEASE_RATE_RTOL, SUM_RTOL,
-    TORQUE_ATOL, sum_and_scale,
+    ACCELERATION_ATOL, BOUND_RTOL, FORCED_SLIP_RTOL, GRAZING_RTOL, RELEASE_RATE_RTOL,
+    RELEASE_SUM_RTOL, SUM_RTOL, TORQUE_ATOL, sum_and_scale,
 };
 
 /// The earliest fall within `h` [s], refined so that the time carries derivatives, and whether it
@@ -105,8 +105,9 @@ fn friction_guards<T: Number>(
         FrictionState::Open | FrictionState::Saturated { .. } => {}
         FrictionState::Slipping { sign } => {
             let slip = &state.expansion.channels[j].arguments[0];
-            let cause = EventCause::SlipZero(RowId::Friction(j));
-            consider(departing(slip, sign, state.released[j]), cause);
+            let row = RowId::Friction(j);
+            let released = state.released[j].then(|| rate_size(state, row));
+            consider(departing(slip, sign, released), EventCause::SlipZero(row));
         }
         FrictionState::Sticking => {
             forced_guards(state, RowId::Friction(j), consider);
@@ -148,9 +149,10 @@ fn gear_guards<T: Number>(
             if state.blocked[i] {
                 return;
             }
-            let released = state.released[state.rows.len() + i];
+            let row = RowId::Gear(i);
+            let released = state.released[state.index_of(row)].then(|| rate_size(state, row));
             let speed = state.expansion.speed_form(&gear.speed);
-            consider(departing(&speed, sign, released), EventCause::SlipZero(RowId::Gear(i)));
+            consider(departing(&speed, sign, released), EventCause::SlipZero(row));
         }
         GearState::Locked => {
             forced_guards(state, RowId::Gear(i), consider);
@@ -220,17 +222,27 @@ fn direction_tolerance<T: Number>(state: &HybridState<'_, T>, i: usize) -> T {
 
 /// Slip in its direction. What is released at this instant starts from exact zero, and where static
 /// and kinetic capacities agree also from zero acceleration: what is left of these beside the next term, or
-/// against its direction, is round-off and would look like an immediate return.
-fn departing<T: Number>(slip: &Series<T>, sign: f64, released: bool) -> Series<T> {
+/// against its direction, is round-off and would look like an immediate return. `released` is then the size of
+/// the terms that its rate is the sum of: between light members a rate is small beside the next term, but no
+/// round-off.
+fn departing<T: Number>(slip: &Series<T>, sign: f64, released: Option<T::Values>) -> Series<T> {
     let mut guard = scaled(slip, T::of(sign));
-    if released {
+    if let Some(terms) = released {
         guard[0] = T::zero_();
         let (rate, bend) = (guard[1].re(), guard[2].re().magnitude());
-        let small = (rate.magnitude() - bend * RELEASE_RATE_RTOL).mask_where(|left| left <= 0.0);
+        let least = (bend * RELEASE_RATE_RTOL).smaller(terms * RELEASE_SUM_RTOL);
+        let small = (rate.magnitude() - least).mask_where(|left| left <= 0.0);
         let against = rate.mask_where(|rate| (-ACCELERATION_ATOL..0.0).contains(&rate));
         guard[1] = guard[1].replace_where(small | against, T::zero_());
     }
     guard
+}
+
+/// Sum of the magnitudes of the terms that the slip rate of a row is the sum of, rad/s².
+fn rate_size<T: Number>(state: &HybridState<'_, T>, row: RowId) -> T::Values {
+    let mut basis = Vec::new();
+    state.expansion.basis_at(state.network, T::zero_(), &mut basis);
+    state.acceleration(row, &state.mode, &basis).1
 }
 
 fn negative<T: Number>(series: Series<T>) -> Series<T> {

@@ -3,12 +3,14 @@
 
 use crate::network::linalg::Matrix;
 use crate::network::nonlinear_torque::form;
-use crate::network::{Demand, GearState, Impulse, ImpulseFault, ModeKey, Network, RowId};
+use crate::network::{Demand, GearState, Impulse, ImpulseFault, ModeKey, RowId};
 use crate::number::{Number, Values};
 use crate::solver::hybrid::event::{Event, EventKind, FrictionState};
-use crate::solver::hybrid::state::{HybridState, self_locking};
+use crate::solver::hybrid::state::{HybridState, undetermined};
 use crate::solver::status::Status;
-use crate::solver::tolerances::{FORCED_ACCELERATION_RTOL, START_SPEED_RTOL};
+use crate::solver::tolerances::{
+    FORCED_ACCELERATION_RTOL, JUMP_ENERGY_RTOL, SPEED_FLOOR, START_SPEED_RTOL,
+};
 
 /// Energy of an impulse, J.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +35,7 @@ impl<T: Number> HybridState<'_, T> {
             network.prescribed.iter().map(|&(_, input)| inputs[input][0]).collect();
         let before = self.x.clone();
         let demand = Demand { rows, speeds: &before, prescribed: &prescribed };
-        if self.is_round_off(&network.excess(rows, &before, &prescribed)) {
+        if self.is_round_off(rows, &network.excess(rows, &before, &prescribed)) {
             if T::DERIVATIVES && !network.losses.is_empty() {
                 self.turn_gears();
                 let impulse = self.impulse(demand)?;
@@ -52,7 +54,12 @@ impl<T: Number> HybridState<'_, T> {
         }
         self.add_to_speeds(&impulse.change);
         self.apply_locking_impulse(&impulse.rows)?;
-        Ok(self.account(&before, &impulse))
+        let events = self.account(&before, &impulse);
+        let ImpulseEnergy { lost, source } = self.starting_impulse;
+        let (gain, energy) = self.kinetic_gain(&before, &impulse.change);
+        let moved = energy + lost.re().magnitude() + source.re().magnitude();
+        self.check_energy(&impulse.rows, gain + lost.re() - source.re(), moved)?;
+        Ok(events)
     }
 
     fn impulse(&self, demand: Demand<'_, T>) -> Result<Impulse<T>, Status> {
@@ -65,14 +72,52 @@ impl<T: Number> HybridState<'_, T> {
         })
     }
 
-    /// Return true if speeds that are to vanish are the round-off of the fastest.
-    fn is_round_off(&self, excess: &Matrix<T>) -> bool {
-        let speed = |largest: T::Values, v: &T| v.re().magnitude().larger(largest);
-        let speeds = &self.x[..self.network.speeds()];
-        let fastest = speeds.iter().fold(T::Values::zero_(), speed);
-        excess
-            .max_abs()
-            .decide_with(fastest, |excess, fastest| excess <= START_SPEED_RTOL * fastest)
+    /// Return true if the speeds that are to vanish, of `rows` and then of prescribed speeds, are the round-off
+    /// of the speeds of their members.
+    fn is_round_off(&self, rows: &[RowId], excess: &Matrix<T>) -> bool {
+        let (network, floor) = (self.network, T::Values::of(SPEED_FLOOR));
+        let speed = |node| form(network.coordinates.speeds.row(node), &self.x);
+        let (_, nodes) = network.held_speeds(rows);
+        nodes.iter().enumerate().all(|(i, terms)| {
+            let terms = terms.iter().map(|&(node, c)| (c * speed(node)).re().magnitude());
+            let scale = terms.fold(floor, |largest, term| term.larger(largest));
+            let excess = excess[(i, 0)].re().magnitude();
+            excess.decide_with(scale, |excess, scale| excess <= START_SPEED_RTOL * scale)
+        })
+    }
+
+    /// Gain of the kinetic energy by a change of the speeds `before`, and the energy that its round-off is
+    /// relative to, J.
+    fn kinetic_gain(&self, before: &[T], change: &Matrix<T>) -> (T::Values, T::Values) {
+        let (mut gain, mut energy) = (T::Values::zero_(), T::Values::zero_());
+        for i in 0..change.rows {
+            let mut momentum = T::Values::zero_();
+            for (j, mass) in self.network.mass.row(i).iter().enumerate() {
+                momentum += mass.re() * (before[j].re() + change[(j, 0)].re() * 0.5);
+            }
+            gain += change[(i, 0)].re() * momentum;
+            let speed = before[i].re().magnitude().larger(T::Values::of(SPEED_FLOOR));
+            energy += self.network.mass[(i, i)].re() * speed * speed * 0.5;
+        }
+        (gain, energy)
+    }
+
+    /// Refuse an impulse on `rows` and prescribed speeds that leaves an `error` in the balance of `energy` [J].
+    fn check_energy(
+        &self,
+        rows: &[RowId],
+        error: T::Values,
+        energy: T::Values,
+    ) -> Result<(), Status> {
+        if !error.decide_with(energy, |error, energy| error.abs() > JUMP_ENERGY_RTOL * energy) {
+            return Ok(());
+        }
+        let network = self.network;
+        let resting = rows.iter().map(|&row| network.element_of(row).to_owned());
+        let prescribed = network.mechanism.prescribed.iter().map(|p| p.element.to_string());
+        let elements = resting.chain(prescribed).collect();
+        let (error, energy) = (error.leading(), energy.leading());
+        Err(Status::Unbalanced { time: self.time(), elements, error, energy })
     }
 
     fn add_to_speeds(&mut self, change: &Matrix<T>) {
@@ -181,17 +226,9 @@ impl<T: Number> HybridState<'_, T> {
         let excess = network.excess(&rows, &self.x, &prescribed);
         let change = network.hold_by_mass(&rows).stop(&excess);
         let change = change.ok_or_else(|| undetermined(network, self.time()))?;
+        let (gain, energy) = self.kinetic_gain(&self.x, &change);
+        self.check_energy(&rows, gain, energy)?;
         self.add_to_speeds(&change);
         Ok(())
     }
-}
-
-/// Status where a lossy gear or, without one, the inertias leave the motion undetermined.
-fn undetermined<T>(network: &Network<T>, time: f64) -> Status {
-    if !network.losses.is_empty() {
-        return self_locking(network, time);
-    }
-    let nodes = network.coordinates.independent.iter();
-    let members = nodes.map(|&node| network.mechanism.nodes[node].to_string()).collect();
-    Status::Undetermined { time, members }
 }

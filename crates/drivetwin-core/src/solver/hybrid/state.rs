@@ -62,7 +62,7 @@ impl<'a, T: Number> HybridState<'a, T> {
         let mode = modes
             .cached_mode(key)
             .or_else(|| modes.compile_mode(network, key, &vec![T::zero_(); frictions]));
-        let mode = mode.ok_or_else(|| self_locking(network, t.re().leading()))?;
+        let mode = mode.ok_or_else(|| undetermined(network, t.re().leading()))?;
         Ok(Self {
             rows: vec![FrictionState::Open; frictions],
             expansion: TaylorExpansion::new(network),
@@ -112,7 +112,7 @@ impl<'a, T: Number> HybridState<'a, T> {
             return Ok(mode);
         }
         let mode = self.modes.compile_mode(self.network, key, &self.capacities());
-        mode.ok_or_else(|| self_locking(self.network, self.time()))
+        mode.ok_or_else(|| undetermined(self.network, self.time()))
     }
 
     /// Name of the element that an event is about.
@@ -161,7 +161,12 @@ impl<T: Number> Kernel for ExpandKernel<'_, '_, T> {
     }
 }
 
-pub(crate) fn self_locking<T>(network: &Network<T>, time: f64) -> Status {
-    let element = network.losses.first().map_or_else(String::new, |l| l.element.to_string());
-    Status::SelfLocking { time, element }
+/// Status where a lossy gear or, without one, the inertias leave the motion undetermined.
+pub(super) fn undetermined<T>(network: &Network<T>, time: f64) -> Status {
+    if let Some(gear) = network.losses.first() {
+        return Status::SelfLocking { time, element: gear.element.to_string() };
+    }
+    let nodes = network.coordinates.independent.iter();
+    let members = nodes.map(|&node| network.mechanism.nodes[node].to_string()).collect();
+    Status::Undetermined { time, members }
 }

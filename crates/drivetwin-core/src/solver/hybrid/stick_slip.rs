@@ -11,8 +11,8 @@ use crate::solver::hybrid::event::{FrictionState, signum_nonneg};
 use crate::solver::hybrid::state::HybridState;
 use crate::solver::status::Status;
 use crate::solver::tolerances::{
-    BOUND_RTOL, FORCED_ACCELERATION_RTOL, STRICT_MARGIN_RTOL, SUM_RTOL, TORQUE_ATOL,
-    ZERO_SLIP_RTOL, negligible, sum_and_scale,
+    BOUND_RTOL, FORCED_ACCELERATION_RTOL, FORCED_SUM_RTOL, STRICT_MARGIN_RTOL, SUM_RTOL,
+    TORQUE_ATOL, ZERO_SLIP_RTOL, negligible, sum_and_scale,
 };
 use std::sync::Arc;
 
@@ -295,8 +295,8 @@ impl<T: Number> HybridState<'_, T> {
                 worst = Some((relative, Violation::TorqueBound(row, sign)));
             }
             if worst.is_none() && !self.network.prescribed.is_empty() {
-                let a = self.acceleration(row, mode, basis).0;
-                let forced = self.forced_acceleration();
+                let (a, scale) = self.acceleration(row, mode, basis);
+                let forced = self.forced_acceleration().larger(scale * FORCED_SUM_RTOL);
                 if a.decide_with(forced, |a, forced| a.abs() > forced) {
                     worst =
                         Some((T::Values::zero_(), Violation::TorqueBound(row, signum_nonneg(a))));
@@ -361,7 +361,12 @@ impl<T: Number> HybridState<'_, T> {
     }
 
     /// Acceleration [rad/s²] of a row's speed and the size of the terms it is the sum of.
-    fn acceleration(&self, row: RowId, mode: &Mode<T>, basis: &[T]) -> (T::Values, T::Values) {
+    pub(super) fn acceleration(
+        &self,
+        row: RowId,
+        mode: &Mode<T>,
+        basis: &[T],
+    ) -> (T::Values, T::Values) {
         let (mut sum, mut scale) = (T::Values::zero_(), T::Values::zero_());
         for (i, c) in self.network.slip_of(row).iter().enumerate() {
             let (part, size) = sum_and_scale(mode.derivative.row(i), basis);
@@ -402,10 +407,13 @@ impl<T: Number> HybridState<'_, T> {
     /// Number of independent speeds of rows.
     fn rank(&self, rows: &[RowId]) -> usize {
         let mut speeds = Matrix::zeros(rows.len(), self.network.speeds());
+        let mut sizes = Vec::with_capacity(rows.len());
         for (i, &row) in rows.iter().enumerate() {
-            speeds.row_mut(i).copy_from_slice(self.network.slip_of(row));
+            let slip = self.network.slip_of(row);
+            speeds.row_mut(i).copy_from_slice(slip);
+            sizes.push(slip.size);
         }
-        independent_rows(&speeds).len()
+        independent_rows(&speeds, &sizes).len()
     }
 
     /// Make a trial the state of the run.

@@ -4,7 +4,7 @@
 use crate::network::linalg::is_zero;
 use crate::network::loss_coupling::LossCoupling;
 use crate::network::nonlinear_torque::{ChannelSeries, form};
-use crate::network::{Branch, Mode, Network, NonlinearTorque, TableLoss};
+use crate::network::{Branch, Mode, Network, NonlinearTorque, SpeedForm, TableLoss};
 use crate::number::{INVERSE, KernelFloat, Number, Series, TERMS, Values, evaluate, slope};
 use crate::solver::settings::Accuracy;
 use crate::solver::tolerances::{MAX_STICTION_EXPONENT_CHANGE, STICTION_RANGE};
@@ -49,7 +49,7 @@ impl<T: Number> TaylorExpansion<T> {
         basis.clear();
         basis.extend(self.states.iter().map(value));
         basis.extend(self.inputs.iter().map(|input| evaluate(input, of_inputs, h)));
-        let rate = |&(_, input): &(Vec<T>, usize)| slope(&self.inputs[input], of_inputs, h);
+        let rate = |&(_, input): &(SpeedForm<T>, usize)| slope(&self.inputs[input], of_inputs, h);
         basis.extend(network.prescribed.iter().map(rate));
         basis.push(T::of(1.0));
         basis.extend(self.channels.iter().map(|channel| value(&channel.torque)));
