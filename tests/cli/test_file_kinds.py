@@ -79,7 +79,7 @@ def test_no_content_breaks_the_recognition(
         ("result", FileKind.LOG, FileFormatError, "the log that was identified"),
         ("comma", FileKind.CARD, CardError, "with --vehicle"),
         ("twin", FileKind.CARD, CardError, "need no card"),
-        ("mapping", FileKind.CARD, CardError, "--channels"),
+        ("mapping", FileKind.CARD, CardError, "argument 'mapping'"),
     ],
 )
 def test_a_wrong_kind_is_named_with_the_remedy(

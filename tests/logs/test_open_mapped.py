@@ -59,9 +59,9 @@ def test_inspect_then_proposes_a_mapping(
     written = folder / "mine.toml"
     log = [str(folder / "log.csv"), "--vehicle", str(bench_files.card)]
     assert main(["inspect", *log, "--write-mapping", str(written)]) == 0
-    assert f"{folder / 'channels.toml'} beside the log is not applied" in " ".join(
-        capsys.readouterr().out.split()
-    )
+    finding = f"{folder / 'channels.toml'} beside the log is not applied"
+    printed = capsys.readouterr().out  # the terminal breaks long paths
+    assert "".join(finding.split()) in "".join(printed.split())
     mapping = read_mapping(written)
     assert mapping.channels["input_speed"].source == "SpdIn"
     assert mapping.options.time.source is None

@@ -60,5 +60,5 @@ def test_a_file_that_lacks_entries_is_refused_with_the_command_that_writes_it(
     del document["parameters"]
     path = tmp_path / "result.json"
     path.write_text(json.dumps(document), encoding="utf-8")
-    with pytest.raises(ResultFileError, match=r"write it again with `drivetwin.identify`"):
+    with pytest.raises(ResultFileError, match=r"write it again with 'drivetwin.identify'"):
         load_result(path)
