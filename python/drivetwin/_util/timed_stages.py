@@ -2,8 +2,8 @@
 """Stages of long computations; their shares of the time are measured, not guessed.
 
 A computation declares its stages by name and enters each of them once, or as often as stated. The
-CPU seconds of a stage are read from `stage_seconds.toml`, which `python -m benchmarks.progress
---write` measures. Stages may be nested: progress inside a stage is mapped to its share.
+CPU seconds of a stage are read from `stage_seconds.toml`, which `benchmarks.progress` measures.
+Stages may be nested: progress inside a stage is mapped to its share.
 """
 
 from __future__ import annotations
