@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -57,9 +56,7 @@ def test_while_the_last_file_is_written_keeps_the_old_ones(
 
 def test_as_a_signal_to_the_running_program(bench_files: Files, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "drivetwin", *identify(bench_files, tmp_path / "out")]
-    # Programs started in the background inherit an interrupt that is ignored.
-    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heed) as program:
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as program:
         time.sleep(1.2)
         program.send_signal(signal.SIGINT)
         _, message = program.communicate(timeout=30)
