@@ -8,11 +8,12 @@ SHELL := bash
 venv := .venv
 bin := $(venv)/bin
 pip := $(bin)/python -m pip --disable-pip-version-check
-# Cargo profile of the native module. `demo` builds fast, without the copies of the inner loops for
-# AVX-512; results are the same. The wheel and everything that is timed use `release`.
+# Cargo profile of the native module. `demo` builds fast, with inner loops for the processor of this
+# machine alone; results are the same. The wheel and everything that is timed use `release`.
 profile := demo
 wheel_profile := release
 flags_demo := --no-default-features --features pyo3/extension-module
+rust_demo := RUSTFLAGS="$${RUSTFLAGS:-} -C target-cpu=native"
 # Tests run on all cores. Each worker starts with a contiguous share of them, so that the tests of a
 # file stay together, and takes over from others at the end.
 pytest := $(bin)/pytest -q -n auto --dist worksteal
@@ -109,12 +110,12 @@ wheel test-reproducible: export SOURCE_DATE_EPOCH = $(shell git log -1 --format=
 .PHONY: wheel
 wheel: $(venv)/.base ## the abi3 wheel, into dist/
 	rm -f dist/drivetwin-*.whl
-	$(bin)/maturin build $(wheel_build) --out dist
+	$(rust_$(wheel_profile)) $(bin)/maturin build $(wheel_build) --out dist
 	ls dist/drivetwin-*.whl
 
 .PHONY: test-reproducible
 test-reproducible: wheel ## build the wheel twice and compare the bytes
-	tools/reproduce_wheel.sh $(CURDIR)/$(bin) dist/drivetwin-*.whl $(wheel_build)
+	$(rust_$(wheel_profile)) tools/reproduce_wheel.sh $(CURDIR)/$(bin) dist/drivetwin-*.whl $(wheel_build)
 
 .PHONY: test-wheel
 test-wheel: wheel ## run the demo from the wheel where there is no Rust
@@ -211,7 +212,7 @@ $(venv)/.dev: $(venv)/.base
 # source is. The stamp has the name of the profile, of which one at a time is installed.
 $(venv)/.native-%: $(venv)/.base $(rust_sources)
 	rm -f $(venv)/.native-*
-	VIRTUAL_ENV=$(CURDIR)/$(venv) $(bin)/maturin develop --quiet --profile $* $(flags_$*) --locked
+	$(rust_$*) VIRTUAL_ENV=$(CURDIR)/$(venv) $(bin)/maturin develop --quiet --profile $* $(flags_$*) --locked
 	touch $@
 
 .PHONY: native
