@@ -20,6 +20,7 @@ from benchmarks.estimation.vehicles import draw_vehicle
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.effects.causes import CAUSES
 from drivetwin.estimation.likelihood.effects.drum_inertia import REFERENCE_TORQUE
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.estimate import Z95, Verdict
@@ -36,6 +37,8 @@ EVIDENCE = 5.0
 """Log evidence from which a cause counts as named."""
 MOVED = 2.0
 """Move of a parameter by an effect, in standard deviations, from which its cause must be found."""
+VISIBLE = CAUSES.least_evidence + float(np.log(len(EFFECTS)))
+"""Log evidence below which no cause is named."""
 LEAST_POSSIBLE = 11
 """Values that could be identified of a vehicle without a log: those of the truth less P0."""
 PHYSICAL = ("eta", "J_e", "J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -50,9 +53,8 @@ class StudyLog:
     values; the causes named with most evidence, and their evidence.
 
     `possible` is the number of values that could be identified: those of the truth without the P0
-    that the card states exactly. `moved` is the largest move of a value by the effect, over its
-    standard deviation from noise, in fits without effects; None where it was not computed.
-    `chi2` is that of the fit, None without one.
+    that the card states exactly. `moved` and `left` are those of `Move`; None where they were not
+    computed. `chi2` is that of the fit, None without one.
     """
 
     seed: int
@@ -66,8 +68,22 @@ class StudyLog:
     failure: str = ""
     possible: int = 0
     moved: float | None = None
+    left: float | None = None
     chi2: float | None = None
     status: str = ""
+
+
+@dataclass(frozen=True)
+class Move:
+    """Consequences of an effect for a fit without effects.
+
+    `values` is the largest move of an unknown over its standard deviation from noise. `left` is the
+    rise of half the deviance: all the log evidence that a method which knows the effect could have.
+    Both are infinite where the fit has a part of the plant or fails with the effect.
+    """
+
+    values: float
+    left: float
 
 
 def draw_size(seed: int, effect: EffectId, factor: float) -> float:
@@ -141,8 +157,9 @@ def study_log(
             seed, name, 0.0, {}, {}, (), 0.0, False, error.what, possible or LEAST_POSSIBLE
         )
     truth = correct_delay(made.recorded.truth.parameters, effect, size)
-    moved = None if effect is None else measure_move(seed, effect, found)
-    return replace(judge(seed, name, size, found, truth), possible=possible, moved=moved)
+    judged = replace(judge(seed, name, size, found, truth), possible=possible)
+    move = None if effect is None else measure_move(seed, effect, found)
+    return judged if move is None else replace(judged, moved=move.values, left=move.left)
 
 
 def count_possible(made: MismatchLog) -> int:
@@ -151,17 +168,11 @@ def count_possible(made: MismatchLog) -> int:
     return len(made.recorded.truth.parameters) - known
 
 
-def measure_move(seed: int, effect: EffectId, found: Identification) -> float | None:
-    """Measure by how much the effect of a log moves the unknowns of a fit without effects.
+def measure_move(seed: int, effect: EffectId, found: Identification) -> Move | None:
+    """Measure what the effect of a log does to a fit without effects; None without such a fit.
 
     The same vehicle without the effect has the same noise, so that the difference of both fits is
     the effect alone.
-
-    Returns
-    -------
-    float or None
-        Largest move over its standard deviation from noise; infinite where the fit has a part of
-        the plant or fails with the effect, None where the log without the effect has no fit.
     """
     try:
         plain = make_sized_log(seed, effect, 0.0)
@@ -173,7 +184,7 @@ def measure_move(seed: int, effect: EffectId, found: Identification) -> float | 
     if other is None or other.plant is not None:
         return None
     if fit is None or fit.plant is not None:
-        return float("inf")
+        return Move(np.inf, np.inf)
     values = dict(zip(fit.mean.names, fit.mean.values.tolist(), strict=True))
     std = np.sqrt(np.diag(other.noise_covariance))
     rows = zip(other.mean.names, other.mean.values.tolist(), std.tolist(), strict=True)
@@ -182,7 +193,7 @@ def measure_move(seed: int, effect: EffectId, found: Identification) -> float | 
         for name, value, spread in rows
         if name in values and (name in PHYSICAL or name.endswith(".P0"))
     ]
-    return max(moves, default=None)
+    return Move(max(moves, default=0.0), 0.5 * (fit.deviance - other.deviance))
 
 
 def judge(
@@ -248,7 +259,7 @@ def _format_log(one: StudyLog) -> str:
     }
     counts = f"{len(one.identified):2d} identified, {len(one.weak):2d} weak"
     cause = f"{', '.join(one.named)} {one.evidence:.1f}" if one.named else ""
-    moved = "" if one.moved is None else f"moved {one.moved:.1f}"
+    moved = "" if one.moved is None else f"moved {one.moved:.1f} left {one.left:.1f}"
     chi2 = "" if one.chi2 is None else f"chi2 {one.chi2:.2f}"
     head = f"{one.seed} {one.effect} {one.size:.3g}: {counts} {outside}"
     return f"{head} {cause} {moved} {chi2} {one.failure[:60]}"
@@ -269,10 +280,13 @@ def summarise(logs: Sequence[StudyLog]) -> list[str]:
     false = sum(one.evidence > EVIDENCE for one in obeying)
     lines.append(f"right cause {right} of {len(evident)}, false alarms {false} of {len(obeying)}")
     moved = [one for one in departing if one.moved is not None and one.moved > MOVED]
-    right = sum(one.effect in one.named for one in moved)
-    lines.append(
-        f"right cause of effects that move a value by over {MOVED:g}: {right} of {len(moved)}"
-    )
+    visible = [one for one in moved if one.left is not None and one.left > VISIBLE]
+    for group, text in ((moved, ""), (visible, f" and leave over {VISIBLE:.1f} nats")):
+        right = sum(one.effect in one.named for one in group)
+        lines.append(
+            f"right cause of effects that move a value by over {MOVED:g}{text}: "
+            f"{right} of {len(group)}"
+        )
     certain = sum(one.certain and one.chi2 is not None and one.chi2 > CERTAIN_CHI2 for one in logs)
     lines.append(f"causes called certain at chi2 above {CERTAIN_CHI2:g}: {certain}")
     lines += [

@@ -270,14 +270,21 @@ def test_validity_counts_kept_moved_and_certain() -> None:
     errors = {f"p{k}": 0.0 for k in range(8)}
     right, missed, quiet = ("tyre_slip",), ("backlash",), ()
     logs = [
-        StudyLog(1, "tyre_slip", 1.0, errors, {}, right, 9.0, True, "", 10, 3.0, 1.0, "valid"),
-        StudyLog(2, "tyre_slip", 1.0, errors, {}, missed, 9.0, True, "", 10, 3.0, 1.3, "valid"),
-        StudyLog(3, "tyre_slip", 1.0, errors, {}, quiet, 0.0, False, "", 10, 1.9, 1.5, "valid"),
+        StudyLog(
+            1, "tyre_slip", 1.0, errors, {}, right, 9.0, True, "", 10, 3.0, 20.0, 1.0, "valid"
+        ),
+        StudyLog(
+            2, "tyre_slip", 1.0, errors, {}, missed, 9.0, True, "", 10, 3.0, 4.0, 1.3, "valid"
+        ),
+        StudyLog(
+            3, "tyre_slip", 1.0, errors, {}, quiet, 0.0, False, "", 10, 1.9, 20.0, 1.5, "valid"
+        ),
         StudyLog(4, "tyre_slip", 0.0, {}, {}, (), 0.0, False, "refused", 10),
-        StudyLog(5, "", 0.0, errors, {}, (), 0.0, False, "", 10, None, 1.0, "valid"),
+        StudyLog(5, "", 0.0, errors, {}, (), 0.0, False, "", 10, None, None, 1.0, "valid"),
     ]
     text = "\n".join(summarise_validity(logs))
     assert "right cause of effects that move a value by over 2: 1 of 2" in text
+    assert "by over 2 and leave over 7.9 nats: 1 of 1" in text
     assert "causes called certain at chi2 above 1.2: 1" in text
     assert "kept of departing 24 of 40 = 60.0 %" in text
     assert "kept of obeying 8 of 10 = 80.0 %" in text
