@@ -24,8 +24,8 @@ def test_a_log_without_a_known_gain_has_mu_times_gain(
     stated = ["--element", "P0_bar=0.8", "--element", "gain_m3=unknown"]
     log = str(bench_files.log)
     assert main(["card", "new", "-o", str(card), "--from", log, "--draft", *stated]) == 0
-    shown = capsys.readouterr().out.splitlines()
-    assert not [line for line in shown if line.startswith("open")]
+    lines = capsys.readouterr().out.splitlines()
+    assert not [line for line in lines if line.startswith("open")]
     loaded = drivetwin.load_card(card)
     assert all(one.gain.assumed for one in loaded.elements.values())
     assert loaded.elements["B3"].gain.std == pytest.approx(

@@ -89,9 +89,9 @@ def find_time_index(
 
 def _describe_other_units(names: Sequence[str], units: Sequence[str | None]) -> str:
     """Describe the columns that have a name for time but another unit."""
-    told = [
+    shown = [
         f"{name!r} is in {unit!r}"
         for name, unit in zip(names, units, strict=True)
         if is_time_name(name) and not can_be_time(unit)
     ]
-    return f"; {', '.join(told)}, no unit of time" if told else ""
+    return f"; {', '.join(shown)}, no unit of time" if shown else ""

@@ -92,8 +92,8 @@ class Agreement:
     @property
     def bare(self) -> tuple[int, ...]:
         """Indices of the candidates with a value but without an interval."""
-        told = [(k, one) for k, one in enumerate(self.estimates) if one and one.value is not None]
-        return tuple(k for k, one in told if not _has_interval(one.std_total))
+        given = [(k, one) for k, one in enumerate(self.estimates) if one and one.value is not None]
+        return tuple(k for k, one in given if not _has_interval(one.std_total))
 
     @property
     def agrees(self) -> bool | None:
@@ -111,12 +111,12 @@ def compare_estimates(candidates: Sequence[Candidate]) -> list[Agreement]:
 
 
 def _compare_parameter(name: str, estimates: Sequence[Estimate | None]) -> Agreement | None:
-    told = [(one.value, one.std_total) for one in estimates if one and one.value is not None]
-    if not told:
+    given = [(one.value, one.std_total) for one in estimates if one and one.value is not None]
+    if not given:
         return None
-    values = np.array([value for value, _ in told])
-    stds = np.array([np.nan if std is None else std for _, std in told])
-    known = np.array([_has_interval(std) for _, std in told])
+    values = np.array([value for value, _ in given])
+    stds = np.array([np.nan if std is None else std for _, std in given])
+    known = np.array([_has_interval(std) for _, std in given])
     weights = np.where(known, 1.0 / np.where(known, stds, 1.0) ** 2, 0.0)
     mean = float(np.average(values, weights=weights if known.any() else None))
     spread = np.where(known, stds, 0.0)

@@ -215,8 +215,8 @@ def _build_fit_tables(fit: Mapping[str, Mapping[str, SignalFit]]) -> Iterable[Ta
     for signal, one in fit.items():
         display = get_display_unit(get_channel_unit(signal))
         error = f"{format_significant(one['all'].rmse * display.factor, 3)} {display.label}"
-        told = [f"{one[p].fit_percent:z.1f}" if p in one else "–" for p in phases]
-        rows.append((get_channel_label(signal), *told, error))
+        fits = [f"{one[p].fit_percent:z.1f}" if p in one else "–" for p in phases]
+        rows.append((get_channel_label(signal), *fits, error))
     head = ("fit %", *phases, "rmse")
     yield Table(head, rows, frozenset(range(1, len(head))))
 

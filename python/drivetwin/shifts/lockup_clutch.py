@@ -159,7 +159,7 @@ def require_locked_converter(log: ShiftLog, card: VehicleCard, shift: Shift) -> 
             f"the converter is open before the shift {shift.start_gear}-{shift.end_gear}: engine "
             f"and gearbox input differ by {100.0 * slip:.1f} %",
             "state the map of the converter as [converter] on the card, or record the shift with "
-            "the lock-up clutch closed; phases and speeds of this one are told by "
+            "the lock-up clutch closed; see phases and speeds of this one with "
             "'drivetwin shifts'",
             Where(file=log.source, time=shift.before[1]),
         )

@@ -52,18 +52,18 @@ def check_flags(
     """The shifts with a finding where flag or gear contradict them, and flags without a shift."""
     flag = log.channels.get("shift_in_process")
     spans = None if flag is None else find_flag_spans(flag)
-    told = tuple(
+    found = tuple(
         replace(s, findings=(*s.findings, *_find_contradictions(log, s, spans))) for s in shifts
     )
     if flag is None or spans is None:
-        return told, tuple(rejected)
+        return found, tuple(rejected)
     seen = [(s.torque_phase[0], s.lockup_time) for s in shifts] + [r.time for r in rejected]
     empty = [
         RejectedShift(span, _explain_missing_shift(log, flag, span))
         for span in spans
         if not any(low <= span[1] and high >= span[0] for low, high in seen)
     ]
-    return told, (*rejected, *empty)
+    return found, (*rejected, *empty)
 
 
 def _explain_missing_shift(log: ShiftLog, flag: Channel, span: Span) -> str:

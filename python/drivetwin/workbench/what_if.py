@@ -75,14 +75,14 @@ def list_sliders(twin: Twin, shift: Shift) -> list[Slider]:
     names = ("eta", inertia, "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
     elements = (shift.offgoing, shift.oncoming)
     ids = (*names, *BESIDE_MODEL, *(f"P0.{element}" for element in elements))
-    told = [_build_slider(twin, name) for name in ids]
+    sliders = [_build_slider(twin, name) for name in ids]
     laws = [
         Slider.from_range(
             FRICTION + element, f"Friction μ {element}", "× identified", (0.5, 1.0, 1.5)
         )
         for element in elements
     ]
-    return [one for one in told if one is not None] + laws
+    return [one for one in sliders if one is not None] + laws
 
 
 def get_display(slider_id: str) -> Display:

@@ -218,13 +218,13 @@ impl<T: Number> Network<T> {
     }
 
     /// A linear form over nodes, expressed over the independent speeds.
-    pub fn over_speeds(&self, row: &[(usize, T)]) -> SpeedForm<T> {
+    pub fn express_in_speeds(&self, row: &[(usize, T)]) -> SpeedForm<T> {
         self.coordinates.form(row)
     }
 
     /// A linear form over nodes, expressed over the basis as far as it has terms.
     pub fn over_basis(&self, row: &[(usize, T)]) -> Vec<T> {
-        let mut form = self.over_speeds(row).to_vec();
+        let mut form = self.express_in_speeds(row).to_vec();
         if let Some(Followers { speeds, .. }) = &self.followers {
             form.resize(speeds.cols, T::zero_());
             for &(node, c) in row {
@@ -255,7 +255,7 @@ impl<T: Number> Network<T> {
     }
 
     fn node_speed(&self, node: usize) -> SpeedForm<T> {
-        self.over_speeds(&[(node, T::of(1.0))])
+        self.express_in_speeds(&[(node, T::of(1.0))])
     }
 
     pub(super) fn count_states(&mut self) {
@@ -324,7 +324,7 @@ impl<T: Number> Network<T> {
             self.twist_rates.row_mut(i).copy_from_slice(&rate);
         }
         for f in &self.mechanism.frictions {
-            let slip = self.over_speeds(&f.row);
+            let slip = self.express_in_speeds(&f.row);
             let (mu, normal) = (f.law.clone(), f.normal.clone());
             self.channels.push(NonlinearTorque {
                 law: TorqueLaw::Friction { mu, normal, peak: f.peak },
@@ -425,7 +425,7 @@ impl<T: Number> Network<T> {
             }
             ForceLaw::Loss { slip, constraint, map } => NonlinearTorque {
                 law: TorqueLaw::Loss { map: map.clone(), coupled: constraint.is_some() },
-                arguments: vec![self.over_states(&self.over_speeds(slip))],
+                arguments: vec![self.over_states(&self.express_in_speeds(slip))],
             },
         })
     }

@@ -2,7 +2,7 @@
 //! Minimal coordinates: some node speeds are independent, the rest follow from the constraints.
 
 use super::error::CompileError;
-use super::linalg::{Matrix, eliminate, independent_rows, without_residue};
+use super::linalg::{Matrix, drop_residue, eliminate, independent_rows};
 use crate::model::mechanism::Mechanism;
 use crate::number::{Number, Values};
 use std::ops::Deref;
@@ -68,7 +68,7 @@ impl<T: Number> Coordinates<T> {
                 sum += c * self.speeds[(node, j)];
                 size += c.re().magnitude() * self.sizes[(node, j)].re();
             }
-            coefficients.push(without_residue(sum, size));
+            coefficients.push(drop_residue(sum, size));
             largest = largest.larger(size);
         }
         SpeedForm { coefficients, size: T::promote(largest) }

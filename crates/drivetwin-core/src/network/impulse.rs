@@ -77,7 +77,7 @@ impl<T: Number> Network<T> {
         rows.retain(|&row| !self.slips(row, &after, RESTING_RTOL));
         let hold = self.hold(&motion, &rows);
         let impulses = hold.impulses(&change);
-        let (_, nodes) = self.held_speeds(&rows);
+        let (_, nodes) = self.build_held_speeds(&rows);
         let mut residual = Matrix::zeros(self.inertia.rows, 1);
         residual.subtract(&self.inertia.times(&self.coordinates.speeds).times(&change));
         subtract_held(&mut residual, &nodes, &impulses);

@@ -8,9 +8,9 @@ use crate::number::{KernelFloat, Number, Values};
 use smallvec::SmallVec;
 use std::ops::Range;
 
-/// What is left of terms that cancel counts as rounding up to this share of their magnitudes.
+/// Sum of terms that cancel that is rounding, relative to their magnitudes.
 const CANCELLATION_RTOL: f64 = 1e-12;
-/// What is left of a row that depends on others, relative to its largest entry.
+/// Remainder of a row that depends on others, relative to its largest entry.
 const RANK_RTOL: f64 = 1e-9;
 
 /// A dense row-major matrix.
@@ -227,7 +227,7 @@ pub fn eliminate<T: Number>(
     order: &[usize],
 ) -> Vec<usize> {
     let mut least: SmallVec<[_; 8]> = (0..a.rows).map(|i| largest(a.row(i)) * RANK_RTOL).collect();
-    a.data.iter_mut().zip(&sizes.data).for_each(|(v, &size)| *v = without_residue(*v, size));
+    a.data.iter_mut().zip(&sizes.data).for_each(|(v, &size)| *v = drop_residue(*v, size));
     let mut units = Vec::with_capacity(a.rows);
     for &column in order {
         let row = units.len();
@@ -254,7 +254,7 @@ pub fn eliminate<T: Number>(
                 for j in 0..a.cols {
                     let grown = share * sizes[(row, j)] + error * a[(row, j)].re().magnitude();
                     sizes[(r, j)] += grown;
-                    a[(r, j)] = without_residue(a[(r, j)], sizes[(r, j)]);
+                    a[(r, j)] = drop_residue(a[(r, j)], sizes[(r, j)]);
                 }
             }
         }
@@ -273,7 +273,7 @@ pub fn eliminate<T: Number>(
 pub fn independent_rows<T: Number>(a: &Matrix<T>, sizes: &[T]) -> Vec<usize> {
     let most = a.rows.min(a.cols);
     let mut kept = Vec::with_capacity(most);
-    // What is left of each kept row, with 1 as its largest entry, and where that stands.
+    // Remainder of each kept row, with 1 as its largest entry, and the place of that entry.
     let mut left = Matrix::<T::Values>::zeros(most, a.cols);
     let mut pivots = SmallVec::<[(usize, T::Values); 8]>::new();
     for i in 0..a.rows {
@@ -400,9 +400,9 @@ fn subtract_row<T: Number>(
     target[from..].iter_mut().zip(&source[from..]).for_each(|(t, &s)| *t -= s * factor);
 }
 
-/// A sum of terms of the magnitude `size`; zero, but for its derivatives, in the runs in which it is only their
-/// rounding.
-pub fn without_residue<T: Number>(sum: T, size: T::Values) -> T {
+/// Set a sum of terms of the magnitude `size` to zero in the runs in which it is their rounding alone. The
+/// derivatives stay.
+pub fn drop_residue<T: Number>(sum: T, size: T::Values) -> T {
     let value = sum.re();
     let left = value.magnitude() - size * CANCELLATION_RTOL;
     let rounding = left.mask_where(|left| left <= 0.0);
@@ -436,9 +436,9 @@ mod tests {
 
     #[test]
     fn what_is_left_of_terms_that_cancel_is_measured_by_these_terms() {
-        assert_eq!(without_residue(1.0 + 2e-16 - 1.0, 2.0), 0.0);
-        assert_eq!(without_residue(1e-11, 1.0), 1e-11);
-        assert_eq!(without_residue(1e-20, 1e-20), 1e-20);
+        assert_eq!(drop_residue(1.0 + 2e-16 - 1.0, 2.0), 0.0);
+        assert_eq!(drop_residue(1e-11, 1.0), 1e-11);
+        assert_eq!(drop_residue(1e-20, 1e-20), 1e-20);
     }
 
     #[test]

@@ -241,7 +241,7 @@ impl<T: Number> Network<T> {
         force_map: Option<&Matrix<T>>,
         rows: &[RowId],
     ) -> ConstraintSolver<'m, T> {
-        let (speeds, nodes) = self.held_speeds(rows);
+        let (speeds, nodes) = self.build_held_speeds(rows);
         let acting = force_map.map(|map| map.times_columns(&nodes));
         let firm = (0..rows.len()).filter(|&i| self.is_one_way(rows[i])).collect();
         let sizes = rows.iter().map(|&row| self.slip_of(row).size);
@@ -311,7 +311,7 @@ impl<T: Number> Network<T> {
     }
 
     /// Speeds kept at zero or prescribed, over the independent speeds and over the nodes.
-    pub fn held_speeds(&self, stuck: &[RowId]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
+    pub fn build_held_speeds(&self, stuck: &[RowId]) -> (Matrix<T>, Vec<mechanism::Row<T>>) {
         let count = stuck.len() + self.prescribed.len();
         let mut speeds = Matrix::zeros(count, self.speeds());
         let mut nodes = Vec::with_capacity(count);
@@ -398,7 +398,7 @@ impl<T: Number> Mode<T> {
     /// `D_depᵀ λ = (f - I ω')_dep`. Computed when first asked for.
     pub(super) fn multipliers(&self, network: &Network<T>) -> &Matrix<T> {
         self.multipliers.get_or_init(|| {
-            let (_, nodes) = network.held_speeds(&self.stuck);
+            let (_, nodes) = network.build_held_speeds(&self.stuck);
             let mut acceleration = Matrix::zeros(network.speeds(), network.basis());
             for i in 0..network.speeds() {
                 acceleration.row_mut(i).copy_from_slice(self.derivative.row(i));

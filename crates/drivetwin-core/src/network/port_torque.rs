@@ -69,7 +69,7 @@ impl<T: Number> Mode<T> {
     pub fn acceleration(&self, network: &Network<T>, terms: &[(usize, T)]) -> Vec<T> {
         let mut row = vec![T::zero_(); network.basis()];
         for (i, &c) in
-            network.over_speeds(terms).iter().enumerate().filter(|(_, c)| !is_nothing(**c))
+            network.express_in_speeds(terms).iter().enumerate().filter(|(_, c)| !is_nothing(**c))
         {
             row.iter_mut().zip(self.derivative.row(i)).for_each(|(r, &d)| *r += c * d);
         }

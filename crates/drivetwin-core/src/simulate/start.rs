@@ -221,7 +221,7 @@ fn speeds_of<T: Number>(
         let node = find("node", name, nodes.iter())?;
         // The speed of a follower is no state.
         if !network.is_follower(node) {
-            stated.push((name, network.over_speeds(&[(node, T::of(1.0))]), speed));
+            stated.push((name, network.express_in_speeds(&[(node, T::of(1.0))]), speed));
         }
     }
     let given = stated.iter().map(|(_, row, _)| row);
@@ -278,7 +278,7 @@ fn matrix<T: Number>(rows: &[&SpeedForm<T>], width: usize) -> Matrix<T> {
 fn missing<T: Number>(network: &Network<T>, rows: &[&SpeedForm<T>]) -> Vec<String> {
     let nodes = &network.coordinates.independent;
     let own: Vec<_> =
-        nodes.iter().map(|&node| network.over_speeds(&[(node, T::of(1.0))])).collect();
+        nodes.iter().map(|&node| network.express_in_speeds(&[(node, T::of(1.0))])).collect();
     let all: Vec<&SpeedForm<T>> = rows.iter().copied().chain(&own).collect();
     let kept = independent(&all, network.speeds()).into_iter();
     let names = kept.filter_map(|row| nodes.get(row.checked_sub(rows.len())?));

@@ -24,7 +24,7 @@ pub(crate) const ACCELERATION_ATOL: f64 = 1e-9;
 /// Acceleration of an element at rest that is round-off, relative to 1 rad/s² plus the largest
 /// prescribed acceleration.
 pub(crate) const FORCED_ACCELERATION_RTOL: f64 = 1e-9;
-/// The same, relative to the sum of the magnitudes of its terms.
+/// Acceleration of an element at rest that is round-off, relative to the sum of the magnitudes of its terms.
 pub(crate) const FORCED_SUM_RTOL: f64 = 1e-13;
 /// Slip of an element at rest by which a prescribed speed has moved it, relative to the largest of its
 /// terms and 1 rad/s.
@@ -52,7 +52,7 @@ pub(crate) const JUMP_ENERGY_RTOL: f64 = 1e-8;
 pub(crate) const RUNAWAY: f64 = 1e4;
 /// Error of the energy balance of a run, relative to its largest energy.
 pub(crate) const AUDIT_RTOL: f64 = 1e-8;
-/// The same per truncation error of a step, where a larger one is asked for.
+/// Error of the energy balance per truncation error of a step, where a larger one is asked for.
 pub(crate) const AUDIT_PER_TRUNCATION: f64 = 1e4;
 /// Slip that a stalled run can have gained within [`STALL_NUDGE`], rad/s.
 pub(crate) const STALLED_SLIP: f64 = 1e-6;

@@ -193,6 +193,8 @@ class ShiftModel:
 
     def _build_element(self, point: ParameterVector, one: ShiftElementKinematics) -> ShiftElement:
         c, drop, v, ln_v_s = self.get_law(point, one.name)
+        with np.errstate(over="ignore"):  # an infinite speed is a constant law
+            v_s = float(np.exp(ln_v_s))
         placed = self.place_element(point, one)
         return ShiftElement(
             name=one.name,
@@ -200,7 +202,7 @@ class ShiftModel:
             i_out=placed.b,
             gain=one.gain,
             P0=self.get_value(point, f"{one.name}.P0"),
-            friction=Stribeck(c, c + drop, float(np.exp(ln_v_s)), v),
+            friction=Stribeck(c, c + drop, v_s, v),
             peak=one.peak,
             drum_inertia=self.get_value(point, f"{one.name}.drum"),
         )

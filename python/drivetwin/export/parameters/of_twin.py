@@ -127,13 +127,13 @@ def _collect_load_terms(twin: Twin) -> Iterator[Scalar]:
 
 def _collect_gearing(twin: Twin) -> Iterator[Scalar]:
     """Input gear, and the ratios without an estimate; an estimated one is among the estimates."""
-    told = _list_estimated(twin)
+    estimated = _list_estimated(twin)
     yield Scalar("i_in", twin.i_in, text="input gear")
-    if FINAL_DRIVE not in told:
+    if FINAL_DRIVE not in estimated:
         yield Scalar(FINAL_DRIVE, twin.final_drive, text="final drive; design value")
     for name, gear in twin.gears.items():
         text = f"ratio of gear {name} without the input gear, held by {gear.element}; design value"
-        if (key := make_ratio_id(name)) not in told:
+        if (key := make_ratio_id(name)) not in estimated:
             yield Scalar(key, gear.ratio / twin.i_in, text=to_one_line(text))
 
 
@@ -143,10 +143,10 @@ def _collect_elements(twin: Twin) -> Iterator[Scalar]:
 
 
 def _build_design_scalar(name: str, element: TwinElement, twin: Twin) -> Iterator[Scalar]:
-    told = _list_estimated(twin)
+    estimated = _list_estimated(twin)
     for field, (unit, text) in DESIGN_FIELDS.items():
         key = f"{field}.{name}"
-        if not told & {key, key + OVER_ETA}:
+        if not estimated & {key, key + OVER_ETA}:
             yield Scalar(key, getattr(element, field), unit, f"{text}; design value")
 
 

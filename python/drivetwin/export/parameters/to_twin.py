@@ -146,8 +146,10 @@ def _set_number(twin: Twin, name: str, value: float) -> Twin:
         changes = {field: value}
         design = replace(twin.elements[element], **changes)
         return replace(twin, elements={**twin.elements, element: design})
-    told = Estimate(name, value, None, Verdict.DESIGN, METHOD, reason="given by a parameter file")
-    return replace(twin, parameters={**twin.parameters, name: told})
+    estimate = Estimate(
+        name, value, None, Verdict.DESIGN, METHOD, reason="given by a parameter file"
+    )
+    return replace(twin, parameters={**twin.parameters, name: estimate})
 
 
 def _set_input_gear(twin: Twin, value: float) -> Twin:

@@ -95,8 +95,8 @@ def _build_parameter_table(
 ) -> TableBlock:
     rows = []
     for one in found:
-        told = next(each for each in one.estimates if each is not None)
-        display = get_display_unit(told.unit)
+        estimate = next(each for each in one.estimates if each is not None)
+        display = get_display_unit(estimate.unit)
         rows.append(
             (
                 Cell(get_parameter_label(one.id), note=one.id),

@@ -54,10 +54,10 @@ def build_joint_section(found: Identification, several: Several) -> Section:
     ]
     shared = {k: one for k, one in found.estimates.items() if not split_log_number(k)[1]}
     names = [f"log {one.number}" for one in several.logs]
-    told = [(name, one.alone) for name, one in zip(names, several.logs, strict=True)]
+    separate = [(name, one.alone) for name, one in zip(names, several.logs, strict=True)]
     candidates = [
         Candidate(name, "", {k: v for k, v in alone.items() if k in shared}, {}, {}, {}, "")
-        for name, alone in (*told, (_TOGETHER, shared))
+        for name, alone in (*separate, (_TOGETHER, shared))
     ]
     compared = [one for one in compare_estimates(candidates) if one.apart is not None]
     blocks: list[Block] = [

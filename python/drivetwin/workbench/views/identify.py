@@ -184,8 +184,8 @@ def _build_result(outcome: Outcome) -> list[Component]:
     content: list[Component] = []
     if outcome.found is None:
         count = Counter(one.verdict for one in outcome.twin.parameters.values())
-        told = {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
-        content.append(build_facts_line({"method": outcome.twin.method.value, **told}))
+        counts = {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
+        content.append(build_facts_line({"method": outcome.twin.method.value, **counts}))
         content.append(
             ui.make_hint("From the saved workspace; identify again for evidence and report.")
         )

@@ -77,7 +77,7 @@ impl<T: Number> HybridState<'_, T> {
     fn is_round_off(&self, rows: &[RowId], excess: &Matrix<T>) -> bool {
         let (network, floor) = (self.network, T::Values::of(SPEED_FLOOR));
         let speed = |node| form(network.coordinates.speeds.row(node), &self.x);
-        let (_, nodes) = network.held_speeds(rows);
+        let (_, nodes) = network.build_held_speeds(rows);
         nodes.iter().enumerate().all(|(i, terms)| {
             let terms = terms.iter().map(|&(node, c)| (c * speed(node)).re().magnitude());
             let scale = terms.fold(floor, |largest, term| term.larger(largest));
