@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.errors import InputError, RefusedError, UnitError
 from drivetwin.estimation.result.method import Method
-from drivetwin.findings import render
+from drivetwin.findings import Code, render
 from drivetwin.logs.formats import parser_limits
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
@@ -294,3 +294,20 @@ def test_the_mapping_of_the_project_folder_is_used(session: Session, tmp_path: P
     plain = session.work.require_log()["output_torque"].time
     session.open(Source(LOG, log))
     assert session.work.require_log()["output_torque"].time == pytest.approx(plain + 0.25)
+
+
+def test_a_mapping_that_fits_no_column_is_reported_and_not_applied(
+    session: Session, tmp_path: Path
+) -> None:
+    source = session.get_folder_source(LOG)
+    log = tmp_path / LOG
+    log.write_bytes(source.path.read_bytes())
+    (tmp_path / "channels.toml").write_text('[channels.output_torque]\nsource = "of another log"\n')
+    session.open(Source(LOG, log))
+    opened = session.work.require_opened()
+    assert not opened.fault
+    found = session.work.require_log()
+    (finding,) = [one for one in found.findings if one.code is Code.MAPPING_NOT_APPLIED]
+    assert "channels.toml" in finding.text
+    assert "of another log" in finding.text
+    assert "output_torque" in found.channels
