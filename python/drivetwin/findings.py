@@ -99,6 +99,7 @@ class Code(StrEnum):
     EFFECT_IN_PLANT = auto()
     EFFECT_POSSIBLE = auto()
     EFFECT_RESEMBLED = auto()
+    EFFECT_EXCLUDED = auto()
     EFFECT_LARGE = auto()
     EFFECT_NOT_LINEAR = auto()
     EFFECTS_OMITTED = auto()

@@ -48,6 +48,7 @@ from drivetwin.estimation.likelihood.uncertainty.predicted_spread import predict
 from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.assessment import FittedParameters
+from drivetwin.estimation.result.cause import WRONG_ENTRY
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
@@ -78,9 +79,6 @@ from drivetwin.parameters import OVER_ETA
 from drivetwin.vehicle.spec import PriorValue
 
 AGE = "te_delay"
-WRONG_ENTRY = 10.0
-"""Lead of log evidence of a wrong design value over any effect: entries of a card are rarely wrong
-(odds of e⁵ against it), and it must lead as a cause does (e⁵)."""
 WITH_ETA = "likelihood over η, times η from design"
 """Method of a torque-like parameter of a log without an output torque, where η is on the card."""
 WITH_PRIOR = "likelihood with design prior"

@@ -12,6 +12,7 @@ from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.excluded import admit_excluded
 from drivetwin.estimation.likelihood.effects.plant_refit import build_plant_priors, select_plant
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
@@ -68,10 +69,10 @@ def estimate_without_linear(
     with _STAGES.enter("guess"):
         guess = _compute_own_guess(signals, drivelines, design)
     priors = EffectPriors(design.effects, design.sensors)
-    best, notes = _fit(signals, drivelines, design.loss_law, guess, priors)
+    best = _fit(signals, drivelines, design.loss_law, guess, priors)
     with _STAGES.enter("conclusions", "intervals"):
-        told = build_estimates(best, signals, drivelines, {}, priors)
-    return replace(told, findings=(*told.findings, *notes)), best
+        found = build_estimates(best.fit, signals, drivelines, {}, best.priors)
+    return replace(found, findings=(*found.findings, *best.findings)), best.fit
 
 
 def _compute_own_guess(
@@ -122,11 +123,20 @@ def estimate_likelihood(
     with _STAGES.enter("guess"):
         guess = _compute_guess(signals, drivelines, shifts, design)
     priors = EffectPriors(design.effects, design.sensors)
-    best, notes = _fit(signals, drivelines, design.loss_law, guess, priors)
+    best = _fit(signals, drivelines, design.loss_law, guess, priors)
     with _STAGES.enter("conclusions", "intervals"):
-        told = build_estimates(best, signals, drivelines, found.friction, priors)
-    findings = (*told.findings, *notes, *_find_disagreements(told, found))
-    return replace(told, findings=findings), best
+        estimates = build_estimates(best.fit, signals, drivelines, found.friction, best.priors)
+    findings = (*estimates.findings, *best.findings, *_find_disagreements(estimates, found))
+    return replace(estimates, findings=findings), best.fit
+
+
+@dataclass(frozen=True, eq=False)
+class _SelectedFit:
+    """Fit of the selected plant, and the statements on effects that the log does not contradict."""
+
+    fit: LikelihoodFit
+    priors: EffectPriors
+    findings: tuple[Finding, ...]
 
 
 def _fit(
@@ -135,7 +145,7 @@ def _fit(
     loss_law: LossLaw,
     guess: Mapping[str, float],
     priors: EffectPriors,
-) -> tuple[LikelihoodFit, tuple[Finding, ...]]:
+) -> _SelectedFit:
     """Fit the dual clutch, or a plant with a part beside it that the log supports.
 
     Raises IdentificationError where no plant reaches a plausible minimum.
@@ -149,7 +159,8 @@ def _fit(
                 raise
             best, notes = found, tuple(report_modes(found.problem.kinds))
     with _STAGES.enter("plant", "parts of the plant"):
-        return select_plant(best, priors), notes
+        admitted, warnings = admit_excluded(best, priors)
+        return _SelectedFit(select_plant(best, admitted), admitted, (*notes, *warnings))
 
 
 def _search_again(
@@ -172,19 +183,19 @@ def _search_again(
     return fit_with_backlash(problem, start, shifts, own)
 
 
-def _find_disagreements(told: EstimateSet, linear: EstimateSet) -> list[Finding]:
+def _find_disagreements(found: EstimateSet, linear: EstimateSet) -> list[Finding]:
     """Return a finding for each parameter on which both methods differ by more than their noise.
 
     Nothing is compared where an effect moves the values of one method. `OF_A_CONSTANT_LOAD` is not
     compared if only one method has a load that grows with speed: the difference is then expected,
     and the load is reported elsewhere.
     """
-    if told.cause is not None:
+    if found.cause is not None:
         return []
-    alike = (told.load is None) == (linear.load is None)
+    alike = (found.load is None) == (linear.load is None)
     explained = frozenset() if alike else OF_A_CONSTANT_LOAD
     differ = []
-    for name, estimate in told.estimates.items():
+    for name, estimate in found.estimates.items():
         other = linear.estimates.get(name)
         if other is None or other.value is None or estimate.value is None or name in explained:
             continue

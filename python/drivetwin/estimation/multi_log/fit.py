@@ -29,6 +29,7 @@ from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.excluded import admit_excluded
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START
@@ -80,31 +81,32 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
                 "leave out the log of another vehicle, payload or temperature",
             ) from fault
     with stages.enter("conclusions", "intervals"):
-        told = build_estimates(fit, signals, drivelines, pool_curves(alone), priors)
-        tested = check_consistency(fit, signals, told.friction)
+        priors, contradicted = admit_excluded(fit, priors)
+        joint = build_estimates(fit, signals, drivelines, pool_curves(alone), priors)
+        tested = check_consistency(fit, signals, joint.friction)
     shares = tuple(
         _build_log_share(k, log, one, fit)
         for k, (log, one) in enumerate(zip(logs, alone, strict=True), 1)
     )
     read = [one.set_file(Path(log.source).name) for log in logs for one in log.findings]
     is_open = any(s.torque_of_speeds is not None for s in signals)
-    ranges = () if is_open else check_design_ranges(told.estimates, design)
-    estimates, gains = check_efficiency_limit(told.estimates, design.loss_law)
+    ranges = () if is_open else check_design_ranges(joint.estimates, design)
+    estimates, gains = check_efficiency_limit(joint.estimates, design.loss_law)
     shown = collect_shift_findings(signals)
-    findings = (*read, *shown, *told.findings, *notes, *gains, *ranges)
-    told = replace(told, estimates=estimates, findings=findings)
+    findings = (*read, *shown, *joint.findings, *notes, *contradicted, *gains, *ranges)
+    joint = replace(joint, estimates=estimates, findings=findings)
     several = Several(shares, tested)
     evidence = StageResults(
         signals=tuple(signals),
         paper=tuple(one for each in alone for one in each.evidence.paper),
         integral=tuple(one for each in alone for one in each.evidence.integral),
         likelihood=fit,
-        loads=told.loads,
-        cause=told.cause,
-        spread=told.spread,
+        loads=joint.loads,
+        cause=joint.cause,
+        spread=joint.spread,
         several=several,
     )
-    return replace(_join_results(alone, told, several), evidence=evidence)
+    return replace(_join_results(alone, joint, several), evidence=evidence)
 
 
 def merge_tolerances(logs: Sequence[PreparedLog]) -> dict[str, SensorTolerance]:
@@ -139,11 +141,11 @@ def compute_start(alone: Sequence[Identification]) -> dict[str, float]:
     values: dict[str, float] = {}
     for k, fit in enumerate(fits, 1):
         structures = [part.structure for part in fit.problem.parts]
-        told = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
-        told = {**structures[0].fixed, **told}
-        own = {name: told.pop(name) for name in LOG_SPECIFIC if name in told}
+        joint = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
+        joint = {**structures[0].fixed, **joint}
+        own = {name: joint.pop(name) for name in LOG_SPECIFIC if name in joint}
         values |= {map_log_names(k)[name]: value for name, value in own.items()}
-        values = own | told | values
+        values = own | joint | values
     values |= _compute_weighted_mean([_compute_shared_mean(fit) for fit in fits])
     starts = {f"start{k}.{key}" for k in range(len(values)) for key in RUN_SPECIFIC}
     return {name: value for name, value in values.items() if name not in starts | {AERO}}
@@ -155,9 +157,9 @@ def _require_agreement(alone: Sequence[Identification]) -> None:
     To first order the common Q exceeds that of the logs alone by Σ (θ_k - θ)ᵀ F_k (θ_k - θ).
     """
     fits = [get_likelihood_fit(one)[0] for one in alone]
-    told = [_compute_shared_mean(fit) for fit in fits]
-    mean, excess = _compute_weighted_mean(told), 0.0
-    for names, values, information in told:
+    joint = [_compute_shared_mean(fit) for fit in fits]
+    mean, excess = _compute_weighted_mean(joint), 0.0
+    for names, values, information in joint:
         away = values - np.array([mean[name] for name in names])
         excess += float(away @ information @ away)
     if excess > (MULTI_START.plausible_chi2 - 1.0) * sum(fit.problem.size for fit in fits):
@@ -177,11 +179,11 @@ def _compute_shared_mean(fit: LikelihoodFit) -> _Told:
     return names, fit.mean.values[keep], invert_information(fit.covariance[np.ix_(keep, keep)])
 
 
-def _compute_weighted_mean(told: Sequence[_Told]) -> dict[str, float]:
+def _compute_weighted_mean(joint: Sequence[_Told]) -> dict[str, float]:
     """Mean of the unknowns of several fits, weighted by information."""
-    names = list(dict.fromkeys(name for one in told for name in one[0]))
+    names = list(dict.fromkeys(name for one in joint for name in one[0]))
     information, pull = np.zeros((len(names), len(names))), np.zeros(len(names))
-    for known, values, weight in told:
+    for known, values, weight in joint:
         place = [names.index(name) for name in known]
         information[np.ix_(place, place)] += weight
         pull[place] += weight @ values
@@ -217,31 +219,31 @@ def _build_log_share(
 
 
 def _join_results(
-    alone: Sequence[Identification], told: EstimateSet, several: Several
+    alone: Sequence[Identification], joint: EstimateSet, several: Several
 ) -> Identification:
     """Build one identification of all logs, without its evidence."""
-    told = apply_consistency(told, several.consistency)
+    joint = apply_consistency(joint, several.consistency)
     names = [Path(share.source).name for share in several.logs]
     agreed = (several.consistency.text,) if several.consistency.agree else ()
     first = alone[0]
     return replace(
         first,
-        estimates=told.estimates,
-        friction=told.friction,
+        estimates=joint.estimates,
+        friction=joint.friction,
         shifts=tuple(shift for one in alone for shift in one.shifts),
         rejected=tuple(one for each in alone for one in each.rejected),
         validity=_merge_ranges(alone),
         inputs={name: digest for one in alone for name, digest in one.inputs.items()},
-        findings=told.findings,
+        findings=joint.findings,
         assumptions=(
             f"{', '.join(names)} are of one vehicle in one state: they share all parameters but "
             "load and age of the engine torque",
             *agreed,
             *first.assumptions,
         ),
-        correlation_ids=told.correlation_ids,
-        correlation=told.correlation,
-        load=told.load,
+        correlation_ids=joint.correlation_ids,
+        correlation=joint.correlation,
+        load=joint.load,
     )
 
 

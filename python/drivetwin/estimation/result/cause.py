@@ -9,6 +9,9 @@ from drivetwin.vehicle.effects import EffectId
 
 LEAD = 5.0
 """Lead of log evidence over the next cause from which a cause counts as found: odds of 150 to 1."""
+WRONG_ENTRY = 10.0
+"""Lead of log evidence of a wrong entry of the card over any effect: entries of a card are rarely
+wrong (odds of e⁵ against it), and it must lead as a cause does (e⁵)."""
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,16 @@ class EffectPriors:
             return EffectPrior(change.std, change.value)
         return self.effects.get(effect, EffectPrior(EFFECTS[effect].std))
 
+    @property
+    def excluded(self) -> set[EffectId]:
+        """Effects that the card states as absent."""
+        return {name for name, one in self.effects.items() if not (one.std or one.value)}
+
+    def drop_statements(self, effects: Collection[EffectId]) -> EffectPriors:
+        """Return the statements without those on some effects, which get their default priors."""
+        kept = {name: one for name, one in self.effects.items() if name not in effects}
+        return EffectPriors(kept, self.sensors)
+
     def drop_effects(self) -> EffectPriors:
         """Return the statements on sensors with all effects off."""
         return EffectPriors({one: EffectPrior(0.0) for one in EffectId}, self.sensors)
