@@ -11,7 +11,12 @@ import pytest
 import drivetwin.cli
 from drivetwin.__main__ import main
 from drivetwin._util import interrupts
-from drivetwin._util.interrupts import defer_interrupts, interrupt_on_signals, was_interrupted
+from drivetwin._util.interrupts import (
+    defer_interrupts,
+    ignore_interrupts,
+    interrupt_on_signals,
+    was_interrupted,
+)
 from drivetwin.errors import INTERRUPTED
 
 ENDING = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -73,3 +78,13 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
     interrupt_on_signals()
     signal.raise_signal(signal.SIGINT)
     assert not was_interrupted()
+
+
+@ENDING
+def test_signals_are_ignored_for_the_block_alone(number: int) -> None:
+    interrupt_on_signals()
+    with ignore_interrupts():
+        signal.raise_signal(number)
+    assert not was_interrupted()
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(number)

@@ -27,13 +27,18 @@ def interrupt_on_signals() -> None:
             signal.signal(one, _interrupt)
 
 
-def ignore_interrupts() -> None:
+@contextmanager
+def ignore_interrupts() -> Iterator[None]:
     """Ignore all signals of `ENDING` while the program cleans up.
 
     A terminal that is closed sends more than one.
     """
-    for one in ENDING:
-        signal.signal(one, signal.SIG_IGN)
+    before = {one: signal.signal(one, signal.SIG_IGN) for one in ENDING}
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
 
 
 def was_interrupted() -> bool:

@@ -70,9 +70,9 @@ def workbench(
     except KeyboardInterrupt:
         pass  # the way to end the program
     finally:
-        ignore_interrupts()
-        end_all()
-        sessions.close()
+        with ignore_interrupts():
+            end_all()
+            sessions.close()
 
 
 def _serve(
