@@ -21,7 +21,9 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.effects.causes import CAUSES
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.drum_inertia import REFERENCE_TORQUE
+from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.pipeline import identify
@@ -53,8 +55,8 @@ class StudyLog:
     values; the causes named with most evidence, and their evidence.
 
     `possible` is the number of values that could be identified: those of the truth without the P0
-    that the card states exactly. `moved` and `left` are those of `Move`; None where they were not
-    computed. `chi2` is that of the fit, None without one.
+    that the card states exactly. `moved` and `own_evidence` are those of `Move`; None where they were
+    not computed. `chi2` is that of the fit, None without one.
     """
 
     seed: int
@@ -68,7 +70,7 @@ class StudyLog:
     failure: str = ""
     possible: int = 0
     moved: float | None = None
-    left: float | None = None
+    own_evidence: float | None = None
     chi2: float | None = None
     status: str = ""
 
@@ -77,13 +79,13 @@ class StudyLog:
 class Move:
     """Consequences of an effect for a fit without effects.
 
-    `values` is the largest move of an unknown over its standard deviation from noise. `left` is the
-    rise of half the deviance: all the log evidence that a method which knows the effect could have.
-    Both are infinite where the fit has a part of the plant or fails with the effect.
+    `values` is the largest move of an unknown over its standard deviation from noise, `evidence` the
+    log evidence of the effect alone, as a method has it that knows the cause. Both are infinite
+    where the fit has a part of the plant or fails with the effect.
     """
 
     values: float
-    left: float
+    evidence: float
 
 
 def draw_size(seed: int, effect: EffectId, factor: float) -> float:
@@ -158,8 +160,10 @@ def study_log(
         )
     truth = correct_delay(made.recorded.truth.parameters, effect, size)
     judged = replace(judge(seed, name, size, found, truth), possible=possible)
-    move = None if effect is None else measure_move(seed, effect, found)
-    return judged if move is None else replace(judged, moved=move.values, left=move.left)
+    move = None if effect is None else measure_move(seed, effect, found, card)
+    if move is None:
+        return judged
+    return replace(judged, moved=move.values, own_evidence=move.evidence)
 
 
 def count_possible(made: MismatchLog) -> int:
@@ -168,7 +172,9 @@ def count_possible(made: MismatchLog) -> int:
     return len(made.recorded.truth.parameters) - known
 
 
-def measure_move(seed: int, effect: EffectId, found: Identification) -> Move | None:
+def measure_move(
+    seed: int, effect: EffectId, found: Identification, card: VehicleCard
+) -> Move | None:
     """Measure what the effect of a log does to a fit without effects; None without such a fit.
 
     The same vehicle without the effect has the same noise, so that the difference of both fits is
@@ -176,8 +182,8 @@ def measure_move(seed: int, effect: EffectId, found: Identification) -> Move | N
     """
     try:
         plain = make_sized_log(seed, effect, 0.0)
-        card = withhold(plain.card, *EFFECTS)
-        other = identify(plain.log, card, detect_shifts(plain.log, card)).evidence.likelihood
+        bare = withhold(plain.card, *EFFECTS)
+        other = identify(plain.log, bare, detect_shifts(plain.log, bare)).evidence.likelihood
     except DrivetwinError:
         return None
     fit = found.evidence.likelihood
@@ -193,7 +199,10 @@ def measure_move(seed: int, effect: EffectId, found: Identification) -> Move | N
         for name, value, spread in rows
         if name in values and (name in PHYSICAL or name.endswith(".P0"))
     ]
-    return Move(max(moves, default=0.0), 0.5 * (fit.deviance - other.deviance))
+    expansion = expand_effects(fit, EffectPriors({}, card.sensors))
+    groups = {} if expansion is None else expansion.evidence
+    nats = [one.nats for group, one in groups.items() if group.effect is effect]
+    return Move(max(moves, default=0.0), max(nats, default=0.0))
 
 
 def judge(
@@ -259,7 +268,9 @@ def _format_log(one: StudyLog) -> str:
     }
     counts = f"{len(one.identified):2d} identified, {len(one.weak):2d} weak"
     cause = f"{', '.join(one.named)} {one.evidence:.1f}" if one.named else ""
-    moved = "" if one.moved is None else f"moved {one.moved:.1f} left {one.left:.1f}"
+    moved = (
+        "" if one.moved is None else f"moved {one.moved:.1f}, own evidence {one.own_evidence:.1f}"
+    )
     chi2 = "" if one.chi2 is None else f"chi2 {one.chi2:.2f}"
     head = f"{one.seed} {one.effect} {one.size:.3g}: {counts} {outside}"
     return f"{head} {cause} {moved} {chi2} {one.failure[:60]}"
@@ -280,8 +291,8 @@ def summarise(logs: Sequence[StudyLog]) -> list[str]:
     false = sum(one.evidence > EVIDENCE for one in obeying)
     lines.append(f"right cause {right} of {len(evident)}, false alarms {false} of {len(obeying)}")
     moved = [one for one in departing if one.moved is not None and one.moved > MOVED]
-    visible = [one for one in moved if one.left is not None and one.left > VISIBLE]
-    for group, text in ((moved, ""), (visible, f" and leave over {VISIBLE:.1f} nats")):
+    visible = [one for one in moved if (one.own_evidence or 0.0) > VISIBLE]
+    for group, text in ((moved, ""), (visible, f" and have over {VISIBLE:.1f} nats alone")):
         right = sum(one.effect in one.named for one in group)
         lines.append(
             f"right cause of effects that move a value by over {MOVED:g}{text}: "
