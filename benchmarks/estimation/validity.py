@@ -55,8 +55,8 @@ class StudyLog:
     values; the causes named with most evidence, and their evidence.
 
     `possible` is the number of values that could be identified: those of the truth without the P0
-    that the card states exactly. `moved` and `own_evidence` are those of `Move`; None where they were
-    not computed. `chi2` is that of the fit, None without one.
+    that the card states exactly. `moved` and `own_evidence` are those of `Move`; None where they
+    were not computed. `chi2` is that of the fit, None without one.
     """
 
     seed: int
@@ -79,8 +79,8 @@ class StudyLog:
 class Move:
     """Consequences of an effect for a fit without effects.
 
-    `values` is the largest move of an unknown over its standard deviation from noise, `evidence` the
-    log evidence of the effect alone, as a method has it that knows the cause. Both are infinite
+    `values` is the largest move of an unknown over its standard deviation from noise, `evidence`
+    the log evidence of the effect alone, as a method has it that knows the cause. Both are infinite
     where the fit has a part of the plant or fails with the effect.
     """
 
