@@ -92,6 +92,7 @@ class Code(StrEnum):
     GAIN_NOT_DETERMINED = auto()
     FRICTION_IMPLAUSIBLE = auto()
     FRICTION_IMPOSSIBLE = auto()
+    GAIN_REFUTED = auto()
     EFFICIENCY_IMPLAUSIBLE = auto()
     CARD_SUSPECT = auto()
     RESIDUAL_UNEXPLAINED = auto()

@@ -109,3 +109,20 @@ def test_a_card_with_an_impossible_gain_makes_no_valid_model(
         numbers = next(one for one in judged.findings if one.code is code).numbers
         assert numbers["least"].value < 0.027 < numbers["most"].value
         assert judged.estimates["eta"].verdict is Verdict.WEAK
+
+
+@pytest.mark.parametrize(("partner", "refuted"), [("B3", True), ("B2", False)])
+def test_a_gain_that_card_and_log_contradict_makes_no_valid_model(
+    partner: str, refuted: bool
+) -> None:
+    unequal = report(
+        Code.CARD_GAINS_UNEQUAL, element="B3", found=0.27, unit="m³", factor=10.0, others="B2",
+        low=0.01, high=0.1,
+    )  # fmt: skip
+    contradiction = report(Code.GAINS_CONTRADICT, element="B2", partner=partner, ratio=0.7)
+    found = replace(_simulated(90.0, 10.0), findings=(unequal, contradiction))
+    judged = assess_model(found)
+    assert (judged.status is ModelStatus.NOT_VALID) is refuted
+    codes = [one.code for one in judged.findings]
+    assert (Code.GAIN_REFUTED in codes) is refuted
+    assert (Code.CARD_GAINS_UNEQUAL in codes) is not refuted

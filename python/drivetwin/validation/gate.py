@@ -44,8 +44,9 @@ class GateSettings:
 
 GATE = GateSettings()
 _ON_GAIN = (
-    {Code.FRICTION_IMPOSSIBLE, Code.FRICTION_IMPLAUSIBLE},
+    {Code.FRICTION_IMPOSSIBLE, Code.FRICTION_IMPLAUSIBLE, Code.GAIN_REFUTED},
     {Code.GAIN_SUSPECT},
+    {Code.GAINS_CONTRADICT, Code.CARD_GAINS_UNEQUAL},
     {Code.CARD_FRICTION_IMPLAUSIBLE, Code.CARD_FRICTION_UNUSUAL, Code.CARD_FRICTION_BOUND},
 )
 """Findings on the gain of an element; those of a row replace those of the rows below it."""
@@ -57,15 +58,15 @@ def assess_model(found: Identification) -> Identification:
     Two questions are apart. The values may be trusted if the fit explains the log and no phase of
     the simulation leaves its predicted spread. The twin can replay the log if the simulation also
     explains most of what moves; a poor fit within its spread is a remark. A likelihood that reached
-    no plausible minimum fails too, and so does one with a friction that no clutch can have: its
-    card contradicts it. A model that fails keeps its values, none of them identified, and a finding
-    names the entries of the card that are most likely wrong.
+    no plausible minimum fails too, and so does one with a friction or a gain that no clutch can
+    have: its card contradicts it. A model that fails keeps its values, none of them identified, and
+    a finding names the entries of the card that are most likely wrong.
     """
     found = withhold_starting_values(found)
     noisy, missing = _check_fit(found)
     impossible, implausible = _check_friction(found)
     failures = [*missing, *_check_runs(found), *_check_spread(found), *_check_efficiency(found)]
-    failures += impossible
+    failures += [*impossible, *_find_refuted_gains(found)]
     doubts = [*noisy, *implausible]
     estimates = apply_errors(found.estimates, failures)
     refuted = bool(failures or found.evidence.gave_up) or _is_unexplained(found)
@@ -200,6 +201,19 @@ def _check_friction(found: Identification) -> tuple[list[Finding], list[Finding]
         else:
             implausible.append(report(Code.FRICTION_IMPLAUSIBLE, element=name, **numbers))
     return impossible, implausible
+
+
+def _find_refuted_gains(found: Identification) -> Iterator[Finding]:
+    """Find gains that are out of proportion on the card and contradict the log: two witnesses."""
+    disputed = {
+        one.names[key]
+        for one in found.findings
+        if one.code is Code.GAINS_CONTRADICT
+        for key in ("element", "partner")
+    }
+    for one in found.findings:
+        if one.code is Code.CARD_GAINS_UNEQUAL and one.names["element"] in disputed:
+            yield replace(one, code=Code.GAIN_REFUTED)
 
 
 def _check_efficiency(found: Identification) -> Iterator[Finding]:
