@@ -69,7 +69,7 @@ def _format_head(answers: Answers, survey: LogSurvey | None, *, draft: bool) -> 
     yield "# Design values are a number, or { value = ..., std = ... } with one standard deviation."
     if draft:
         source = "" if survey is None else f" from {escape_line(survey.name)}"
-        yield f"# Draft{source}: confirm entries marked 'guess:', fill in those that are comments."
+        yield f"# Draft{source}: confirm entries marked 'guess:', fill in the commented ones."
     if survey is not None and survey.remark:
         yield f"# The log gives no ratios: {escape_line(survey.remark)}"
     yield from format_entry("name", answers.get(("name",), UNKNOWN), "")

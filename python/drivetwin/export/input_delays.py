@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Delays between the inputs of a log and those that act in the exported model."""
+"""Delays between the inputs of a log and the acting inputs of the exported model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivetwin.twin.twin import PRESSURE_DELAY, Twin
 
 @dataclass(frozen=True)
 class InputDelays:
-    """Delays [s] between the inputs of a log and those that act in the model.
+    """Delays [s] between the inputs of a log and the acting inputs of the model.
 
     A log shows the engine torque `torque` after it acts. Pressures act `pressure` after the log
     shows them. Both may be negative. With `as_logged` the model takes the inputs as a log shows
@@ -32,7 +32,7 @@ class InputDelays:
     def lag(self) -> float:
         """Delay [s] of model and outputs: the largest advance that a logged input would need.
 
-        Zero if the inputs of the model are those that act.
+        Zero if the model takes acting inputs.
         """
         return max(0.0, self._torque_age, -self.pressure) if self.as_logged else 0.0
 
@@ -82,7 +82,7 @@ class InputDelays:
 
 
 ACTING_INPUTS = InputDelays()
-"""Delays of a model whose inputs are those that act."""
+"""Delays of a model that takes acting inputs."""
 
 
 def _describe_shift(late: float) -> str:

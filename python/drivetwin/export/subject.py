@@ -24,7 +24,7 @@ class Subject:
     note: str = ""
     """Origin of the numbers, one line."""
     delays: InputDelays = ACTING_INPUTS
-    """Delays between the inputs of a log and those that act."""
+    """Delays between the inputs of a log and the acting inputs."""
 
 
 def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:

@@ -26,7 +26,7 @@ NOTHING_STATED = Mapped({})
 def open_as_mapped(
     path: Path, stated: Mapped, card: VehicleCard | None
 ) -> Iterator[tuple[Recording, Mapped]]:
-    """Open a log with the `stated` options, completed by those that the twin of the card remembers.
+    """Open a log with the `stated` options, completed by the remembered ones of the twin.
 
     Yields the recording and the mapping with the options that were used. A log that cannot be
     opened with the remembered options is opened without them. See `open_stated`.
@@ -48,7 +48,7 @@ def open_as_mapped(
 
 
 def _complete_options(stated: Mapped, card: VehicleCard, path: Path) -> Mapped:
-    """Complete the options of a mapping by those that the twin of the card remembers."""
+    """Complete the options of a mapping by the remembered options of the twin of the card."""
     options = recall_options(stated.options, card.remembered.options, path.parent)
     if options == stated.options:
         return stated

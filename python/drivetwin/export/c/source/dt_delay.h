@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file dt_delay.h
- *  Delay lines from the inputs of an exported model to those that act.
+ *  Delay lines from the inputs of an exported model to the acting inputs.
  *
  *  A log shows each signal with its own delay. No signal can be advanced in real time, so the model
  *  waits for the latest one: the lines delay the other inputs, and the outputs are later by the lag
@@ -24,7 +24,7 @@ extern "C" {
 
 #define DT_LINE 128 /**< samples of a line */
 
-/** Delays from the inputs to those that act, >= 0, and the lag of the outputs that follows. */
+/** Delays from the inputs to the acting ones, >= 0, and the lag of the outputs that follows. */
 typedef struct {
     dt_real engine_torque; /**< s */
     dt_real pressure;      /**< of both clutches, s */

@@ -16,7 +16,7 @@ extern "C" {
 extern const dt_params dt_twin_params;
 /** Where a run starts unless told otherwise: steadily in the old gear. */
 extern const dt_start dt_twin_start;
-/** Delays of the inputs for dt_line_begin; zero where the inputs are those that act. */
+/** Delays of the inputs for dt_line_begin; zero where the model takes acting inputs. */
 extern const dt_delays dt_twin_delays;
 /** Name of the twin. */
 extern const char dt_twin_name[];
