@@ -14,6 +14,7 @@ __all__ = [
     "batch_sensitivities",
     "gear_statics",
     "linearise",
+    "network_sensitivities",
     "reduce_shift",
     "sensitivities",
     "simulate",
@@ -32,6 +33,7 @@ _Run = tuple[
 ]
 
 _Output = tuple[str, Sequence[str]]
+_Seeded = tuple[float, Sequence[tuple[int, float]]]
 _Ratios = tuple[str, float, float, float]
 _Scenario = tuple[
     Sequence[tuple[str, _Array, _Array, float]],
@@ -93,6 +95,17 @@ def simulate_network(
     grid: _Array,
     options: _Options,
 ) -> _Run: ...
+def network_sensitivities(
+    driveline: str,
+    outputs: Sequence[_Output],
+    signals: tuple[
+        Sequence[tuple[str, _Array, _Array, _Seeded]],
+        Sequence[tuple[str, float, float, float, float]],
+    ],
+    start: tuple[Sequence[tuple[str, _Seeded]], Sequence[tuple[str, _Seeded]], Sequence[str]],
+    grid: _Array,
+    options: tuple[float, float],
+) -> tuple[_Array, list[tuple[float, str, str, float]], str, list[_Array], _Array]: ...
 def actuator_pressure(
     model: str, command: tuple[_Array, _Array], initial: float | None, at: _Array
 ) -> _Array: ...

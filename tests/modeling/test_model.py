@@ -43,6 +43,20 @@ def test_a_brake_stops_a_wheel_and_heats_by_its_energy() -> None:
     assert run[wheel.acceleration][slips] == pytest.approx(-5.0)
 
 
+def test_derivatives_are_exact_through_the_stop_of_a_wheel() -> None:
+    """ω = ω0 - M·t/J up to the stop at J·ω0/M = 0.8 s, and 0 after it."""
+    model, wheel, _ = _brake_test()
+    found = model.differentiate(1.0, ["wheel.inertia", "start.wheel"])
+    time, slopes = found.run.time, found.derivatives[wheel.speed]
+    slips = time < 0.799
+    assert slopes[slips] == pytest.approx(
+        np.column_stack([10.0 * time / 2.0**2, np.ones(time.size)])[slips], abs=1e-9
+    )
+    assert np.all(slopes[time > 0.801] == 0.0)
+    with pytest.raises(InputError, match="did you mean 'wheel'"):
+        model.differentiate(1.0, ["weel.inertia"])
+
+
 def test_the_page_runs_in_35_lines_and_its_energy_closes() -> None:
     (text,) = re.findall(
         r"^```python\n(.*?)^```", PAGE.read_text("utf-8"), re.MULTILINE | re.DOTALL

@@ -2,10 +2,10 @@
 //! Simulation of the dual-clutch driveline; see `drivetwin.simulation.dual_clutch`.
 
 use crate::border::call;
-use crate::plain::{Audit, Event, as_array, events_of};
+use crate::plain::{Audit, Event, as_array, events_of, status_of};
 use drivetwin_core::model::DualClutch;
 use drivetwin_core::simulate::{
-    DualClutchStart, RunOptions, Sampled, Trajectory, dual_clutch_sensitivities, run_dual_clutch,
+    DualClutchStart, RunOptions, Sampled, dual_clutch_sensitivities, run_dual_clutch,
 };
 use drivetwin_core::solver::{Settings, Signal};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
@@ -105,16 +105,6 @@ pub fn sensitivities<'py>(
         derivatives,
         PyArray2::from_vec2(py, &found.events)?,
     ))
-}
-
-/// The status, and what makes derivatives worthless.
-fn status_of(run: &Trajectory<f64>) -> String {
-    match &run.grazing {
-        Some((time, element)) => {
-            format!("{}; {element} grazes its event at {time:.9} s", run.status)
-        }
-        None => run.status.to_string(),
-    }
 }
 
 /// A driveline from its JSON.

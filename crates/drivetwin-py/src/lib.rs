@@ -11,6 +11,7 @@ mod dual_clutch;
 mod gearbox;
 mod linear;
 mod network;
+mod network_sensitivity;
 mod output;
 mod plain;
 mod table;
@@ -32,6 +33,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(actuator::actuator_pressure, module)?)?;
     module.add_function(wrap_pyfunction!(linear::linearise, module)?)?;
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
+    module.add_function(wrap_pyfunction!(network_sensitivity::network_sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::reduce_shift, module)?)?;
     module.add_class::<table::TableScanner>()?;

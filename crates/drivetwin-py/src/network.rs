@@ -11,11 +11,12 @@ use drivetwin_core::solver::{Settings, Signal};
 use numpy::{PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use serde::de::DeserializeOwned;
 
 /// Input name, times [s] and values.
 type Samples<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
 /// Input name, offset, amplitude, frequency [Hz], phase [rad].
-type Sine = (String, f64, f64, f64, f64);
+pub type Sine = (String, f64, f64, f64, f64);
 /// Speeds [rad/s] by node, twists [rad] by shaft, names of elements at rest.
 type StartState = (Vec<(String, f64)>, Vec<(String, f64)>, Vec<String>);
 /// Tolerance, longest step [s], fixed order, whether samples without events may be passed at once,
@@ -63,11 +64,11 @@ pub fn simulate_network<'py>(
 }
 
 /// Read the elements one by one, so that a fault names its element.
-pub fn parse(elements: &str) -> PyResult<Driveline<f64>> {
+pub fn parse<T: DeserializeOwned>(elements: &str) -> PyResult<Driveline<T>> {
     let refuse = |name: &str, e: serde_json::Error| PyValueError::new_err(format!("{name}: {e}"));
     let all: Vec<serde_json::Value> =
         serde_json::from_str(elements).map_err(|e| refuse("elements", e))?;
-    let element = |(i, value): (usize, serde_json::Value)| -> PyResult<Element<f64>> {
+    let element = |(i, value): (usize, serde_json::Value)| -> PyResult<Element<T>> {
         let name = value.get("name").and_then(|name| name.as_str());
         let name = name.map_or_else(|| format!("element {i}"), ToOwned::to_owned);
         serde_json::from_value(value).map_err(|e| refuse(&name, e))

@@ -23,6 +23,16 @@ pub fn as_array(a: EnergyAudit) -> Audit {
     [a.source, a.stored, friction, gear_loss, shaft, load, converter, impulse, created, error]
 }
 
+/// Describe the status, with the first event that only grazes: no derivatives after it.
+pub fn status_of(run: &Trajectory<f64>) -> String {
+    match &run.grazing {
+        Some((time, element)) => {
+            format!("{}; {element} grazes its event at {time:.9} s", run.status)
+        }
+        None => run.status.to_string(),
+    }
+}
+
 fn kind_name(kind: EventKind) -> &'static str {
     match kind {
         EventKind::Lock => "lock",

@@ -25,6 +25,11 @@ from drivetwin.modeling.run import ModelRun
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
 from drivetwin.simulation.network import Output, Sine, Start, simulate
+from drivetwin.simulation.network_sensitivity import (
+    NetworkSensitivities,
+    Unknowns,
+    differentiate,
+)
 from drivetwin.simulation.serialize import as_array, require_number
 
 _SAMPLING = 1e-3
@@ -87,6 +92,45 @@ class Model(ElementMethods):
         elements = [part.element for part in self.parts]
         run = simulate(elements, inputs, start, grid, outputs, audit=audit, accuracy=accuracy)
         return ModelRun(run)
+
+    def differentiate(
+        self,
+        time: float | FloatArray,
+        unknowns: Unknowns,
+        *,
+        record: Sequence[Output] | None = None,
+        accuracy: Accuracy | None = None,
+    ) -> NetworkSensitivities:
+        """Simulate with the exact derivatives of the recorded quantities by numbers of the model.
+
+        Parameters
+        ----------
+        time
+            End of the run, which is then sampled each millisecond, or instants [s].
+        unknowns
+            Paths such as `shaft.stiffness`, `start.engine`, `delay.torque`; see
+            `drivetwin.simulation.network_sensitivity`.
+        record
+            Quantities to record; the speeds of all nodes if None.
+        accuracy
+            Settings of the integration.
+
+        Raises
+        ------
+        InputError
+            With all faults of the model, or for a path without a derivative.
+        """
+        grid = self._make_grid(time)
+        speeds = [node.speed for node in self.nodes if node is not self.ground]
+        return differentiate(
+            [part.element for part in self.parts],
+            self._make_inputs((float(grid[0]), float(grid[-1]))),
+            self._resolve_start(),
+            grid,
+            speeds if record is None else list(record),
+            unknowns,
+            accuracy=accuracy,
+        )
 
     def list_outputs(self) -> list[Output]:
         """List everything that a run records."""

@@ -123,22 +123,13 @@ def simulate(
     """
     accuracy = accuracy or Accuracy()
     elements, outputs = list(elements), list(outputs)
-    refuse_faults(find_element_faults(elements))
-    requests = [resolve_output(output, elements) for output in outputs]
-    refuse_faults([one for one in requests if isinstance(one, str)])
-    refuse_faults(_find_input_faults(elements, inputs))
+    recorded = resolve_outputs(elements, inputs, outputs)
     sampled = {name: one for name, one in inputs.items() if isinstance(one, Signal)}
-    sines = [
-        (name, sine.offset, sine.amplitude, sine.frequency, sine.phase)
-        for name, sine in inputs.items()
-        if isinstance(sine, Sine)
-    ]
-    recorded = [request for request in requests if isinstance(request, Request)]
     try:
         columns, events, status, energy = native_simulate_network(
             as_json(elements),
             [one for request in recorded for one in request.native],
-            (to_core_samples(sampled), sines),
+            (to_core_samples(sampled), to_core_sines(inputs)),
             (list(start.speeds.items()), list(start.twists.items()), as_names(start.locked)),
             run_time(time),
             (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit),
@@ -152,6 +143,28 @@ def simulate(
         status,
         EnergyAudit(*energy) if energy is not None else None,
     )
+
+
+def resolve_outputs(
+    elements: Sequence[Element], inputs: Mapping[str, Signal | Sine], outputs: Sequence[Output]
+) -> list[Request]:
+    """Return the requests of outputs; raises InputError with the faults of the description."""
+    refuse_faults(find_element_faults(elements))
+    requests = [resolve_output(output, elements) for output in outputs]
+    refuse_faults([one for one in requests if isinstance(one, str)])
+    refuse_faults(_find_input_faults(elements, inputs))
+    return [request for request in requests if isinstance(request, Request)]
+
+
+def to_core_sines(
+    inputs: Mapping[str, Signal | Sine],
+) -> list[tuple[str, float, float, float, float]]:
+    """Sines as the core takes them: name, offset, amplitude, frequency [Hz], phase [rad]."""
+    return [
+        (name, sine.offset, sine.amplitude, sine.frequency, sine.phase)
+        for name, sine in inputs.items()
+        if isinstance(sine, Sine)
+    ]
 
 
 def _find_input_faults(

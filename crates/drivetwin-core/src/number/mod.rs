@@ -5,6 +5,7 @@
 mod consensus;
 mod dual;
 mod kernel_float;
+mod seeded;
 mod series;
 mod simd_vector;
 mod transpose;

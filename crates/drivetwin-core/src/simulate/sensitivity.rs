@@ -3,10 +3,9 @@
 
 use super::dual_clutch::{DualClutchRun, DualClutchStart, simulate_dual_clutch};
 use super::run::{RunOptions, SimulateError};
-use super::trajectory::Trajectory;
 use crate::model::dual_clutch::DualClutch;
 use crate::number::{Dual, Number};
-use crate::solver::{Event, Settings, Signal, Status};
+use crate::solver::{Settings, Signal, Status};
 use thiserror::Error;
 
 /// Most parameters that one pass differentiates for.
@@ -132,29 +131,8 @@ fn pass<const P: usize>(
     }
     let of_lane = |lane| dual.events.iter().map(|e| e.time.eps[lane]).collect();
     let events: Vec<Vec<f64>> = (0..parameters.len()).map(of_lane).collect();
-    let (run, columns) = split_derivatives(dual);
+    let (run, columns) = dual.split_derivatives();
     Ok(Pass { run, columns, events })
-}
-
-/// The run without derivatives, and those of its columns: time × parameters.
-fn split_derivatives<const P: usize>(
-    run: DualClutchRun<Dual<P>>,
-) -> (DualClutchRun<f64>, Vec<Vec<f64>>) {
-    let event = |e: &Event<Dual<P>>| {
-        let Event { time, element, kind, energy } = *e;
-        Event { time: time.re, element, kind, energy: energy.re }
-    };
-    let values = Trajectory {
-        time: run.time,
-        columns: run.columns,
-        derivatives: Vec::new(),
-        elements: run.elements,
-        events: run.events.iter().map(event).collect(),
-        status: run.status,
-        grazing: run.grazing,
-        audit: run.audit,
-    };
-    (values, run.derivatives.into_iter().map(Vec::into_flattened).collect())
 }
 
 /// Model, start and delays [s].

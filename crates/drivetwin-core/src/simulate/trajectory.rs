@@ -9,7 +9,7 @@ use crate::model::Name;
 use crate::network::linalg::is_zero;
 use crate::network::nonlinear_torque::form;
 use crate::network::{Mode, Network, RowId};
-use crate::number::{Number, Real};
+use crate::number::{Dual, Number, Real};
 use crate::solver::{
     Event, FrictionState, HybridState, Integrator, Kernel, SampleRange, SampleSink, Samples,
     Status, Step, dispatch_simd,
@@ -80,6 +80,27 @@ pub struct Trajectory<T: Real> {
     pub grazing: Option<(f64, String)>,
     /// Energy balance, where asked for.
     pub audit: Option<EnergyAudit>,
+}
+
+impl<const P: usize> Trajectory<Dual<P>> {
+    /// Split into the run without derivatives and the derivatives of its columns: time × parameters.
+    pub fn split_derivatives(self) -> (Trajectory<f64>, Vec<Vec<f64>>) {
+        let event = |e: &Event<Dual<P>>| {
+            let Event { time, element, kind, energy } = *e;
+            Event { time: time.re, element, kind, energy: energy.re }
+        };
+        let values = Trajectory {
+            time: self.time,
+            columns: self.columns,
+            derivatives: Vec::new(),
+            elements: self.elements,
+            events: self.events.iter().map(event).collect(),
+            status: self.status,
+            grazing: self.grazing,
+            audit: self.audit,
+        };
+        (values, self.derivatives.into_iter().map(Vec::into_flattened).collect())
+    }
 }
 
 /// Fills columns while a run advances.

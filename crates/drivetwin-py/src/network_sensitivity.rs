@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+//! Exact derivatives of the runs of any network; see `drivetwin.simulation.network_sensitivity`.
+
+use crate::border::call;
+use crate::network::{Sine, parse};
+use crate::output::{NamedOutput, outputs_of};
+use crate::plain::{Event, events_of, status_of};
+use drivetwin_core::network::Network;
+use drivetwin_core::number::Dual;
+use drivetwin_core::simulate::{RunOptions, SimulateError, Start, run};
+use drivetwin_core::solver::{Settings, Signal};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Unknowns that one pass differentiates by.
+const LANES: usize = 16;
+
+type Variable = Dual<LANES>;
+/// Value and the weights of its derivatives by lanes.
+type Seeded = (f64, Vec<(usize, f64)>);
+/// Input name, sample times [s], values and delay [s].
+type Delayed<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, Seeded);
+/// Speeds [rad/s] by node, twists [rad] by shaft, names of elements at rest.
+type StartState = (Vec<(String, Seeded)>, Vec<(String, Seeded)>, Vec<String>);
+/// Columns (n_outputs, n_time), events, status, derivatives of every column (n_time, lanes) and of every
+/// event time (n_events, lanes).
+type Found<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Vec<Event>,
+    String,
+    Vec<Bound<'py, PyArray2<f64>>>,
+    Bound<'py, PyArray2<f64>>,
+);
+
+/// Simulate a driveline given as JSON and differentiate by its seeded numbers, at most [`LANES`] unknowns.
+#[pyfunction]
+pub fn network_sensitivities<'py>(
+    py: Python<'py>,
+    driveline: &str,
+    outputs: Vec<NamedOutput>,
+    signals: (Vec<Delayed<'py>>, Vec<Sine>),
+    start: StartState,
+    grid: PyReadonlyArray1<'py, f64>,
+    options: (f64, f64),
+) -> PyResult<Found<'py>> {
+    let (driveline, outputs) = (parse::<Variable>(driveline)?, outputs_of(&outputs)?);
+    let grid = grid.as_slice()?;
+    let (samples, sines) = signals;
+    let mut inputs = samples
+        .iter()
+        .map(|(name, times, values, delay)| {
+            let (times, values, delay) = (times.as_slice()?, values.as_slice()?, seed(delay)?);
+            Ok((name.as_str(), Signal::Samples { times, values, delay }))
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    inputs.extend(sines.iter().map(|&(ref name, offset, amplitude, frequency, phase)| {
+        let (offset, amplitude) = (constant(offset), constant(amplitude));
+        (name.as_str(), Signal::Sine { offset, amplitude, frequency, phase })
+    }));
+    let (speeds, twists, locked) = start;
+    let start = Start { speeds: seed_all(speeds)?, twists: seed_all(twists)?, locked };
+    let (tolerance, max_step) = options;
+    let settings = Settings { tolerance, max_step, ..Settings::default() };
+    let options = RunOptions { settings, audit: false };
+    let found = call(py, || -> Result<_, SimulateError> {
+        run(&Network::compile(&driveline)?, &inputs, &start, grid, &outputs, options)
+    })?
+    .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let times: Vec<Vec<f64>> = found.events.iter().map(|e| e.time.eps.to_vec()).collect();
+    let (run, slopes) = found.split_derivatives();
+    let handed = |slopes: Vec<f64>| slopes.into_pyarray(py).reshape([grid.len(), LANES]);
+    Ok((
+        PyArray2::from_vec2(py, &run.columns)?,
+        events_of(&run),
+        status_of(&run),
+        slopes.into_iter().map(handed).collect::<PyResult<_>>()?,
+        PyArray2::from_vec2(py, &times)?,
+    ))
+}
+
+fn constant(value: f64) -> Variable {
+    Dual::new(value, [0.0; LANES])
+}
+
+fn seed((value, seeds): &Seeded) -> PyResult<Variable> {
+    let mut number = constant(*value);
+    for &(lane, weight) in seeds {
+        let refusal = || PyValueError::new_err(format!("lane {lane} is beyond {LANES}"));
+        *number.eps.get_mut(lane).ok_or_else(refusal)? += weight;
+    }
+    Ok(number)
+}
+
+fn seed_all(named: Vec<(String, Seeded)>) -> PyResult<Vec<(String, Variable)>> {
+    named.into_iter().map(|(name, number)| Ok((name, seed(&number)?))).collect()
+}
