@@ -80,8 +80,8 @@ class Move:
     """Consequences of an effect for a fit without effects.
 
     `values` is the largest move of an unknown over its standard deviation from noise, `evidence`
-    the log evidence of the effect alone, as a method has it that knows the cause. Both are infinite
-    where the fit has a part of the plant or fails with the effect.
+    the log evidence of the effect alone, as a method has it that knows the cause; 0 for an effect
+    without columns. Both are infinite where the fit has a part of the plant or fails.
     """
 
     values: float

@@ -6,15 +6,12 @@ use crate::network::{Sine, parse};
 use crate::output::{NamedOutput, outputs_of};
 use crate::plain::{Event, events_of, status_of};
 use drivetwin_core::network::Network;
-use drivetwin_core::number::Dual;
-use drivetwin_core::simulate::{RunOptions, SimulateError, Start, run};
+use drivetwin_core::number::{Dual, Number};
+use drivetwin_core::simulate::{LANES, RunOptions, SimulateError, Start, run};
 use drivetwin_core::solver::{Settings, Signal};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-
-/// Unknowns that one pass differentiates by.
-const LANES: usize = 16;
 
 type Variable = Dual<LANES>;
 /// Value and the weights of its derivatives by lanes.
@@ -55,7 +52,7 @@ pub fn network_sensitivities<'py>(
         })
         .collect::<PyResult<Vec<_>>>()?;
     inputs.extend(sines.iter().map(|&(ref name, offset, amplitude, frequency, phase)| {
-        let (offset, amplitude) = (constant(offset), constant(amplitude));
+        let (offset, amplitude) = (Variable::of(offset), Variable::of(amplitude));
         (name.as_str(), Signal::Sine { offset, amplitude, frequency, phase })
     }));
     let (speeds, twists, locked) = start;
@@ -79,17 +76,9 @@ pub fn network_sensitivities<'py>(
     ))
 }
 
-fn constant(value: f64) -> Variable {
-    Dual::new(value, [0.0; LANES])
-}
-
 fn seed((value, seeds): &Seeded) -> PyResult<Variable> {
-    let mut number = constant(*value);
-    for &(lane, weight) in seeds {
-        let refusal = || PyValueError::new_err(format!("lane {lane} is beyond {LANES}"));
-        *number.eps.get_mut(lane).ok_or_else(refusal)? += weight;
-    }
-    Ok(number)
+    let refuse = |lane| PyValueError::new_err(format!("lane {lane} is beyond {LANES}"));
+    Dual::from_seeds(*value, seeds).map_err(refuse)
 }
 
 fn seed_all(named: Vec<(String, Seeded)>) -> PyResult<Vec<(String, Variable)>> {

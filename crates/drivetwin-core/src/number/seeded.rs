@@ -14,19 +14,25 @@ enum Seeded {
     Variable { value: f64, seeds: Vec<(usize, f64)> },
 }
 
+impl<const P: usize> Dual<P> {
+    /// Value with the weights of its derivatives by lanes. Return the lane that is beyond `P`, if any.
+    pub fn from_seeds(value: f64, seeds: &[(usize, f64)]) -> Result<Self, usize> {
+        let mut eps = [0.0; P];
+        for &(lane, weight) in seeds {
+            *eps.get_mut(lane).ok_or(lane)? += weight;
+        }
+        Ok(Self::new(value, eps))
+    }
+}
+
 impl<'de, const P: usize> Deserialize<'de> for Dual<P> {
     fn deserialize<D: Deserializer<'de>>(source: D) -> Result<Self, D::Error> {
         let (value, seeds) = match Seeded::deserialize(source)? {
             Seeded::Constant(value) => (value, Vec::new()),
             Seeded::Variable { value, seeds } => (value, seeds),
         };
-        let mut eps = [0.0; P];
-        for (lane, weight) in seeds {
-            let slot = eps.get_mut(lane);
-            let refusal = || D::Error::custom(format!("lane {lane} of a derivative is beyond {P}"));
-            *slot.ok_or_else(refusal)? += weight;
-        }
-        Ok(Self::new(value, eps))
+        let refuse = |lane| D::Error::custom(format!("lane {lane} of a derivative is beyond {P}"));
+        Self::from_seeds(value, &seeds).map_err(refuse)
     }
 }
 

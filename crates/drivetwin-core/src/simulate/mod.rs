@@ -30,6 +30,6 @@ pub use energy_balance::EnergyAudit;
 pub use linear::{Linear, Slipping, linearise};
 pub use output::Output;
 pub use run::{Plan, RunOptions, SimulateError, run, run_network};
-pub use sensitivity::{Sampled, Sensitivities, SensitivityError, dual_clutch_sensitivities};
+pub use sensitivity::{LANES, Sampled, Sensitivities, SensitivityError, dual_clutch_sensitivities};
 pub use start::{Start, StartError, State};
 pub use trajectory::Trajectory;

@@ -141,11 +141,11 @@ def compute_start(alone: Sequence[Identification]) -> dict[str, float]:
     values: dict[str, float] = {}
     for k, fit in enumerate(fits, 1):
         structures = [part.structure for part in fit.problem.parts]
-        joint = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
-        joint = {**structures[0].fixed, **joint}
-        own = {name: joint.pop(name) for name in LOG_SPECIFIC if name in joint}
+        known = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
+        known = {**structures[0].fixed, **known}
+        own = {name: known.pop(name) for name in LOG_SPECIFIC if name in known}
         values |= {map_log_names(k)[name]: value for name, value in own.items()}
-        values = own | joint | values
+        values = own | known | values
     values |= _compute_weighted_mean([_compute_shared_mean(fit) for fit in fits])
     starts = {f"start{k}.{key}" for k in range(len(values)) for key in RUN_SPECIFIC}
     return {name: value for name, value in values.items() if name not in starts | {AERO}}
@@ -157,19 +157,19 @@ def _require_agreement(alone: Sequence[Identification]) -> None:
     To first order the common Q exceeds that of the logs alone by Σ (θ_k - θ)ᵀ F_k (θ_k - θ).
     """
     fits = [get_likelihood_fit(one)[0] for one in alone]
-    joint = [_compute_shared_mean(fit) for fit in fits]
-    mean, excess = _compute_weighted_mean(joint), 0.0
-    for names, values, information in joint:
+    means = [_compute_shared_mean(fit) for fit in fits]
+    mean, excess = _compute_weighted_mean(means), 0.0
+    for names, values, information in means:
         away = values - np.array([mean[name] for name in names])
         excess += float(away @ information @ away)
     if excess > (MULTI_START.plausible_chi2 - 1.0) * sum(fit.problem.size for fit in fits):
         raise IdentificationError(f"they disagree by χ² {excess:.3g}", "")
 
 
-_Told = tuple[list[str], FloatArray, FloatArray]
+_SharedMean = tuple[list[str], FloatArray, FloatArray]
 
 
-def _compute_shared_mean(fit: LikelihoodFit) -> _Told:
+def _compute_shared_mean(fit: LikelihoodFit) -> _SharedMean:
     """Names, values (s,) and information (s, s) of what a log shares with others."""
     starts = {f"{part.structure.label}.{key}" for part in fit.problem.parts for key in RUN_SPECIFIC}
     keep = [
@@ -179,11 +179,11 @@ def _compute_shared_mean(fit: LikelihoodFit) -> _Told:
     return names, fit.mean.values[keep], invert_information(fit.covariance[np.ix_(keep, keep)])
 
 
-def _compute_weighted_mean(joint: Sequence[_Told]) -> dict[str, float]:
+def _compute_weighted_mean(means: Sequence[_SharedMean]) -> dict[str, float]:
     """Mean of the unknowns of several fits, weighted by information."""
-    names = list(dict.fromkeys(name for one in joint for name in one[0]))
+    names = list(dict.fromkeys(name for one in means for name in one[0]))
     information, pull = np.zeros((len(names), len(names))), np.zeros(len(names))
-    for known, values, weight in joint:
+    for known, values, weight in means:
         place = [names.index(name) for name in known]
         information[np.ix_(place, place)] += weight
         pull[place] += weight @ values
