@@ -20,11 +20,11 @@ from drivetwin.calibration.scenarios import scale_units
 from drivetwin.calibration.spread import Spread
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.dyno.departed_vehicle import DepartedVehicle
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.dyno.sensor_effects import compute_torque_error
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log
-from drivetwin.simulation.departed_driveline import DepartedDriveline
 from drivetwin.simulation.dual_clutch import Signal
 
 _BEFORE, _AFTER = 1.5, 1.0
@@ -38,7 +38,7 @@ class TrueUnits:
 
     made: MadeVehicle
     shift: Maneuver
-    units: Sequence[DepartedDriveline]
+    units: Sequence[DepartedVehicle]
 
     def evaluate_all(self, controls: Sequence[Control]) -> list[Outcome]:
         """Return the metrics of each control over all units."""
@@ -70,13 +70,10 @@ def draw_true_units(
 ) -> TrueUnits:
     """Draw `count` units around a true vehicle."""
     random = np.random.default_rng([made.seed, 43, seed])
-    model, departure = made.scenario.model, made.driveline.departure
-    units = []
-    for _ in range(count):
-        drawn = scale_units(replace(model, elements=departure.elements), spread, random)
-        own = replace(departure, elements=drawn.elements)
-        units.append(replace(made.driveline, model=drawn, departure=own))
-    return TrueUnits(made, replace(shift, model=model), units)
+    vehicle = made.vehicle
+    drawn = [scale_units(vehicle.model, spread, random) for _ in range(count)]
+    units = [replace(vehicle, model=replace(one, load=vehicle.model.load)) for one in drawn]
+    return TrueUnits(made, replace(shift, model=made.scenario.model), units)
 
 
 def follow_profiles(made: MadeVehicle, shift: Maneuver, wanted: Profiles) -> Profiles:

@@ -37,7 +37,7 @@ from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.acting_inputs import build_acting_inputs
 from drivetwin.dyno.actuators import ControlledActuator, Program
-from drivetwin.dyno.departure import compute_departure
+from drivetwin.dyno.departed_vehicle import DepartedVehicle, compute_vehicle
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import convert_channels
 from drivetwin.dyno.nominal import NominalRun
@@ -47,7 +47,6 @@ from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.simulation.departed_driveline import DepartedDriveline
 from drivetwin.simulation.dual_clutch import Signal, Trajectory
 from drivetwin.simulation.shift_control import ShiftController
 from drivetwin.twin.build import build_twin
@@ -109,18 +108,17 @@ class MadeVehicle:
         return NominalRun(self.scenario.model, clean.trajectory, torque, pressures)
 
     @cached_property
-    def driveline(self) -> DepartedDriveline:
-        """Network of the vehicle."""
-        departure = compute_departure(self.nominal, self.effects, self.seed)
+    def vehicle(self) -> DepartedVehicle:
+        """Vehicle with the effects."""
         gears = [gear.element for gear in self.scenario.gears]
-        return DepartedDriveline(self.scenario.model, departure, gears)
+        return compute_vehicle(self.nominal, self.effects, gears, self.seed)
 
     def simulate(
         self, shift: Maneuver, torque: Signal, pressures: dict[str, Signal], time: FloatArray
     ) -> Trajectory:
         """Simulate a shift with pressures at the clutches on `time` (n,) [s]."""
         start = replace(shift, model=self.scenario.model).build_start()
-        return self.driveline.simulate(*self.build_acting(torque, pressures), start, time)
+        return self.vehicle.simulate(*self.build_acting(torque, pressures), start, time)
 
     def build_acting(
         self, torque: Signal, pressures: dict[str, Signal]

@@ -104,7 +104,7 @@ def network_sensitivities(
     ],
     start: tuple[Sequence[tuple[str, _Seeded]], Sequence[tuple[str, _Seeded]], Sequence[str]],
     grid: _Array,
-    options: tuple[float, float],
+    options: tuple[float, float, int],
 ) -> tuple[_Array, list[tuple[float, str, str, float]], str, list[_Array], _Array]: ...
 def actuator_pressure(
     model: str, command: tuple[_Array, _Array], initial: float | None, at: _Array

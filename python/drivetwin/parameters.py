@@ -121,6 +121,25 @@ _SPECS = (
         "damping ratio of the engine's share of J1 on the input shaft", 0.0, 1.0,
     ),
     ParameterSpec("backlash", "backlash", "δ", "rad", "play of the output shaft", 0.0, 1.0),
+    ParameterSpec(
+        "tyre_slip", "tyre slip", "s_t", "1", "slip of the driven tyres at the reference torque",
+        0.0, 0.5,
+    ),
+    ParameterSpec(
+        "shaft_progression", "shaft progression", "a_o", "1",
+        "factor a of the output shaft's torque k φ (1 + a ((k φ / T_r)² - 1/2))", -1.0, 1.0,
+    ),
+    ParameterSpec(
+        "shaft_reference", "reference torque", "T_r", "N*m",
+        "largest output torque of the log, to which tyre slip and progression refer", 0.0, 1e7,
+    ),
+    ParameterSpec(
+        "eta_step", "efficiency step", "Δη", "1",
+        "efficiency of a gear less that of the gear before it", -0.5, 0.5,
+    ),
+    ParameterSpec(
+        "input_drag", "input drag", "T_d", "N*m", "drag torque at the gearbox input", -1e5, 1e5,
+    ),
 )  # fmt: skip
 
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}

@@ -12,7 +12,10 @@ import pytest
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.simulation.dual_clutch import Signal, simulate
+from drivetwin.simulation.driveline_run import DrivelineTask
+from drivetwin.simulation.driveline_start import solve_steady_speed
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory, simulate
+from drivetwin.simulation.vehicle_parts import VehicleParts
 from drivetwin.vehicle.card import load_card
 
 
@@ -48,22 +51,28 @@ def test_all_inertias_of_the_model_turn_behind_the_converter() -> None:
     }
     torque = Signal(np.array([0.0, 0.1, 0.5]), np.array([1545.0, 1545.0, 800.0]))
     start = replace(scenario.start(), engine_speed=1.2 * scenario.start().engine_speed)
-    ran, _ = scenario.converter.simulate(model, torque, held, start, time)
+    parts = VehicleParts(front=scenario.converter)
+
+    def simulate_behind(model: DualClutch) -> Trajectory:
+        return DrivelineTask(model, parts, torque, held, start, time).simulate()
+
+    ran = simulate_behind(model)
     # Without losses it is all one on which side of the input gear an inertia turns.
     before = replace(model, J1=3.5, J2e=0.0)
-    same, _ = scenario.converter.simulate(before, torque, held, start, time)
+    same = simulate_behind(before)
     assert ran.status == same.status == "completed"
     assert ran.engine_speed == pytest.approx(same.engine_speed, abs=1e-6)
-    lighter, _ = scenario.converter.simulate(replace(model, J2e=0.0), torque, held, start, time)
+    lighter = simulate_behind(replace(model, J2e=0.0))
     assert np.max(np.abs(lighter.engine_speed - ran.engine_speed)) > 0.01
 
 
 def test_the_engine_starts_where_its_torque_is_steady() -> None:
     scenario = load_scenario("open_converter")
     assert scenario.converter is not None
-    engine, turbine = scenario.converter.solve_steady_speed(1545.0, 140.0)
-    assert scenario.converter.converter.compute_pump_torque(engine, 140.0) == pytest.approx(1545.0)
-    assert turbine > 1545.0
+    engine = solve_steady_speed(scenario.converter, 1545.0, 140.0)
+    table = scenario.converter.converter
+    assert table.compute_pump_torque(engine, 140.0) == pytest.approx(1545.0)
+    assert table.compute_turbine_torque(engine, 140.0) > 1545.0
 
 
 def test_the_card_has_the_map(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-type Variable = Dual<LANES>;
+/// Most unknowns of a narrow pass.
+const FEW: usize = 8;
 /// Value and the weights of its derivatives by lanes.
 type Seeded = (f64, Vec<(usize, f64)>);
 /// Input name, sample times [s], values and delay [s].
@@ -30,6 +31,9 @@ type Found<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
+/// Tolerance, longest step [s], number of unknowns.
+type Options = (f64, f64, usize);
+
 /// Simulate a driveline given as JSON and differentiate by its seeded numbers, at most [`LANES`] unknowns.
 #[pyfunction]
 pub fn network_sensitivities<'py>(
@@ -39,9 +43,27 @@ pub fn network_sensitivities<'py>(
     signals: (Vec<Delayed<'py>>, Vec<Sine>),
     start: StartState,
     grid: PyReadonlyArray1<'py, f64>,
-    options: (f64, f64),
+    options: Options,
 ) -> PyResult<Found<'py>> {
-    let (driveline, outputs) = (parse::<Variable>(driveline)?, outputs_of(&outputs)?);
+    let given = (signals, start, grid);
+    match options.2 {
+        ..=FEW => differentiate::<FEW>(py, driveline, &outputs, given, options),
+        _ => differentiate::<LANES>(py, driveline, &outputs, given, options),
+    }
+}
+
+/// Inputs, start and grid.
+type Given<'py> =
+    ((Vec<Delayed<'py>>, Vec<Sine>), StartState, PyReadonlyArray1<'py, f64>);
+
+fn differentiate<'py, const P: usize>(
+    py: Python<'py>,
+    driveline: &str,
+    outputs: &[NamedOutput],
+    (signals, start, grid): Given<'py>,
+    options: Options,
+) -> PyResult<Found<'py>> {
+    let (driveline, outputs) = (parse::<Dual<P>>(driveline)?, outputs_of(outputs)?);
     let grid = grid.as_slice()?;
     let (samples, sines) = signals;
     let mut inputs = samples
@@ -52,12 +74,12 @@ pub fn network_sensitivities<'py>(
         })
         .collect::<PyResult<Vec<_>>>()?;
     inputs.extend(sines.iter().map(|&(ref name, offset, amplitude, frequency, phase)| {
-        let (offset, amplitude) = (Variable::of(offset), Variable::of(amplitude));
+        let (offset, amplitude) = (Dual::of(offset), Dual::of(amplitude));
         (name.as_str(), Signal::Sine { offset, amplitude, frequency, phase })
     }));
     let (speeds, twists, locked) = start;
     let start = Start { speeds: seed_all(speeds)?, twists: seed_all(twists)?, locked };
-    let (tolerance, max_step) = options;
+    let (tolerance, max_step, _) = options;
     let settings = Settings { tolerance, max_step, ..Settings::default() };
     let options = RunOptions { settings, audit: false };
     let found = call(py, || -> Result<_, SimulateError> {
@@ -66,7 +88,7 @@ pub fn network_sensitivities<'py>(
     .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let times: Vec<Vec<f64>> = found.events.iter().map(|e| e.time.eps.to_vec()).collect();
     let (run, slopes) = found.split_derivatives();
-    let handed = |slopes: Vec<f64>| slopes.into_pyarray(py).reshape([grid.len(), LANES]);
+    let handed = |slopes: Vec<f64>| slopes.into_pyarray(py).reshape([grid.len(), P]);
     Ok((
         PyArray2::from_vec2(py, &run.columns)?,
         events_of(&run),
@@ -76,11 +98,11 @@ pub fn network_sensitivities<'py>(
     ))
 }
 
-fn seed((value, seeds): &Seeded) -> PyResult<Variable> {
-    let refuse = |lane| PyValueError::new_err(format!("lane {lane} is beyond {LANES}"));
+fn seed<const P: usize>((value, seeds): &Seeded) -> PyResult<Dual<P>> {
+    let refuse = |lane| PyValueError::new_err(format!("lane {lane} is beyond {P}"));
     Dual::from_seeds(*value, seeds).map_err(refuse)
 }
 
-fn seed_all(named: Vec<(String, Seeded)>) -> PyResult<Vec<(String, Variable)>> {
+fn seed_all<const P: usize>(named: Vec<(String, Seeded)>) -> PyResult<Vec<(String, Dual<P>)>> {
     named.into_iter().map(|(name, number)| Ok((name, seed(&number)?))).collect()
 }

@@ -6,12 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin.dyno.acting_inputs import build_acting_inputs
-from drivetwin.dyno.departure import compute_departure
+from drivetwin.dyno.departed_vehicle import DepartedVehicle, compute_vehicle
 from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects
 from drivetwin.dyno.nominal import NominalRun, compute_friction_work
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import InputError, SimulationError, Where
-from drivetwin.simulation.departed_driveline import DepartedDriveline
 from drivetwin.simulation.dual_clutch import FloatArray, Trajectory
 from drivetwin.vehicle.effects import EffectId
 
@@ -46,25 +45,23 @@ def simulate_departed(
     work of the run before it. A failed run returns its status.
     Raises SimulationError where the repetition does not converge.
     """
-    departure = compute_departure(nominal, effects, seed)
-    driveline = DepartedDriveline(
-        scenario.model, departure, [gear.element for gear in scenario.gears]
-    )
+    gears = [gear.element for gear in scenario.gears]
+    vehicle = compute_vehicle(nominal, effects, gears, seed)
     heated = nominal.trajectory
     if effects.get(EffectId.FRICTION_HEAT, 0.0) > 0.0:
-        heated = _heat(scenario, nominal, effects, driveline)
+        heated = _heat(scenario, nominal, effects, vehicle)
     inputs = build_acting_inputs(nominal, effects, heated)
-    return driveline.simulate(*inputs, scenario.start(), time)
+    return vehicle.simulate(*inputs, scenario.start(), time)
 
 
 def _heat(
-    scenario: Scenario, nominal: NominalRun, effects: Effects, driveline: DepartedDriveline
+    scenario: Scenario, nominal: NominalRun, effects: Effects, vehicle: DepartedVehicle
 ) -> Trajectory:
     """Find the run, on the times of the nominal one, with the friction of its own work."""
     heated = nominal.trajectory
     for _ in range(_ROUNDS):
         inputs = build_acting_inputs(nominal, effects, heated)
-        run = driveline.simulate(*inputs, scenario.start(), heated.time)
+        run = vehicle.simulate(*inputs, scenario.start(), heated.time)
         if run.status != "completed" or _compute_change(run, heated) < _AGREEMENT:
             return run
         heated = run

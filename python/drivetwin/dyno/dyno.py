@@ -21,8 +21,9 @@ from drivetwin.dyno.sensor_effects import TorqueError, apply_delay, compute_torq
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.dyno.truth import Truth, compute_truth
 from drivetwin.errors import InputError, SimulationError, Where
-from drivetwin.simulation import dual_clutch
+from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import Signal, Trajectory
+from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 
 FloatArray = NDArray[np.float64]
 
@@ -170,14 +171,15 @@ def _simulate(
     scenario: Scenario, inputs: _Inputs, time: FloatArray
 ) -> tuple[Trajectory, dict[str, Signal]]:
     """The exact motion at `time`, and by role what it does not hold: inputs, engine speed."""
-    given = (scenario.model, inputs.engine_torque, inputs.pressures, scenario.start(), time)
-    speeds = {}
-    if scenario.converter is not None:
-        trajectory, crank = scenario.converter.simulate(*given)
-        speeds["engine_speed"] = Signal(time, crank)
+    given = (inputs.engine_torque, inputs.pressures, scenario.start(), time)
+    parts = VehicleParts(front=scenario.converter) if scenario.converter else NO_PARTS
+    if scenario.plant is not None:
+        trajectory = scenario.plant.simulate(scenario.model, *given)
     else:
-        run = dual_clutch.simulate if scenario.plant is None else scenario.plant.simulate
-        trajectory = run(*given)
+        trajectory = DrivelineTask(scenario.model, parts, *given).simulate()
+    speeds = {}
+    if trajectory.crank_speed is not None:
+        speeds["engine_speed"] = Signal(time, trajectory.crank_speed)
     _check_completed(scenario, trajectory)
     return trajectory, {**inputs.list_by_role(scenario), **speeds}
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +13,18 @@ from drivetwin.gearbox import Gearbox, build_network_elements, reduce, solve_gea
 from drivetwin.gearbox.dual import build_shift_element
 from drivetwin.gearbox.reduction import ElementRatios
 from drivetwin.gearbox.spec import GROUND
+from drivetwin.simulation.driveline import (
+    ENGINE,
+    SHAFT,
+    WHEEL,
+    OutputSide,
+    build_engine_side,
+    build_shaft,
+    build_vehicle,
+)
+from drivetwin.simulation.driveline_run import build_trajectory, list_motion_outputs
 from drivetwin.simulation.dual_clutch import (
+    ENGINE_TORQUE,
     DualClutch,
     FloatArray,
     RoadLoad,
@@ -21,10 +32,8 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Trajectory,
 )
-from drivetwin.simulation.network import Element, Output, Start, build_element, simulate
+from drivetwin.simulation.network import Element, Start, build_element, simulate
 
-_ENGINE, _AXLE, _WHEEL, _SHAFT = "engine", "axle", "wheel", "output shaft"
-_TORQUE = "engine torque"
 _MAIN = 2e6
 """Pressure of an element that stays closed throughout, Pa."""
 
@@ -63,42 +72,31 @@ class Plant:
         end = np.array([0.0, float(time[-1])])
         idle = {name: Signal(end, np.zeros(2)) for name in self.gearbox.elements}
         closed = {name: Signal(end, np.full(2, _MAIN)) for name in self.common}
+        names, output = list(self.ratios), self.gearbox.output
         run = simulate(
             self._build_elements(model),
-            {**idle, **closed, **pressures, _TORQUE: engine_torque},
+            {**idle, **closed, **pressures, ENGINE_TORQUE: engine_torque},
             self._start(start),
             time,
-            _list_outputs(self.gearbox, tuple(self.ratios)),
+            list_motion_outputs(names, output),
         )
-        motion = run.columns
+        found = build_trajectory(run, names, output)
         sense = {name: each.sense for name, each in self.ratios.items()}
-        return Trajectory(
-            time=time,
-            engine_speed=motion["speed", _ENGINE],
-            output_speed=motion["speed", self.gearbox.output],
-            wheel_speed=motion["speed", _WHEEL],
-            twist=motion["twist", _SHAFT],
-            shaft_torque=motion["shaft_torque", _SHAFT],
-            clutch_torque={n: sense[n] * motion["friction_torque", n] for n in sense},
-            slip={n: sense[n] * motion["slip", n] for n in sense},
-            events=run.events,
-            status=run.status,
-            audit=run.audit,
+        return replace(
+            found,
+            clutch_torque={n: sense[n] * found.clutch_torque[n] for n in sense},
+            slip={n: sense[n] * found.slip[n] for n in sense},
         )
 
     def _build_elements(self, model: DualClutch) -> list[Element]:
         loss = {"law": model.loss_law, "eta": model.eta}
-        box, shaft = self.gearbox, {"stiffness": model.k_o, "damping": model.c_o}
-
+        box, side = self.gearbox, OutputSide.from_model(model)
         return [
-            build_element("torque", "engine torque", node=_ENGINE, input=_TORQUE),
-            build_element("inertia", "J1", node=_ENGINE, inertia=model.J1),
-            build_element("gear", "losses", a=_ENGINE, b=box.input, ratio=1.0, loss=loss),
+            *build_engine_side(model.J1),
+            build_element("gear", "losses", a=ENGINE, b=box.input, ratio=1.0, loss=loss),
             *build_network_elements(box),
-            build_element("spring_damper", _SHAFT, a=box.output, b=_AXLE, **shaft),
-            build_element("gear", "final drive", a=_AXLE, b=_WHEEL, ratio=model.i_f),
-            build_element("inertia", "vehicle", node=_WHEEL, inertia=model.J_v),
-            build_element("road_load", "load", node=_WHEEL, **asdict(model.load)),
+            *build_shaft(side, box.output),
+            *build_vehicle(side),
         ]
 
     def _start(self, start: State) -> Start:
@@ -109,22 +107,10 @@ class Plant:
         members = solve_gear(self.gearbox, gear).speeds
         speeds = {name: start.engine_speed * (each or 0.0) for name, each in members.items()}
         return Start(
-            {**speeds, _ENGINE: start.engine_speed, _WHEEL: start.wheel_speed},
-            {_SHAFT: start.twist},
+            {**speeds, ENGINE: start.engine_speed, WHEEL: start.wheel_speed},
+            {SHAFT: start.twist},
             (*start.locked, *self.common),
         )
-
-
-def _list_outputs(gearbox: Gearbox, elements: tuple[str, ...]) -> list[Output]:
-    return [
-        ("speed", _ENGINE),
-        ("speed", gearbox.output),
-        ("speed", _WHEEL),
-        ("twist", _SHAFT),
-        ("shaft_torque", _SHAFT),
-        *(("slip", name) for name in elements),
-        *(("friction_torque", name) for name in elements),
-    ]
 
 
 def build_plant(gearbox: Gearbox, gears: tuple[str, ...]) -> Plant:

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.dyno.actuators import Actuator, ControlledActuator, Program
-from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.plant import Plant
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
+from drivetwin.simulation.driveline_start import solve_steady_speed
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, State
+from drivetwin.simulation.vehicle_parts import OpenConverter
 
 FloatArray = NDArray[np.float64]
 
@@ -135,7 +136,9 @@ class Scenario:
         wheel_speed = self.engine_speed / i_g / model.i_f
         torque = float(self.compute_torque(np.zeros(1))[0])
         if self.converter is not None:
-            _, torque = self.converter.solve_steady_speed(torque, self.engine_speed)
+            engine = solve_steady_speed(self.converter, torque, self.engine_speed)
+            spec = self.converter.converter
+            torque = float(spec.compute_turbine_torque(engine, self.engine_speed))
         return State(
             engine_speed=self.engine_speed,
             output_speed=self.engine_speed / i_g,

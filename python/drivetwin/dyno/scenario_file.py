@@ -36,7 +36,6 @@ from drivetwin.dyno.actuators import (
     Program,
     Vibration,
 )
-from drivetwin.dyno.converter import OpenConverter
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.plant import Plant, Surroundings, build_form, build_plant
 from drivetwin.dyno.scenario import HeldGear, Scenario, TorqueReduction
@@ -44,6 +43,7 @@ from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
 from drivetwin.gearbox import load_gearbox
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
+from drivetwin.simulation.vehicle_parts import OpenConverter
 from drivetwin.vehicle.converter import ConverterTable
 
 Table = Mapping[str, Any]

@@ -20,8 +20,9 @@ from drivetwin.observer.kind import Observer
 from drivetwin.observer.propagate import select_uncertain
 from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.added_part import AddedPart, simulate_plant
+from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
+from drivetwin.simulation.vehicle_parts import VehicleParts
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import simulate_shift
 
@@ -76,7 +77,7 @@ def simulate_observed(
             continue
         one = _simulate_member(
             model,
-            twin.part,
+            twin.build_parts(model),
             _sample_signal(torque, known.to_named(values)["te_delay"], rng),
             {name: _sample_signal(signal, 0.0, rng) for name, signal in noise.items()},
             _sample_start(model, run, (shift, unrest), rng),
@@ -129,7 +130,7 @@ def _sample_start(
 
 def _simulate_member(
     model: DualClutch,
-    part: AddedPart | None,
+    parts: VehicleParts,
     torque: Signal,
     pressures: Mapping[str, Signal],
     start: State,
@@ -137,7 +138,7 @@ def _simulate_member(
 ) -> Trajectory | None:
     """A run of the ensemble; None where drawn values make none."""
     try:
-        found = simulate_plant(model, part, torque, pressures, start, time)
+        found = DrivelineTask(model, parts, torque, pressures, start, time).simulate()
     except InputError:
         return None
     return found if found.status == "completed" else None

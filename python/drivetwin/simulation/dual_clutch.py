@@ -25,6 +25,7 @@ from drivetwin.simulation.serialize import (
     require_number,
     require_samples,
 )
+from drivetwin.simulation.variable import sign
 
 FloatArray = NDArray[np.float64]
 LossLaw = Literal["paper", "dissipative"]
@@ -108,7 +109,7 @@ class RoadLoad:
 
     def evaluate(self, wheel_speed: float) -> float:
         """Load torque at the wheel [N m] at a speed [rad/s] of either sign."""
-        turning = self.rolling * float(np.sign(wheel_speed))
+        turning = self.rolling * sign(wheel_speed)
         return self.constant + turning + self.aero * wheel_speed * abs(wheel_speed)
 
 
@@ -286,7 +287,8 @@ class Trajectory:
     """Result of one run. Arrays (n,) on `time`; `clutch_torque` and `slip` by element name.
 
     A run that fails keeps its length: NaN after the failure, and `status` is the cause
-    (`completed` otherwise).
+    (`completed` otherwise). `crank_speed` is that of an engine in front of an input shaft or
+    converter, None where there is neither.
     """
 
     time: FloatArray
@@ -300,6 +302,7 @@ class Trajectory:
     events: tuple[Event, ...]
     status: str
     audit: EnergyAudit | None = field(default=None)
+    crank_speed: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,9 @@ def resolve_output(output: tuple[str, str], elements: Sequence[Mapping[str, Any]
     return Request(tuple(("torque", (element_name, node)) for node in others), -1.0)
 
 
-def combine_columns(requests: Sequence[Request], columns: FloatArray) -> list[FloatArray]:
+def combine_columns(
+    requests: Sequence[Request], columns: FloatArray | list[FloatArray]
+) -> list[FloatArray]:
     """Columns of the outputs from those of the core, in the order of the requests."""
     combined = []
     start = 0

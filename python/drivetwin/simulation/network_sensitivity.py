@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ from drivetwin.simulation.network import (
 )
 from drivetwin.simulation.network_output import Request, combine_columns
 from drivetwin.simulation.serialize import as_json, as_names, is_number
+from drivetwin.simulation.variable import Variable, iterate_variables, seed, seed_description
 
 LANES = 16
 """Unknowns that one pass of the core differentiates by."""
@@ -63,17 +64,50 @@ class NetworkSensitivities:
     event_times: FloatArray
 
 
-Seeded = tuple[float, list[tuple[int, float]]]
-"""A number with the lanes and weights of its derivatives."""
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """Network with inputs and start, whose numbers may be variables."""
 
+    elements: Sequence[Element]
+    inputs: Mapping[str, Signal | Sine]
+    start: Start
+    time: FloatArray
+    requests: Sequence[Request]
+    accuracy: Accuracy
 
-@dataclass(frozen=True)
-class _Seed:
-    """Number at a path of which the unknown of a lane has a weight."""
+    def list_acting(self, count: int) -> list[int]:
+        """List the unknowns, of `count`, that a number depends on."""
+        delays = [one.delay for one in self.inputs.values() if isinstance(one, Signal)]
+        acting = np.zeros(count, dtype=bool)
+        numbers = [self.elements, self.start.speeds, self.start.twists, delays]
+        for one in iterate_variables(numbers):
+            acting |= one.slopes != 0.0
+        return np.flatnonzero(acting).tolist()
 
-    path: str
-    lane: int
-    weight: float
+    def run(self, lanes: Sequence[int]) -> _Pass:
+        """Simulate with the derivatives by the unknowns of one pass."""
+        sampled = {name: one for name, one in self.inputs.items() if isinstance(one, Signal)}
+        samples = [
+            (name, times, values, seed(delay, lanes))
+            for name, times, values, delay in to_delayed_core_samples(sampled)
+        ]
+        speeds, twists = (
+            [(name, seed(value, lanes)) for name, value in one.items()]
+            for one in (self.start.speeds, self.start.twists)
+        )
+        try:
+            found = network_sensitivities(
+                as_json(seed_description(self.elements, lanes)),
+                [one for request in self.requests for one in request.native],
+                (samples, to_core_sines(self.inputs)),
+                (speeds, twists, as_names(self.start.locked)),
+                run_time(self.time),
+                (self.accuracy.tolerance, self.accuracy.max_step, len(lanes)),
+            )
+        except ValueError as error:
+            remedy = "correct the elements, their inputs or the start"
+            raise InputError(str(error), remedy) from error
+        return _Pass(*found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,65 +119,6 @@ class _Pass:
     status: str
     slopes: list[FloatArray]
     event_times: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class _Task:
-    """Network with inputs and start; `elements` are plain data."""
-
-    elements: list[dict[str, Any]]
-    inputs: Mapping[str, Signal | Sine]
-    start: Start
-    time: FloatArray
-    requests: list[Request]
-    accuracy: Accuracy
-
-    @property
-    def sampled(self) -> dict[str, Signal]:
-        """Inputs that may have a delay."""
-        return {name: one for name, one in self.inputs.items() if isinstance(one, Signal)}
-
-    def run(self, seeds: Sequence[_Seed]) -> _Pass:
-        """Simulate with the derivatives of one pass."""
-        samples = [
-            (name, times, values, (delay, _select(seeds, f"delay.{name}")))
-            for name, times, values, delay in to_delayed_core_samples(self.sampled)
-        ]
-        try:
-            found = network_sensitivities(
-                as_json(_seed_elements(self.elements, seeds)),
-                [one for request in self.requests for one in request.native],
-                (samples, to_core_sines(self.inputs)),
-                self._seed_start(seeds),
-                run_time(self.time),
-                (self.accuracy.tolerance, self.accuracy.max_step),
-            )
-        except ValueError as error:
-            remedy = "correct the elements, their inputs or the start"
-            raise InputError(str(error), remedy) from error
-        return _Pass(*found)
-
-    def _seed_start(
-        self, seeds: Sequence[_Seed]
-    ) -> tuple[list[tuple[str, Seeded]], list[tuple[str, Seeded]], list[str]]:
-        speeds, twists = (
-            [(name, (float(value), _select(seeds, f"start.{name}"))) for name, value in one.items()]
-            for one in (self.start.speeds, self.start.twists)
-        )
-        return speeds, twists, as_names(self.start.locked)
-
-    def check(self, path: str) -> None:
-        """Refuse a path that leads to no number."""
-        head, _, name = path.partition(".")
-        known: Mapping[str, object] = {str(one["name"]): one for one in self.elements}
-        what = "element"
-        if head in ("start", "delay"):
-            begin = {**self.start.speeds, **self.start.twists}
-            what, known = ("speed or twist", begin) if head == "start" else ("delay", self.sampled)
-            head = name
-        if head not in known:
-            hint = suggest_spelling(head, known)
-            raise InputError(f"unknown {path!r}: no {what} {head!r}{hint}", _HOW)
 
 
 def differentiate(
@@ -180,57 +155,103 @@ def differentiate(
         the value of the number.
     """
     elements, outputs = list(elements), list(outputs)
-    requests = resolve_outputs(elements, inputs, outputs)
-    plain = json.loads(as_json(elements))
-    task = _Task(plain, inputs, start, time, requests, accuracy or Accuracy())
+    resolve_outputs(elements, inputs, outputs)
     named = unknowns if isinstance(unknowns, Mapping) else {one: {one: 1.0} for one in unknowns}
-    for path in dict.fromkeys(path for one in named.values() for path in one):
-        task.check(path)
-    found, slopes, moves = [], [], []
-    acting = list(named.values())
-    for first in range(0, max(len(acting), 1), LANES):
-        group = acting[first : first + LANES]
-        seeds = [
-            _Seed(path, lane, float(weight))
-            for lane, one in enumerate(group)
-            for path, weight in one.items()
-        ]
-        found.append(task.run(seeds))
-        columns = np.array(found[-1].slopes).reshape(-1, time.size, LANES)
-        combined = [one[:, : len(group)] for one in combine_columns(requests, columns)]
-        slopes.append(np.array(combined).reshape(len(outputs), time.size, len(group)))
-        moves.append(found[-1].event_times.reshape(len(found[-1].events), LANES)[:, : len(group)])
-    values = combine_columns(requests, found[0].values)
+    slopes: dict[str, FloatArray] = {}
+    for place, weights in enumerate(named.values()):
+        for path, weight in weights.items():
+            slopes.setdefault(path, np.zeros(len(named)))[place] += weight
+    seeded = _Description(json.loads(as_json(elements)), dict(inputs), start)
+    for path, derivative in slopes.items():
+        seeded = seeded.place_variable(path, derivative)
+    found = differentiate_variables(
+        seeded.elements, seeded.inputs, seeded.start, time, outputs, len(named), accuracy
+    )
+    return replace(found, unknowns=tuple(named))
+
+
+def differentiate_variables(
+    elements: Sequence[Element],
+    inputs: Mapping[str, Signal | Sine],
+    start: Start,
+    time: FloatArray,
+    outputs: Sequence[Output],
+    count: int,
+    accuracy: Accuracy | None = None,
+) -> NetworkSensitivities:
+    """Simulate a network and differentiate its outputs by the unknowns of the variables in it.
+
+    `count` is the number of the unknowns, which are named by their numbers. Other arguments,
+    returns and raises are those of `differentiate`.
+    """
+    requests = resolve_outputs(elements, inputs, outputs)
+    task = _Task(elements, inputs, start, time, requests, accuracy or Accuracy())
+    acting = task.list_acting(count)
+    passes = [acting[k : k + LANES] for k in range(0, max(len(acting), 1), LANES)]
+    found = [task.run(lanes) for lanes in passes]
     events = tuple(Event(*event) for event in found[0].events)
+    values = combine_columns(requests, found[0].values)
     run = NetworkRun(time, dict(zip(outputs, values, strict=True)), events, found[0].status, None)
-    derivatives = dict(zip(outputs, np.concatenate(slopes, axis=2), strict=True))
-    return NetworkSensitivities(run, tuple(named), derivatives, np.concatenate(moves, axis=1))
+    derivatives = {output: np.zeros((time.size, count)) for output in outputs}
+    event_times = np.zeros((len(events), count))
+    for lanes, one in zip(passes, found, strict=True):
+        columns = combine_columns(requests, one.slopes)
+        for output, column in zip(outputs, columns, strict=True):
+            derivatives[output][:, lanes] = column[:, : len(lanes)]
+        if events:
+            event_times[:, lanes] = one.event_times[:, : len(lanes)]
+    unknowns = tuple(str(k) for k in range(count))
+    return NetworkSensitivities(run, unknowns, derivatives, event_times)
 
 
-def _select(seeds: Sequence[_Seed], path: str) -> list[tuple[int, float]]:
-    """Return lanes and weights of the number at a path."""
-    return [(one.lane, one.weight) for one in seeds if one.path == path]
+@dataclass(frozen=True, eq=False)
+class _Description:
+    """Elements as plain data, inputs and start, in which variables take the places of numbers."""
 
+    elements: list[dict[str, Any]]
+    inputs: dict[str, Signal | Sine]
+    start: Start
 
-def _seed_elements(
-    elements: Sequence[Mapping[str, Any]], seeds: Sequence[_Seed]
-) -> list[dict[str, Any]]:
-    """Return a copy of the elements in which the numbers at the paths carry their seeds."""
-    copied: list[dict[str, Any]] = json.loads(json.dumps(elements))
-    by_name = {str(one["name"]): one for one in copied}
-    for path in dict.fromkeys(one.path for one in seeds):
-        name, *fields = path.split(".")
-        if name in ("start", "delay"):
-            continue
-        place, key = _find_place(by_name[name], fields, path)
+    def place_variable(self, path: str, slopes: FloatArray) -> _Description:
+        """Return the description with a variable of `slopes` (p,) at a path.
+
+        Raises InputError for a path that leads to no number.
+        """
+        head, _, name = path.partition(".")
+        if head == "start":
+            begin = {**self.start.speeds, **self.start.twists}
+            _require_known(path, "speed or twist", name, begin)
+            speeds, twists = (
+                {key: _vary(value, slopes) if key == name else value for key, value in one.items()}
+                for one in (self.start.speeds, self.start.twists)
+            )
+            return replace(self, start=Start(speeds, twists, self.start.locked))
+        if head == "delay":
+            sampled = {key: one for key, one in self.inputs.items() if isinstance(one, Signal)}
+            _require_known(path, "delay", name, sampled)
+            delayed = replace(sampled[name], delay=_vary(sampled[name].delay, slopes))
+            return replace(self, inputs={**self.inputs, name: delayed})
+        by_name = {str(one["name"]): one for one in self.elements}
+        _require_known(path, "element", head, by_name)
+        place, key = _find_place(by_name[head], name.split(".") if name else [], path)
         value = place[key]
         if not is_number(value):
             raise InputError(f"unknown {path!r} is no number", _HOW)
         if value == 0.0 and key not in _SMOOTH_AT_ZERO:
             what = f"nothing has a derivative by {path!r} at 0: its law has a corner there"
             raise InputError(what, "give it a small positive value")
-        place[key] = {"value": float(value), "seeds": _select(seeds, path)}
-    return copied
+        place[key] = _vary(value, slopes)
+        return self
+
+
+def _vary(value: float, slopes: FloatArray) -> Variable:
+    return Variable(float(value), slopes)
+
+
+def _require_known(path: str, what: str, name: str, known: Mapping[str, object]) -> None:
+    if name not in known:
+        hint = suggest_spelling(name, known)
+        raise InputError(f"unknown {path!r}: no {what} {name!r}{hint}", _HOW)
 
 
 def _find_place(element: dict[str, Any], fields: Sequence[str], path: str) -> tuple[Any, Any]:

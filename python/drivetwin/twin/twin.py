@@ -23,7 +23,6 @@ from drivetwin.estimation.result.estimate import (
 from drivetwin.estimation.result.method import Method
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, make_ratio_id
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.added_part import BACKLASH_ID, MODE_IDS, AddedPart, build_part
 from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
@@ -33,6 +32,13 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Stribeck,
 )
+from drivetwin.simulation.part_parameters import (
+    PART_IDS,
+    build_parts,
+    describe_parts,
+    select_parts,
+)
+from drivetwin.simulation.vehicle_parts import VehicleParts
 from drivetwin.vehicle.spec import (
     ElementKind,
     ElementSpec,
@@ -180,24 +186,29 @@ class Twin(DisplayMixin):
         )
 
     @property
-    def part(self) -> AddedPart | None:
-        """Part of the plant beside the dual clutch; None where it has none."""
-        ids = (*MODE_IDS, BACKLASH_ID)
-        known = {name: value for name in ids if (value := self._is_known(name)) is not None}
-        return build_part(known)
+    def part_values(self) -> dict[str, float]:
+        """Parameters of the parts beside the dual clutch by id; empty where there are none."""
+        known = {name: self._is_known(name) for name in PART_IDS}
+        return select_parts({name: value for name, value in known.items() if value is not None})
+
+    def build_parts(self, model: DualClutch) -> VehicleParts:
+        """Build the parts beside the `model` of a shift."""
+        ratio = abs(model.get_overall_ratio(model.elements[0].name))
+        # η is that of the lowest gear of the log, and gears of the twin are those of the log.
+        steps = sum(abs(one.ratio) > ratio * (1.0 + 1e-9) for one in self.gears.values())
+        return build_parts(self.part_values, model, steps)
 
     def drop_part(self) -> Twin:
         """Return the twin with the dual clutch alone as its plant."""
-        ids = (*MODE_IDS, BACKLASH_ID)
-        kept = {name: one for name, one in self.parameters.items() if name not in ids}
+        kept = {name: one for name, one in self.parameters.items() if name not in PART_IDS}
         return replace(self, parameters=kept)
 
     def require_dual_clutch(self, purpose: str) -> None:
         """Raise InputError for a plant with a part that `purpose` would leave out."""
-        if self.part is not None:
+        if self.part_values:
             raise InputError(
                 f"{purpose} holds the dual clutch alone, and the twin {self.name!r} also has "
-                f"{self.part.label}",
+                f"{describe_parts(self.part_values)}",
                 "use --drop-part to leave that out",
             )
 

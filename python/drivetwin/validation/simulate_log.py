@@ -21,7 +21,7 @@ from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.added_part import simulate_plant
+from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin
 from drivetwin.validation.gate import assess_model
@@ -97,7 +97,9 @@ def _simulate_window(
     count = int((window[1] - window[0]) / _GRID + 1e-6)
     time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
     start = state or estimate_start_state(model, log, shift, window[0])
-    trajectory = simulate_plant(model, twin.part, engine_torque, pressures, start, time)
+    parts = twin.build_parts(model)
+    task = DrivelineTask(model, parts, engine_torque, pressures, start, time)
+    trajectory = task.simulate()
     traces = _build_traces(model, log, trajectory)
     phases = clip_phases(shift, window)
     validation = Validation(

@@ -19,18 +19,18 @@ from drivetwin.report.labels import get_parameter_name
 from drivetwin.report.sections.blocks import make_link
 from drivetwin.report.style import COMPARED
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.added_part import BACKLASH_ID, MODE_IDS
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FrictionTable,
     ShiftElement,
     Stribeck,
 )
+from drivetwin.simulation.part_parameters import PART_IDS
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
 from drivetwin.workbench.zoom import View, encode_curves
 
-BESIDE_MODEL = ("te_delay", *MODE_IDS, BACKLASH_ID)
+BESIDE_MODEL = ("te_delay", *PART_IDS)
 """Parameters of a simulation that the dual-clutch model does not have."""
 FRICTION = "mu."
 """Prefix of the slider that scales the friction of an element; 1 as identified."""

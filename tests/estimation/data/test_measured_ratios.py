@@ -11,6 +11,7 @@ import pytest
 from drivetwin.estimation.data.measured_ratios import measure_ratios, refine_ratios
 from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.parameters import FINAL_DRIVE
+from drivetwin.simulation.variable import Variable
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.likelihood.fixtures import bench
 
@@ -66,14 +67,20 @@ def test_a_brake_has_both_ratios_of_eq_15_from_its_gear() -> None:
     step = 1e-6
     ahead, behind = (one.replace_ratio(1.95 + sign * step) for sign in (1.0, -1.0))
     slopes = ((1.0 / ahead.a - 1.0 / behind.a) / (2 * step), (ahead.b - behind.b) / (2 * step))
-    assert one.compute_ratio_slopes() == pytest.approx(slopes, rel=1e-6)
+    varied = one.replace_ratio(Variable(1.95, np.ones(1)))
+    for number, slope in zip((1.0 / varied.a, varied.b), slopes, strict=True):
+        assert isinstance(number, Variable)
+        assert number.slopes == pytest.approx(slope, rel=1e-6)
 
 
 def test_a_clutch_keeps_its_own_ratio() -> None:
     one = replace(rough_driveline().oncoming, follows_ratio=False, a=0.8, b=0.8 * 1.95)
     moved = one.replace_ratio(1.5)
     assert (moved.a, moved.b) == pytest.approx((0.8, 0.8 * 1.5))
-    assert one.compute_ratio_slopes() == pytest.approx((0.0, 0.8))
+    varied = one.replace_ratio(Variable(1.5, np.ones(1)))
+    assert not isinstance(varied.a, Variable)
+    assert isinstance(varied.b, Variable)
+    assert varied.b.slopes == pytest.approx(0.8)
 
 
 def test_noise_that_hides_the_motion_measures_nothing() -> None:

@@ -8,7 +8,7 @@ and prior, MacKay 1992).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -69,14 +69,6 @@ class TableShiftModel(ShiftModel):
         table = self.tables[one.name]
         mu = tuple(point[name] for name in table.list_names(one.name))
         return replace(element, friction=FrictionTable(tuple(table.knots.tolist()), mu))
-
-    def _iterate_entries(
-        self, point: ParameterVector, name: str
-    ) -> Iterator[tuple[str, str, float]]:
-        yield from super()._iterate_entries(point, name)
-        element, _, key = name.partition(".")
-        if element in self.tables and key.startswith("mu."):
-            yield name, name, 1.0
 
 
 @dataclass(frozen=True, eq=False)

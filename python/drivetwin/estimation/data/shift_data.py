@@ -119,12 +119,6 @@ class ShiftElementKinematics:
             return replace(self, a=1.0 / (self.i_in * i_c), b=i_out)
         return replace(self, b=self.a * self.i_in * gear_ratio)
 
-    def compute_ratio_slopes(self) -> tuple[float, float]:
-        """Compute the derivatives of 1/a and b by the ratio of the gear."""
-        if self.follows_ratio:
-            return self.i_in, -((self.a * self.i_in) ** 2)
-        return 0.0, self.a * self.i_in
-
 
 @dataclass(frozen=True)
 class KnownDriveline:

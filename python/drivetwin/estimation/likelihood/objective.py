@@ -25,7 +25,6 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.estimation.likelihood.budget import EXPANSION, RUN, WEIGHTING, charge
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
-from drivetwin.estimation.likelihood.extension import Extension
 from drivetwin.estimation.likelihood.noise.linear_response import (
     LinearResponse,
     build_output_row,
@@ -37,15 +36,11 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import (
     build_sensor_whitener,
 )
 from drivetwin.estimation.likelihood.parametrization import TE_OFFSET, ShiftModel, retract
+from drivetwin.estimation.likelihood.plant_effect import PlantEffect
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.simulation.added_part import simulate_plant
-from drivetwin.simulation.dual_clutch import (
-    Sensitivities,
-    Signal,
-    Trajectory,
-    simulate_sensitivities,
-)
+from drivetwin.simulation.driveline_run import DrivelineTask
+from drivetwin.simulation.dual_clutch import Signal, Trajectory
 from drivetwin.vehicle.spec import PriorValue
 
 
@@ -57,14 +52,9 @@ class ObjectiveSettings:
     """Residual from which a run counts as failed [standard deviations]."""
     square_rtol: float = 1e-6
     """Tolerance for a negative sum of squares, over the squares in it [ratio]."""
-    difference: float = 0.03
-    """Root mean square of the change of the residual, in standard deviations, at which derivatives
-    of an extended plant are taken [-]."""
     own_reach: float = 3.0
-    """Distance from their prior within which unknowns of an extension are sought, in its standard
+    """Distance from their prior within which unknowns of a part are sought, in its standard
     deviations: a share of an inertia stays between 0 and 1 [-]."""
-    own_difference: float = 1e-3
-    """Change of an unknown of an extension, a logarithm or a share, for its derivative [-]."""
 
 
 OBJECTIVE = ObjectiveSettings()
@@ -106,14 +96,24 @@ class ShiftTerm:
 
         Raises InputError or SimulationError for an impossible description.
         """
-        model, start = self.structure.build_model(point), self.structure.build_start(point)
-        torque, pressures = self.get_acting_torque(point), self.get_pressures()
-        part = self.structure.build_part(point, model)
-        return simulate_plant(model, part, torque, pressures, start, time)
+        return self._build_task(point, self.get_acting_torque(point), time).simulate()
 
-    def drop_extension(self) -> ShiftTerm:
+    def _build_task(
+        self, point: ParameterVector, torque: Signal, time: FloatArray
+    ) -> DrivelineTask:
+        model = self.structure.build_model(point)
+        return DrivelineTask(
+            model,
+            self.structure.build_parts(point, model),
+            torque,
+            self.get_pressures(),
+            self.structure.build_start(point),
+            time,
+        )
+
+    def drop_plant_effect(self) -> ShiftTerm:
         """Return the part with the dual clutch alone as its plant."""
-        return replace(self, structure=replace(self.structure, extension=None))
+        return replace(self, structure=replace(self.structure, plant_effect=None))
 
     def _is_complete(self, run: Trajectory) -> bool:
         """Return whether a run reached its end with residuals that can be squared."""
@@ -128,70 +128,23 @@ class ShiftTerm:
     def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
         `point`."""
-        if self.structure.extension is not None:
-            return self._difference(point)
-        names, matrix = self.structure.compute_jacobian(point)
-        model = self.structure.build_model(point)
+        torque = self.get_acting_torque(point)
+        variables = self._build_task(point.to_variables(), torque, self.record.time)
+        changes = self._compute_torque_changes(point)
         try:
-            found: Sensitivities = simulate_sensitivities(
-                model,
-                self.get_acting_torque(point),
-                self.get_pressures(),
-                self.structure.build_start(point),
-                self.record.time,
-                names,
-            )
+            run, derivatives = variables.differentiate(len(point.names))
         except InputError:
             return None
-        if not self._is_complete(found.run):
+        if not self._is_complete(run):
             return None
-        columns = np.column_stack([self.record.sample_run(found.derivatives[n]) for n in names])
-        acting = np.any(matrix != 0.0, axis=0)  # a part depends on few unknowns
-        slopes = np.zeros((len(columns), acting.size))
-        slopes[:, acting] = columns @ matrix[:, acting]
-        response = self.compute_response(point, found.run)
-        for name, disturbance in self._compute_torque_changes(point).items():
+        slopes = self.record.sample_derivatives(derivatives)
+        response = self.compute_response(point, run)
+        for name, disturbance in changes.items():
             answer = self.observe(point, response.propagate_inputs({TORQUE: disturbance}))
             slopes[:, point.names.index(name)] = answer
         if not np.all(np.isfinite(slopes)):
             return None
-        return self.compute_residual(found.run), slopes
-
-    def _difference(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
-        """Linearise an extended plant by differences.
-
-        The steps are from the slopes of the dual clutch. Unknowns of the engine torque keep those
-        slopes: they are formed without its noise.
-        """
-        run, plain = self.simulate(point), self.drop_extension().linearise(point)
-        if run is None or plain is None:
-            return None
-        residual, slopes = self.compute_residual(run), plain[1]
-        answer = np.sqrt(np.mean((slopes / self.record.sigma[:, None]) ** 2, axis=0))
-        steps = OBJECTIVE.difference / np.where(answer > 0.0, answer, np.inf)
-        steps[[name in self._compute_torque_changes(point) for name in point.names]] = 0.0
-        assert self.structure.extension is not None, "only extended plants are differenced"
-        own = self.structure.extension.unknowns
-        steps[[point.names.index(name) for name in own]] = OBJECTIVE.own_difference
-        for k in np.flatnonzero(steps):
-            change = self._compute_change(point, int(k), steps[k], residual)
-            if change is None:
-                return None
-            slopes[:, k] = change
-        return residual, slopes
-
-    def _compute_change(
-        self, point: ParameterVector, index: int, step: float, residual: FloatArray
-    ) -> FloatArray | None:
-        """Compute the change (n,) of the simulated samples per unit of one unknown; backwards where
-        the run forwards fails, None where both fail."""
-        for one in (step, -step):
-            values = point.values.copy()
-            values[index] += one
-            run = self.simulate(point.replace_values(values))
-            if run is not None:
-                return (residual - self.compute_residual(run)) / one
-        return None
+        return self.compute_residual(run), slopes
 
     def _compute_torque_changes(self, point: ParameterVector) -> dict[str, FloatArray]:
         """Compute the change (N-1,) of the acting engine torque per unit of its own unknowns.
@@ -332,12 +285,12 @@ class LikelihoodObjective:
         """Names of the signals that are of another kind than read, as in `Record.kinds`."""
         return frozenset[str]().union(*(part.record.kinds for part in self.parts))
 
-    def extend(self, extension: Extension, priors: Sequence[PriorValue]) -> LikelihoodObjective:
-        """Add a part to the plant of all shifts, with the `priors` of its unknowns.
+    def extend(self, effect: PlantEffect, priors: Sequence[PriorValue]) -> LikelihoodObjective:
+        """Add an effect to the plant of all shifts, with the `priors` of its unknowns.
 
         These come last. They stay within some standard deviations of their prior.
         """
-        structures = [replace(part.structure, extension=extension) for part in self.parts]
+        structures = [replace(part.structure, plant_effect=effect) for part in self.parts]
         parts = [
             replace(part, structure=one) for part, one in zip(self.parts, structures, strict=True)
         ]
@@ -350,12 +303,12 @@ class LikelihoodObjective:
         upper = np.append(self.upper, np.add(own, reach))
         return LikelihoodObjective(tuple(parts), prior, lower, upper)
 
-    def drop_extension(self) -> LikelihoodObjective:
+    def drop_plant_effect(self) -> LikelihoodObjective:
         """Return the problem of the dual clutch alone, without the unknowns of the part."""
-        extension = self.parts[0].structure.extension
-        count = self.lower.size - (0 if extension is None else len(extension.unknowns))
+        effect = self.parts[0].structure.plant_effect
+        count = self.lower.size - (0 if effect is None else len(effect.unknowns))
         prior = Prior(self.prior.mean[:count], self.prior.precision[:count, :count])
-        parts = tuple(part.drop_extension() for part in self.parts)
+        parts = tuple(part.drop_plant_effect() for part in self.parts)
         return LikelihoodObjective(parts, prior, self.lower[:count], self.upper[:count])
 
     def select_modes(self, names: Collection[str]) -> LikelihoodObjective:
@@ -406,8 +359,7 @@ class LikelihoodObjective:
     def normal(self, point: ParameterVector) -> NormalEquations | None:
         """Compute the expansion of Q at `point`; None if a simulation fails."""
         size = len(point.names)
-        extended = any(part.structure.extension is not None for part in self.parts)
-        charge(EXPANSION + size * RUN if extended else EXPANSION)
+        charge(EXPANSION)
         cost, gradient = (
             self.prior.compute_prior_cost(point.values),
             self.prior.compute_gradient(point.values),

@@ -17,19 +17,18 @@ Ratios of gears and final drive are unknowns unless the card states them exactly
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftElementKinematics
-from drivetwin.estimation.likelihood.extension import Extension
+from drivetwin.estimation.likelihood.plant_effect import PlantEffect
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
-from drivetwin.simulation.added_part import AddedPart
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     LossLaw,
@@ -38,6 +37,9 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Stribeck,
 )
+from drivetwin.simulation.part_parameters import build_parts
+from drivetwin.simulation.variable import exp
+from drivetwin.simulation.vehicle_parts import VehicleParts
 
 COMMON = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
 """Unknowns of the driveline, the same in all shifts."""
@@ -87,8 +89,9 @@ class ShiftModel:
     T_v/i_f holds where the load grows with the speed. A `tie` takes the place of the unknown J_e.
     `log` is the number of the log among several, 0 where it is the only one. `departure` is how
     the load of this shift departs from that of its log: a factor by unknown; empty where it does
-    not. An `extension` is a part that the plant has beside the dual clutch. `partners` are the
-    elements whose law an element without a law of its own follows, by its name.
+    not. `plant_effect` is an effect that the plant has beside the dual clutch. `partners` are the
+    elements whose law an element without a law of its own follows, by its name. `eta_steps` is the
+    number of the gear that is left, counted from the lowest one of all shifts.
     """
 
     driveline: KnownDriveline
@@ -99,8 +102,9 @@ class ShiftModel:
     tie: Tie | None = None
     log: int = 0
     departure: Mapping[str, float] = field(default_factory=dict)
-    extension: Extension | None = None
+    plant_effect: PlantEffect | None = None
     partners: Mapping[str, str] = field(default_factory=dict)
+    eta_steps: int = 0
 
     @property
     def elements(self) -> tuple[ShiftElementKinematics, ShiftElementKinematics]:
@@ -173,12 +177,16 @@ class ShiftModel:
             ),
         )
 
-    def build_part(self, point: ParameterVector, model: DualClutch) -> AddedPart | None:
-        """Build the part beside `model` at `point`; None for the dual clutch alone."""
-        if self.extension is None:
-            return None
-        values = {name: point[name] for name in self.extension.unknowns}
-        return self.extension.build_part(model, values)
+    def compute_part_values(self, point: ParameterVector, model: DualClutch) -> dict[str, float]:
+        """Compute the parameters of the parts beside `model` by id at `point`."""
+        if self.plant_effect is None:
+            return {}
+        unknowns = {name: point[name] for name in self.plant_effect.unknowns}
+        return self.plant_effect.compute_values(model, unknowns)
+
+    def build_parts(self, point: ParameterVector, model: DualClutch) -> VehicleParts:
+        """Build the parts beside `model` at `point`."""
+        return build_parts(self.compute_part_values(point, model), model, self.eta_steps)
 
     def _build_load(self, point: ParameterVector) -> RoadLoad:
         aero = self.get_value(point, AERO)
@@ -193,8 +201,7 @@ class ShiftModel:
 
     def _build_element(self, point: ParameterVector, one: ShiftElementKinematics) -> ShiftElement:
         c, drop, v, ln_v_s = self.get_law(point, one.name)
-        with np.errstate(over="ignore"):  # an infinite speed is a constant law
-            v_s = float(np.exp(ln_v_s))
+        v_s = exp(ln_v_s)  # an infinite speed is a constant law
         placed = self.place_element(point, one)
         return ShiftElement(
             name=one.name,
@@ -218,91 +225,6 @@ class ShiftModel:
         speed, wheel, twist = (point[f"{self.label}.{key}"] for key in START)
         ratio = self.compute_ratio_before(point)
         return State(ratio * speed, speed, wheel, twist, (self.driveline.offgoing.name,))
-
-    def compute_jacobian(self, point: ParameterVector) -> tuple[tuple[str, ...], FloatArray]:
-        """Compute the core's names (m,) and the derivative of their values by `point` (m, p)."""
-        entries = [entry for name in point.names for entry in self._iterate_entries(point, name)]
-        core = tuple(dict.fromkeys(entry[0] for entry in entries))
-        matrix = np.zeros((len(core), len(point.names)))
-        for known, name, slope in entries:
-            matrix[core.index(known), point.names.index(name)] = slope
-        return core, matrix
-
-    def _iterate_entries(
-        self, point: ParameterVector, name: str
-    ) -> Iterator[tuple[str, str, float]]:
-        """Yield (name in the core, unknown, derivative) of one unknown; nothing for foreign
-        ones."""
-        i_f, eta, J_e = (
-            self.get_final_drive(point),
-            self.get_value(point, "eta"),
-            self.get_value(point, "J_e"),
-        )
-        by_tie, tied = 0.0, None
-        if self.tie is not None:
-            tied = self.place_element(point, self.tie.element)
-            by_tie = -1.0 / (tied.ratio**2 * eta)
-        table: dict[str, Sequence[tuple[str, float]]] = {
-            "eta": (("eta", 1.0), ("J1", -J_e / eta**2)),
-            "J_e": (("J1", 1.0 / eta),),
-            "J_out": (("J_out", 1.0), ("J1", by_tie)),
-            "J_vehicle": (("J_v", 1.0),),
-            self.get_unknown("Tv_over_if"): (("load.constant", i_f),),
-            AERO: (("load.aero", 1.0), ("load.constant", -(self.mean_speed**2))),
-            "k_o": (("k_o", 1.0),),
-            "c_o": (("c_o", 1.0),),
-            f"{self.label}.speed": (
-                ("start.engine_speed", self.compute_ratio_before(point)),
-                ("start.output_speed", 1.0),
-            ),
-            f"{self.label}.wheel_speed": (("start.wheel_speed", 1.0),),
-            f"{self.label}.twist": (("start.twist", 1.0),),
-            FINAL_DRIVE: (("i_f", 1.0), ("load.constant", self.compute_load(point))),
-        }
-        for own, factor in self.departure.items():
-            table[own] = (("load.constant", factor * i_f),)
-        if tied is not None:
-            by_ratio = -2.0 * by_tie * self.get_value(point, "J_out") / tied.gear_ratio
-            table[make_ratio_id(tied.gear)] = (("J1", by_ratio),)
-        for one in self.spinning:
-            table[f"{one.name}.drum"] = [(f"{one.name}.drum_inertia", 1.0)]
-        for known, slope in table.get(name, ()):
-            yield known, name, slope
-        for one in self.elements:
-            for known, slope in self._list_element_entries(point, one).get(name, ()):
-                yield known, name, slope
-
-    def _list_element_entries(
-        self, point: ParameterVector, one: ShiftElementKinematics
-    ) -> dict[str, list[tuple[str, float]]]:
-        """List by unknown the fields of an element that it acts on, with their derivatives."""
-        fields: dict[str, list[tuple[str, float]]] = {
-            f"{one.name}.P0": [("P0", 1.0)],
-            f"{one.name}.drum": [("drum_inertia", 1.0)],
-        }
-        partner = self.partners.get(one.name, one.name)
-        level = 1.0 if partner == one.name else self.get_value(point, f"{one.name}.level")
-        v_s = float(np.exp(self.get_law(point, one.name)[3]))
-        fields |= {
-            f"{partner}.mu_c": [("mu_c", level), ("mu_s", level)],
-            f"{partner}.mu_drop": [("mu_s", level)],
-            f"{partner}.mu_v": [("mu_v", level)],
-            f"{partner}.ln_v_s": [("v_s", v_s)],
-        }
-        if partner != one.name:
-            c, drop, v = (self.get_value(point, f"{partner}.{key}") for key in LAW[:3])
-            fields[f"{one.name}.level"] = [("mu_c", c), ("mu_s", c + drop), ("mu_v", v)]
-            fields[f"{one.name}.rest"] = [("mu_s", 1.0)]
-        by_i_c, by_i_out = self.place_element(point, one).compute_ratio_slopes()
-        fields[make_ratio_id(one.gear)] = [("i_c", by_i_c), ("i_out", by_i_out)]
-        found = {
-            unknown: [(f"{one.name}.{key}", slope) for key, slope in entries]
-            for unknown, entries in fields.items()
-        }
-        if one is self.driveline.offgoing:
-            speed = one.i_in * point[f"{self.label}.speed"]
-            found[make_ratio_id(one.gear)].append(("start.engine_speed", speed))
-        return found
 
 
 def retract(point: ParameterVector, step: FloatArray) -> FloatArray:

@@ -119,16 +119,25 @@ def build_problem(
     departures = (
         _build_load_factors(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
     )
+    gears = _list_gears(drivelines)
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, split_spans(signals), strict=True)):
         label = f"start{k}"
         record = build_record(s, span, {e.name: e.P0 for e in (d.offgoing, d.oncoming)})
         same = [one for one in signals if one.log == s.log]
         own = {name: fixed[n] for name, n in map_log_names(s.log).items() if n in fixed}
-        speed = compute_mean_speed(same, d.i_f)
         departure = departures.get(k, {})
         structure = ShiftModel(
-            d, loss_law, label, fixed | own, speed, tie, s.log, departure, partners=partners
+            d,
+            loss_law,
+            label,
+            fixed | own,
+            compute_mean_speed(same, d.i_f),
+            tie,
+            s.log,
+            departure,
+            partners=partners,
+            eta_steps=gears.index(d.offgoing.gear),
         )
         parts.append(ShiftTerm.from_sensor_noise(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
@@ -147,6 +156,12 @@ def build_problem(
     sums = list_sum_priors(inertias, drivelines[0].J1, guess["eta"])
     prior = add_sum_priors(prior, point, fixed, sums)
     return LikelihoodObjective(tuple(parts), prior, lower, upper), point
+
+
+def _list_gears(drivelines: Sequence[KnownDriveline]) -> list[str]:
+    """List the gears of all shifts by falling ratio."""
+    ratios = {e.gear: abs(e.ratio) for d in drivelines for e in (d.offgoing, d.oncoming)}
+    return sorted(ratios, key=lambda gear: -ratios[gear])
 
 
 def _expand_logs(names: Sequence[str], logs: Sequence[int]) -> list[str]:

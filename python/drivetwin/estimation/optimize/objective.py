@@ -6,7 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from drivetwin._util.arrays import FloatArray
+from drivetwin.simulation.variable import Variable
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,9 +22,23 @@ class ParameterVector:
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
 
+    def to_variables(self) -> ParameterVector:
+        """Return a vector of the same parameters that carry their derivatives by one another."""
+        return _VariableVector(self.names, self.values)
+
     def replace_values(self, values: FloatArray) -> ParameterVector:
         """Return a vector of the same parameters with other `values` (p,)."""
         return ParameterVector(self.names, values)
+
+
+class _VariableVector(ParameterVector):
+    """Parameter vector whose elements are variables."""
+
+    def __getitem__(self, name: str) -> float:
+        place = self.names.index(name)
+        slopes = np.zeros(len(self.names))
+        slopes[place] = 1.0
+        return Variable(float(self.values[place]), slopes)
 
 
 @dataclass(frozen=True, eq=False)

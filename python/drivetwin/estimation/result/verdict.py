@@ -56,6 +56,11 @@ _EXPERIMENT = {
     "mode_share": _EXCITE_ENGINE,
     "mode_damping": _EXCITE_ENGINE,
     "backlash": "Tip the pedal into overrun and back.",
+    "tyre_slip": "Record the speed of a wheel that is not driven.",
+    "shaft_progression": "Record shifts at two torque levels.",
+    "shaft_reference": "Record shifts at two torque levels.",
+    "eta_step": "Step the pedal in both gears.",
+    "input_drag": "Record the engine torque at zero load.",
 }
 
 

@@ -50,6 +50,7 @@ pub fn phi_functions<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
     h: f64,
     reach: T,
+    n: usize,
     all: &mut PhiFunctions<T, N>,
 ) {
     let mut series = [T::Values::zero_(); MAX_SERIES + 2];
@@ -59,15 +60,15 @@ pub fn phi_functions<T: Number, const F: bool, const N: usize>(
         weights[k] = weights[k - 1] * h / k as f64;
     }
     let sum = &mut all[FORCING_DEGREE];
-    polynomial::<T, F, N>(a, &series[..terms.next_multiple_of(3)], sum);
-    for i in 0..N {
-        for j in 0..unrolled::<T, N>() {
+    polynomial::<T, F, N>(a, &series[..terms.next_multiple_of(3)], n, sum);
+    for i in 0..span::<T, N>(n) {
+        for j in 0..span::<T, N>(n) {
             sum[i][j] *= weights[FORCING_DEGREE];
         }
     }
     for k in (0..FORCING_DEGREE).rev() {
         let (lower, higher) = all.split_at_mut(k + 1);
-        multiply::<T, F, N>(a, &higher[0], &mut lower[k]);
+        multiply::<T, F, N>(a, &higher[0], n, &mut lower[k]);
         if k > 0 {
             add_to_diagonal(&mut lower[k], T::of(weights[k]));
         }
@@ -80,20 +81,21 @@ pub fn phi_functions<T: Number, const F: bool, const N: usize>(
 pub fn double_phi_functions<T: Number, const F: bool, const N: usize>(
     all: &mut PhiFunctions<T, N>,
     h: f64,
+    n: usize,
 ) {
     let mut product = [[T::zero_(); N]; N];
     for k in (0..=FORCING_DEGREE).rev() {
-        multiply::<T, F, N>(&all[0], &all[k], &mut product);
+        multiply::<T, F, N>(&all[0], &all[k], n, &mut product);
         let mut weight = 1.0;
-        for i in 0..N {
-            for j in 0..unrolled::<T, N>() {
+        for i in 0..span::<T, N>(n) {
+            for j in 0..span::<T, N>(n) {
                 product[i][j] += all[k][i][j] + all[k][i][j];
             }
         }
         for lower in (1..k).rev() {
             weight *= h / (k - lower) as f64;
-            for i in 0..N {
-                for j in 0..unrolled::<T, N>() {
+            for i in 0..span::<T, N>(n) {
+                for j in 0..span::<T, N>(n) {
                     product[i][j] = all[lower][i][j].fma_times::<F>(weight, product[i][j]);
                 }
             }
@@ -124,11 +126,16 @@ pub struct WaveResponse<T, const N: usize> {
 
 impl<T: Number, const N: usize> WaveResponse<T, N> {
     /// For a step over which the wave turns by at most [`MAX_WAVE_ANGLE`].
-    pub fn of<const F: bool>(s: &PhiFunctions<T, N>, force: &[T; N], omega: f64) -> Self {
+    pub fn of<const F: bool>(
+        s: &PhiFunctions<T, N>,
+        force: &[T; N],
+        omega: f64,
+        n: usize,
+    ) -> Self {
         let mut parts = [[T::zero_(); N]; 2];
         for k in 0..2 {
-            let first = apply::<T, F, N>(&s[1 + k], force);
-            let third = apply::<T, F, N>(&s[3 + k], force);
+            let first = apply::<T, F, N>(&s[1 + k], force, n);
+            let third = apply::<T, F, N>(&s[3 + k], force, n);
             for i in 0..N {
                 parts[k][i] = first[i] - third[i] * (omega * omega);
             }
@@ -137,11 +144,11 @@ impl<T: Number, const N: usize> WaveResponse<T, N> {
     }
 
     /// Double the step `h` [s]; `s` are those of the single step.
-    pub fn double<const F: bool>(&mut self, s: &PhiFunctions<T, N>, h: f64) {
+    pub fn double<const F: bool>(&mut self, s: &PhiFunctions<T, N>, h: f64, n: usize) {
         let [cosine, sine] = self.parts;
         let (sin, cos) = (self.omega * h).sin_cos();
         let sin_over = if self.omega == 0.0 { h } else { sin / self.omega };
-        let moved = [apply::<T, F, N>(&s[0], &cosine), apply::<T, F, N>(&s[0], &sine)];
+        let moved = [apply::<T, F, N>(&s[0], &cosine, n), apply::<T, F, N>(&s[0], &sine, n)];
         for i in 0..N {
             let (c, q) = (cosine[i], sine[i]);
             self.parts[0][i] = moved[0][i] + c * (1.0 + cos) - q * (self.omega * sin);
@@ -159,17 +166,18 @@ pub const MAX_WAVE_ANGLE: f64 = 1e-3;
 fn polynomial<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
     coefficients: &[T::Values],
+    n: usize,
     sum: &mut Square<T, N>,
 ) {
     let [mut square, mut cube, mut product] = [[[T::zero_(); N]; N]; 3];
-    multiply::<T, F, N>(a, a, &mut square);
-    multiply::<T, F, N>(a, &square, &mut cube);
+    multiply::<T, F, N>(a, a, n, &mut square);
+    multiply::<T, F, N>(a, &square, n, &mut cube);
     for at in (0..coefficients.len()).step_by(3).rev() {
         if at + 3 < coefficients.len() {
-            multiply::<T, F, N>(&cube, sum, &mut product);
+            multiply::<T, F, N>(&cube, sum, n, &mut product);
         }
-        for i in 0..N {
-            for j in 0..unrolled::<T, N>() {
+        for i in 0..span::<T, N>(n) {
+            for j in 0..span::<T, N>(n) {
                 let low = a[i][j].fma_values::<F>(coefficients[at + 1], product[i][j]);
                 sum[i][j] = square[i][j].fma_values::<F>(coefficients[at + 2], low);
             }
@@ -190,12 +198,13 @@ pub fn add_to_diagonal<T: Number, const N: usize>(a: &mut Square<T, N>, value: T
 fn multiply<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
     b: &Square<T, N>,
+    n: usize,
     out: &mut Square<T, N>,
 ) {
-    for i in 0..N {
-        for j in 0..N {
+    for i in 0..span::<T, N>(n) {
+        for j in 0..span::<T, N>(n) {
             let mut sum = T::zero_();
-            for k in 0..unrolled::<T, N>() {
+            for k in 0..span::<T, N>(n) {
                 sum = a[i][k].fma::<F>(b[k][j], sum);
             }
             out[i][j] = sum;
@@ -205,29 +214,34 @@ fn multiply<T: Number, const F: bool, const N: usize>(
 
 /// A matrix times a vector.
 #[inline(always)]
-pub fn apply<T: Number, const F: bool, const N: usize>(a: &Square<T, N>, v: &[T; N]) -> [T; N] {
+pub fn apply<T: Number, const F: bool, const N: usize>(
+    a: &Square<T, N>,
+    v: &[T; N],
+    n: usize,
+) -> [T; N] {
     let mut out = [T::zero_(); N];
-    for i in 0..N {
-        out[i] = dot::<T, F, N>(&a[i], v);
+    for i in 0..span::<T, N>(n) {
+        out[i] = dot::<T, F, N>(&a[i], v, n);
     }
     out
 }
 
 /// Scalar product.
 #[inline(always)]
-pub fn dot<T: Number, const F: bool, const N: usize>(a: &[T; N], b: &[T; N]) -> T {
+pub fn dot<T: Number, const F: bool, const N: usize>(a: &[T; N], b: &[T; N], n: usize) -> T {
     let mut sum = T::zero_();
-    for i in 0..unrolled::<T, N>() {
+    for i in 0..span::<T, N>(n) {
         sum = a[i].fma::<F>(b[i], sum);
     }
     sum
 }
 
-/// `N`, but hidden from the compiler where a number is a vector already: a loop that it unrolls it would
-/// also take for several entries at once, and gather these.
+/// Entries of a row or column that are in use: `N`, so that the loop unrolls, but the number of `states` where
+/// a number is a vector already. The compiler would take several entries of an unrolled loop at once, and
+/// gather these.
 #[inline(always)]
-pub fn unrolled<T: Number, const N: usize>() -> usize {
-    if T::DERIVATIVES || T::RUNS > 1 { std::hint::black_box(N) } else { N }
+pub fn span<T: Number, const N: usize>(states: usize) -> usize {
+    if T::DERIVATIVES || T::RUNS > 1 { states } else { N }
 }
 
 /// Response of the state at the end to a force `e` times each of the [`N_BASIS`].
@@ -236,18 +250,19 @@ pub fn forcing_response<T: Number, const F: bool, const N: usize>(
     s: &PhiFunctions<T, N>,
     force: &[T; N],
     h: f64,
+    n: usize,
 ) -> [[T; N]; N_BASIS] {
     // Those to 1, t, t² and t³ first.
     let mut all = [[T::zero_(); N]; N_BASIS];
     let mut weight = 1.0;
     for k in 0..FORCING_DEGREE {
         weight *= k.max(1) as f64 / if k > 0 { h } else { 1.0 };
-        let response = apply::<T, F, N>(&s[k + 1], force);
-        for i in 0..unrolled::<T, N>() {
+        let response = apply::<T, F, N>(&s[k + 1], force, n);
+        for i in 0..span::<T, N>(n) {
             all[k][i] = response[i] * weight;
         }
     }
-    for i in 0..unrolled::<T, N>() {
+    for i in 0..span::<T, N>(n) {
         let (square, cube) = (all[2][i], all[3][i]);
         all[3][i] = square * 3.0 - cube * 2.0;
         all[4][i] = cube - square;

@@ -11,7 +11,7 @@ use crate::network::{Mode, Network};
 use crate::number::{KernelFloat, Number, Values};
 use crate::solver::exponential::phi::{
     FORCING_DEGREE, N_BASIS, PhiFunctions, WaveResponse, add_to_diagonal, apply, dot,
-    double_phi_functions, doublings, forcing_response, phi_functions, unrolled,
+    double_phi_functions, doublings, forcing_response, phi_functions, span,
 };
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::sine::Wave;
@@ -174,7 +174,7 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         forcing_response: &[[[T; N]; N_BASIS]],
     ) {
         let BuildKernel { network, mode, active, laws, h, .. } = *kernel;
-        let law = laws[slot];
+        let (law, n) = (laws[slot], network.states());
         let mut argument = [T::zero_(); N];
         for (to, &c) in argument.iter_mut().zip(&network.channels[active[slot]].arguments[0]) {
             *to = c * law.sign * law.unit;
@@ -186,12 +186,12 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         for drive in &mut self.inputs {
             let ([held, load_slope], input) = (&drive.step, network.first_input() + drive.input);
             drive.argument[slot] =
-                [dot::<T, F, N>(&argument, held), dot::<T, F, N>(&argument, load_slope)];
+                [dot::<T, F, N>(&argument, held, n), dot::<T, F, N>(&argument, load_slope, n)];
             drive.now[slot] = now[input];
             drive.half_second_derivative[slot] = [second[input], now[input] * (0.5 * h)];
         }
         let argument_end = self.at_end::<F>(&argument, forcing_response);
-        let rate_end = over_moments::<T, F, N>(&rate, forcing_response);
+        let rate_end = over_moments::<T, F, N>(&rate, forcing_response, n);
         let rate = Form::over(network, active, &self.signs, &now);
         let Form { state, constant, channels } = Form::over(network, active, &self.signs, &second);
         let mut half_second_derivative = StepForm { state, constant, ..StepForm::idle() };
@@ -219,11 +219,12 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         forcing_response: &[[[T; N]; N_BASIS]],
     ) -> StepForm<T, N> {
         let mut form = StepForm::idle();
-        for j in 0..N {
-            form.state[j] = dot::<T, F, N>(row, &self.transition[j]);
+        let n = self.states;
+        for j in 0..span::<T, N>(n) {
+            form.state[j] = dot::<T, F, N>(row, &self.transition[j], n);
         }
-        form.constant = dot::<T, F, N>(row, &self.constant);
-        form.cubics = over_moments::<T, F, N>(row, forcing_response);
+        form.constant = dot::<T, F, N>(row, &self.constant, n);
+        form.cubics = over_moments::<T, F, N>(row, forcing_response, n);
         form
     }
 }
@@ -246,7 +247,7 @@ impl<T: Number, const N: usize> BuildKernel<'_, T, N> {
     ) -> Vec<Option<WaveResponse<T, N>>> {
         let response = |(input, wave): (usize, &Option<Wave>)| {
             let force = forcing(self.mode, self.network.first_input() + input);
-            wave.map(|wave| WaveResponse::of::<F>(s, &force, wave.omega))
+            wave.map(|wave| WaveResponse::of::<F>(s, &force, wave.omega, self.network.states()))
         };
         self.waves.iter().enumerate().map(response).collect()
     }
@@ -262,7 +263,9 @@ impl<T: Number, const N: usize> BuildKernel<'_, T, N> {
         for input in 0..self.network.mechanism.inputs.len() {
             if self.network.is_driven_by(input) {
                 let force = forcing(self.mode, self.network.first_input() + input);
-                let mut step = [apply::<T, F, N>(&s[1], &force), apply::<T, F, N>(&s[2], &force)];
+                let n = self.network.states();
+                let respond = |k: usize| apply::<T, F, N>(&s[k], &force, n);
+                let mut step = [respond(1), respond(2)];
                 if let Some(Some(wave)) = responses_to_waves.get(input) {
                     // The offset is there throughout, and the wave is what the input is off it.
                     let offset = self.waves[input].map_or(0.0, |wave| wave.offset);
@@ -300,33 +303,33 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
             a[i][..n].copy_from_slice(&mode.derivative.row(i)[..n]);
         }
         let mut s = [[[T::zero_(); N]; N]; FORCING_DEGREE + 1];
-        phi_functions::<T, F, N>(&a, first, reach * (first / h), &mut s);
+        phi_functions::<T, F, N>(&a, first, reach * (first / h), n, &mut s);
         let mut responses_to_waves = self.responses_to_waves::<F>(&s);
         let mut length = first;
         for _ in 0..doublings {
-            responses_to_waves.iter_mut().flatten().for_each(|wave| wave.double::<F>(&s, length));
-            double_phi_functions::<T, F, N>(&mut s, length);
+            responses_to_waves.iter_mut().flatten().for_each(|wave| wave.double::<F>(&s, length, n));
+            double_phi_functions::<T, F, N>(&mut s, length, n);
             length *= 2.0;
         }
         add_to_diagonal(&mut s[0], T::of(1.0));
         let mut operators = Propagator::empty(n, reach);
         operators.inputs.reserve_exact(network.mechanism.inputs.len());
         operators.channels.reserve_exact(active.len());
-        for i in 0..N {
-            for j in 0..unrolled::<T, N>() {
+        for i in 0..span::<T, N>(n) {
+            for j in 0..span::<T, N>(n) {
                 operators.transition[j][i] = s[0][i][j];
             }
         }
-        operators.constant = apply::<T, F, N>(&s[1], &forcing(mode, network.one()));
+        operators.constant = apply::<T, F, N>(&s[1], &forcing(mode, network.one()), n);
         self.add_inputs::<F>(&mut operators, &s, &responses_to_waves);
         let mut responses: SmallVec<[[[T; N]; N_BASIS]; 2]> = SmallVec::new();
         for (slot, &j) in active.iter().enumerate() {
             operators.signs[slot] = laws[slot].sign;
             let mut force = forcing(mode, network.first_channel() + j);
-            for i in 0..unrolled::<T, N>() {
+            for i in 0..span::<T, N>(n) {
                 force[i] *= laws[slot].sign;
             }
-            responses.push(forcing_response::<T, F, N>(&s, &force, h));
+            responses.push(forcing_response::<T, F, N>(&s, &force, h, n));
         }
         for slot in 0..active.len() {
             operators.carry::<F>(slot, &self, &responses);
@@ -344,11 +347,12 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
 fn over_moments<T: Number, const F: bool, const N: usize>(
     row: &[T; N],
     forcing_response: &[[[T; N]; N_BASIS]],
+    n: usize,
 ) -> [[T; N_BASIS]; MAX_ACTIVE] {
     let mut cubics = [[T::zero_(); N_BASIS]; MAX_ACTIVE];
     for (cubic, forcing_response) in cubics.iter_mut().zip(forcing_response) {
         for k in 0..N_BASIS {
-            cubic[k] = dot::<T, F, N>(row, &forcing_response[k]);
+            cubic[k] = dot::<T, F, N>(row, &forcing_response[k], n);
         }
     }
     cubics
@@ -465,6 +469,15 @@ impl<L: Copy, const N: usize> Propagator<L, N> {
     #[inline(always)]
     pub fn columns(&self) -> usize {
         if N <= 4 { N } else { self.states }
+    }
+}
+
+impl<L: KernelFloat, const N: usize> Propagator<L, N> {
+    /// Rows worth a product: all of plain numbers, which the processor takes together, those in use where a
+    /// number is a vector already.
+    #[inline(always)]
+    pub fn rows(&self) -> usize {
+        if L::DERIVATIVES { self.columns() } else { N }
     }
 }
 

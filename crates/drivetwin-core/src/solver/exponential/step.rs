@@ -63,7 +63,7 @@ pub fn step<L: KernelFloat, U: Coefficient<L>, const F: bool, const N: usize, co
     sampling.apply_linear::<F, U>(op, channels, sample, h, x);
     let expansion_points = sampling.extrapolate::<F>(channels, carry);
     sampling.predict::<F>(op, channels, carry, &expansion_points);
-    sampling.correct::<F>(channels, carry);
+    sampling.correct::<F>(op, channels, carry);
     *x = sampling.end;
     sampling.guard
 }
@@ -91,7 +91,7 @@ impl<L: KernelFloat, const N: usize, const A: usize> StepWork<L, N, A> {
         for drive in &op.inputs {
             let [u, du] = sample[drive.input];
             let u_end = du.times(h) + u;
-            for i in 0..N {
+            for i in 0..op.rows() {
                 s.end[i] = u.multiply_add::<F>(
                     drive.step[0][i],
                     du.multiply_add::<F>(drive.step[1][i], s.end[i]),
@@ -111,7 +111,7 @@ impl<L: KernelFloat, const N: usize, const A: usize> StepWork<L, N, A> {
             }
         }
         for j in 0..op.columns() {
-            for i in 0..N {
+            for i in 0..op.rows() {
                 s.end[i] = op.transition[j][i].fma::<F>(x[j], s.end[i]);
             }
             for a in 0..A {
@@ -193,7 +193,7 @@ impl<L: KernelFloat, const N: usize, const A: usize> StepWork<L, N, A> {
         carry: &mut [ChannelState<L>; A],
         expansion_points: &[[L; 2]; A],
     ) {
-        add_moments::<L, F, N, A, 0, N_START>(channels, &self.cubics, &mut self.end);
+        add_moments::<L, F, N, A, 0, N_START>(op, channels, &self.cubics, &mut self.end);
         for a in 0..A {
             let ChannelCoefficients { argument, argument_end, rate, law, .. } = &channels[a];
             let [predicted_argument, stiction] = expansion_points[a];
@@ -224,6 +224,7 @@ impl<L: KernelFloat, const N: usize, const A: usize> StepWork<L, N, A> {
     #[inline(always)]
     fn correct<const F: bool>(
         &mut self,
+        op: &Propagator<L, N>,
         channels: &[ChannelCoefficients<L, N>; A],
         carry: &mut [ChannelState<L>; A],
     ) {
@@ -253,7 +254,7 @@ impl<L: KernelFloat, const N: usize, const A: usize> StepWork<L, N, A> {
         for a in 0..A {
             missing[a][0] = carry[a].value.value - raised[a];
         }
-        add_moments::<L, F, N, A, N_START, N_END>(channels, &missing, &mut self.end);
+        add_moments::<L, F, N, A, N_START, N_END>(op, channels, &missing, &mut self.end);
         let mut early = [L::Values::splat(0.0); A];
         for a in 0..A {
             let ChannelCoefficients { argument_end, rate_end, .. } = &channels[a];
@@ -335,13 +336,14 @@ fn add_moments<
     const FROM: usize,
     const COUNT: usize,
 >(
+    op: &Propagator<L, N>,
     channels: &[ChannelCoefficients<L, N>; A],
     cubics: &[[L; COUNT]; A],
     end: &mut [L; N],
 ) {
     for k in 0..COUNT {
         for a in 0..A {
-            for i in 0..N {
+            for i in 0..op.rows() {
                 end[i] = channels[a].forcing_response[FROM + k][i].fma::<F>(cubics[a][k], end[i]);
             }
         }

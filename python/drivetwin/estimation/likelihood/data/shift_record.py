@@ -168,9 +168,18 @@ class ShiftRecord:
         return np.concatenate([out.values for out in self.outputs])
 
     def sample_run(self, run: Trajectory) -> FloatArray:
-        """Sample a trajectory (or a sensitivity) at the measured stamps; shape (size,)."""
+        """Sample a trajectory at the measured stamps; shape (size,)."""
         columns = get_columns(run)
         return np.concatenate([out.sample(run.time, columns[out.name]) for out in self.outputs])
+
+    def sample_derivatives(self, derivatives: Trajectory) -> FloatArray:
+        """Sample derivatives of a trajectory by p unknowns at the measured stamps; (size, p)."""
+        columns = get_columns(derivatives)
+        found = [
+            np.column_stack([out.sample(derivatives.time, one) for one in columns[out.name].T])
+            for out in self.outputs
+        ]
+        return np.concatenate(found)
 
     def sample_stamps(self, run: Trajectory) -> FloatArray:
         """Return a trajectory at the measured stamps whatever the samples are; shape (size,)."""

@@ -373,8 +373,8 @@ def _build_random(
 
 def _is_in_plant(at: OperatingPoint, effect: EffectId) -> bool:
     """Return whether the run itself has an effect, so that a column would count it twice."""
-    extension = at.part.structure.extension
-    return extension is not None and extension.effect is effect
+    own = at.part.structure.plant_effect
+    return own is not None and own.effect is effect
 
 
 def _build_known(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Disturbance, float]]:

@@ -139,8 +139,12 @@ def _describe_plant(
     fit: LikelihoodFit, plant: PlantEvidence, columns: int
 ) -> dict[Group, GroupEvidence]:
     """Describe the part that the plant has as a group without columns; its amount is its size."""
-    size = float(np.exp(fit.point.values[plant.index]))
-    std = size * float(np.sqrt(fit.covariance[plant.index, plant.index]))
+    own = fit.problem.parts[0].structure.plant_effect
+    assert own is not None, "the plant has an effect"
+    first = fit.point.values[plant.index]
+    size = own.get_size(float(first))
+    std = float(np.sqrt(fit.covariance[plant.index, plant.index]))
+    std *= 1.0 if own.is_signed else size
     amounts, stds = np.array([size]), np.array([std])
     answer = np.zeros(columns)
     return {Group(plant.effect): GroupEvidence(plant.nats, amounts, stds, (), answer, plant.moves)}

@@ -58,6 +58,8 @@ class Effect:
     power: float = 1.0
     curved: bool = False
     signed: bool = False
+    has_columns: bool = True
+    """False where no column at the minimum of the dual clutch describes the effect."""
     negative: str = ""
     """Meaning of a negative size, where its sign is not evident."""
 

@@ -23,4 +23,5 @@ EFFECT = Effect(
     "130 Hz with the gearbox held",
     "the mode moves k_o, c_o and J′: compare its frequency with that of the torsional damper",
     build,
+    has_columns=False,
 )

@@ -25,19 +25,21 @@ from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import SHOWN, expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import SIZES, GroupEvidence
-from drivetwin.estimation.likelihood.extension import (
-    DAMPING,
-    SHARE,
-    SIZE,
-    UNKNOWNS,
-    Extension,
-)
+from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
     PlantEvidence,
     compute_covariance,
 )
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.plant_effect import (
+    AMOUNT,
+    DAMPING,
+    SHARE,
+    SIZE,
+    UNKNOWNS,
+    PlantEffect,
+)
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import Group
@@ -70,7 +72,7 @@ class PlantSettings:
     damping_spread: float = 0.5
     """Prior standard deviation of its logarithm: 2 to 13 % hold 95 % [-]."""
     least_spread: float = 1e-3
-    """Least prior standard deviation of the logarithm of a size that is stated exactly [-]."""
+    """Least prior standard deviation of a size that is stated exactly, over the size [-]."""
 
 
 PLANT = PlantSettings()
@@ -91,10 +93,6 @@ class Minimum(Protocol):
     @property
     def normal(self) -> NormalEquations:
         """Expansion of Q there."""
-
-
-BY_EVIDENCE = (EffectId.BACKLASH,)
-"""Effects that are tried in the plant where their columns show them."""
 
 
 def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
@@ -133,24 +131,27 @@ def get_nats(fit: LikelihoodFit) -> float:
 def _iterate_refits(
     fit: LikelihoodFit, evidence: Mapping[Group, GroupEvidence], priors: EffectPriors
 ) -> Iterator[LikelihoodFit]:
-    """Yield the refits that end at a minimum.
+    """Yield the refits that end at a minimum, one for each effect.
 
-    The mode of the input side has no columns and is always tried, an effect of `BY_EVIDENCE` where
-    its columns have enough evidence.
+    An effect is tried where its columns have enough evidence, or where none of its columns could
+    show it.
     """
     driveline = fit.problem.parts[0].structure.driveline
-    tried = {EffectId.INPUT_SHAFT_MODE: None} | {
-        effect: float(abs(found.amounts[0]))
-        for effect in BY_EVIDENCE
-        if (found := evidence.get(Group(effect))) is not None and found.nats > PLANT.evidence
-    }
     plans: list[tuple[EffectId, tuple[PriorValue, ...], list[float]]] = []
-    for effect, amount in tried.items():
+    for effect in UNKNOWNS:
         stated = priors.get_prior(effect, driveline)
-        if stated.std > 0.0 or stated.value:
+        if not (stated.std > 0.0 or stated.value):
+            continue
+        if not EFFECTS[effect].has_columns:
             own = build_plant_priors(effect, priors, driveline)
-            starts = _list_starts(own[0]) if amount is None else [np.log(amount * stated.std)]
-            plans.append((effect, own, [float(start) for start in starts]))
+            plans.append((effect, own, _list_starts(own[0])))
+            continue
+        amount = _find_amount(effect, evidence)
+        if amount:
+            own = build_plant_priors(effect, priors, driveline, amount)
+            size = amount * stated.std
+            start = size if UNKNOWNS[effect][0] == AMOUNT else float(np.log(abs(size)))
+            plans.append((effect, own, [start]))
     stages, numbers = _STAGES.repeat("refit", sum(len(one[2]) for one in plans) - 1), count()
     for effect, own, starts in plans:
         refits = []
@@ -162,17 +163,32 @@ def _iterate_refits(
         yield from sorted((one for one in refits if one), key=get_nats)[-1:]
 
 
+def _find_amount(effect: EffectId, evidence: Mapping[Group, GroupEvidence]) -> float:
+    """Return the amount of an effect, in prior standard deviations, by its likeliest column; 0
+    where its columns have too little evidence."""
+    groups = [one for group, one in evidence.items() if group.effect is effect]
+    best = max(groups, key=lambda one: one.nats, default=None)
+    return float(best.amounts[0]) if best and best.nats > PLANT.evidence else 0.0
+
+
 def _list_starts(prior: PriorValue) -> list[float]:
     """Return the initial values of the logarithm of a mode's frequency."""
     return [prior.value + start * prior.std for start in PLANT.starts]
 
 
 def build_plant_priors(
-    effect: EffectId, priors: EffectPriors, driveline: KnownDriveline
+    effect: EffectId, priors: EffectPriors, driveline: KnownDriveline, amount: float = 1.0
 ) -> tuple[PriorValue, ...]:
-    """Build the priors of the unknowns of a part; the size is about its stated value, else about
-    its usual one."""
-    own = {SIZE: _build_size_prior(effect, priors.get_prior(effect, driveline))}
+    """Build the priors of the unknowns of a part.
+
+    The logarithm of a size is about its stated value, else about its usual one. The spread of a
+    signed size grows to the `amount` [prior standard deviations] that its columns show, as the
+    prior of the amount does by the evidence.
+    """
+    prior = priors.get_prior(effect, driveline)
+    own = {SIZE: _build_size_prior(effect, prior)}
+    spread = max(prior.std * max(1.0, abs(amount)), PLANT.least_spread * abs(prior.value))
+    own[AMOUNT] = PriorValue(prior.value, spread)
     own[SHARE] = PriorValue(PLANT.share, PLANT.share_std)
     own[DAMPING] = PriorValue(float(np.log(PLANT.damping)), PLANT.damping_spread)
     return tuple(own[key] for key in UNKNOWNS[effect])
@@ -195,10 +211,11 @@ def extend_problem(
     """Add an effect to the plant; its unknowns come last, at the means of their `priors`."""
     outputs = [out for part in problem.parts for out in part.record.outputs]
     full = max(float(np.max(np.abs(o.values))) for o in outputs if o.name == OUTPUT_TORQUE)
-    extension = Extension(effect, full)
+    torques = [part.record.engine_torque.values for part in problem.parts]
+    own = PlantEffect(effect, full, max(float(np.max(np.abs(one))) for one in torques))
     values = np.append(point.values, [one.value for one in priors])
-    extended = ParameterVector((*point.names, *extension.unknowns), values)
-    return problem.extend(extension, priors), extended
+    extended = ParameterVector((*point.names, *own.unknowns), values)
+    return problem.extend(own, priors), extended
 
 
 def _refit(
@@ -206,7 +223,7 @@ def _refit(
 ) -> LikelihoodFit | None:
     """Fit with an effect in the plant, with the weighting of `fit`; None without a minimum.
 
-    `start` is the logarithm of the size.
+    `start` is the first unknown of the part.
     """
     problem, point = extend_problem(fit.problem, fit.point, effect, priors)
     values, index = point.values.copy(), fit.point.values.size
@@ -229,15 +246,15 @@ def compare_plants(
     Both have the same weighting, so Q alone counts. `chi2` is the residual power per sample,
     `priors` are those of the unknowns of the part.
     """
-    extension = extended.problem.parts[0].structure.extension
-    assert extension is not None, "the plant has a part"
+    own = extended.problem.parts[0].structure.plant_effect
+    assert own is not None, "the plant has an effect"
     fall = plain.normal.cost - extended.normal.cost
     volume = _compute_log_determinant(plain.normal) - _compute_log_determinant(extended.normal)
     spread = float(np.sum(np.log([one.std for one in priors])))
     index = plain.point.values.size
     moves = extended.point.values[:index] - plain.point.values
     return PlantEvidence(
-        extension.effect,
+        own.effect,
         0.5 * fall / max(chi2, 1.0) + 0.5 * volume - spread,
         np.append(moves, np.zeros(len(priors))),
         index,
@@ -277,7 +294,7 @@ def _widen(fit: LikelihoodFit, refits: list[LikelihoodFit], shown: float) -> Lik
     """
     covariance = fit.covariance
     for one in refits:
-        if one.plant is None or one.plant.effect in BY_EVIDENCE:
+        if one.plant is None or EFFECTS[one.plant.effect].has_columns:
             continue
         against = np.logaddexp(0.0, shown) if shown else 0.0
         weight = float(np.exp(-np.logaddexp(0.0, against - one.plant.nats)))

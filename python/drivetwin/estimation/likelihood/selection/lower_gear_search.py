@@ -132,7 +132,7 @@ def _compare(found: LikelihoodFit, priors: Sequence[PriorValue]) -> PlantEvidenc
 
     Where that cannot be simulated it counts as far as a search may be from the measurement.
     """
-    plain = found.problem.drop_extension()
+    plain = found.problem.drop_plant_effect()
     count = plain.lower.size
     start = ParameterVector(found.point.names[:count], found.point.values[:count])
     other = minimise(plain, start)

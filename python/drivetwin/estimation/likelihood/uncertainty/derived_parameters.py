@@ -19,7 +19,6 @@ from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, S
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import OVER_ETA, get_parameter_spec, make_law_id
-from drivetwin.simulation.added_part import get_part_values
 from drivetwin.simulation.dual_clutch import compute_series_inertia
 
 TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "drum", "mu_gain")
@@ -63,7 +62,7 @@ def compute_parameters(
         values |= {
             name: point[name] for name in structure.driveline.ratio_priors if name in point.names
         }
-    values |= get_part_values(first.build_part(point, first.build_model(point)))
+    values |= first.compute_part_values(point, first.build_model(point))
     return values if signals[0].scale_known else _rename_over_eta(values)
 
 

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""Driveline of a vehicle as elements of a network: dual clutch or whole gearbox, and its parts.
+
+    engine - (input shaft or converter) - gearbox - output shaft - final drive - (tyre) - vehicle
+
+Numbers may be variables; the elements then carry their derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, RoadLoad, ShiftElement
+from drivetwin.simulation.network import Element, build_element
+from drivetwin.simulation.vehicle_parts import NO_PARTS, InputShaft, OpenConverter, VehicleParts
+
+CRANK, ENGINE, INPUT, OUTPUT, AXLE, WHEEL, VEHICLE = (
+    *("crankshaft", "engine", "input gear", "output", "axle", "wheel", "vehicle"),
+)
+"""Nodes. ENGINE is the gearbox side of an input shaft or converter, CRANK its engine side."""
+SHAFT, INPUT_SHAFT, CONVERTER, WALK = "output shaft", "input shaft", "converter", "load walk"
+_LEAST_SPEED = 0.5
+"""Speed of the vehicle at the wheel [rad/s] below which a tyre is a damper."""
+
+
+@dataclass(frozen=True)
+class OutputSide:
+    """Shaft, final drive, vehicle and load behind a gearbox; fields as in `DualClutch`."""
+
+    k_o: float
+    c_o: float
+    i_f: float
+    J_v: float
+    load: RoadLoad
+
+    @classmethod
+    def from_model(cls, model: DualClutch) -> OutputSide:
+        """Select the output side of a model."""
+        return cls(model.k_o, model.c_o, model.i_f, model.J_v, model.load)
+
+
+def build_driveline(model: DualClutch, parts: VehicleParts = NO_PARTS) -> list[Element]:
+    """Build the elements of a dual clutch with parts.
+
+    Inputs are `ENGINE_TORQUE` [N m], the pressures [Pa] by shift element, and `WALK` [N m] where
+    the load has one.
+    """
+    loss = {"law": model.loss_law, "eta": model.eta}
+    return [
+        *build_engine_side(model.J1, parts),
+        build_element("gear", "i_in", a=ENGINE, b=INPUT, ratio=model.i_in, loss=loss),
+        build_element("inertia", "J2e", node=INPUT, inertia=model.J2e * model.i_in * model.i_in),
+        build_element("inertia", "J_out", node=OUTPUT, inertia=model.J_out),
+        *build_shaft(OutputSide.from_model(model), OUTPUT, parts),
+        *(one for each in model.elements for one in _build_path(each, model, parts)),
+        *build_vehicle(OutputSide.from_model(model), parts),
+    ]
+
+
+def build_engine_side(J1: float, parts: VehicleParts = NO_PARTS) -> list[Element]:
+    """Build the inertia J1 [kg m^2] with the engine torque, and what is in front of the gearbox."""
+    front, node, inertia = parts.front, ENGINE, J1
+    elements = []
+    if isinstance(front, InputShaft):
+        node, inertia = CRANK, J1 - front.inertia
+        fields = {"stiffness": front.stiffness, "damping": front.damping}
+        elements = [
+            build_element("inertia", "engine inertia", node=CRANK, inertia=front.inertia),
+            build_element("spring_damper", INPUT_SHAFT, a=CRANK, b=ENGINE, **fields),
+        ]
+    elif isinstance(front, OpenConverter):
+        node, ends = CRANK, {"pump": CRANK, "turbine": ENGINE}
+        elements = [
+            build_element("inertia", "engine inertia", node=CRANK, inertia=front.engine_inertia),
+            build_element("torque_converter", CONVERTER, **ends, map=asdict(front.converter)),
+        ]
+    return [
+        build_element("inertia", "J1", node=ENGINE, inertia=inertia),
+        build_element("torque", "engine", node=node, input=ENGINE_TORQUE),
+        *elements,
+        *_build_drag("input drag", ENGINE, parts.input_drag),
+    ]
+
+
+def get_side_nodes(name: str) -> tuple[str, str]:
+    """Return the nodes on both sides of a shift element."""
+    return f"{name} input side", f"{name} output side"
+
+
+def _build_path(element: ShiftElement, model: DualClutch, parts: VehicleParts) -> list[Element]:
+    """Build a shift element between its two ratios (eq. 15)."""
+    name, (driving, driven) = element.name, get_side_nodes(element.name)
+    fields: dict[str, Any] = {}
+    if name in parts.efficiency:
+        fields = {"loss": {"law": model.loss_law, "eta": parts.efficiency[name]}}
+    return [
+        build_element("gear", f"i_c {name}", a=INPUT, b=driving, ratio=element.i_c, **fields),
+        build_element(
+            "clutch",
+            name,
+            a=driving,
+            b=driven,
+            friction=dict(vars(element.friction)),
+            gain=element.gain,
+            p0=element.P0,
+            peak=element.peak,
+            pressure=name,
+            drum_inertia=element.drum_inertia,
+        ),
+        build_element("gear", f"i_out {name}", a=driven, b=OUTPUT, ratio=element.i_out),
+    ]
+
+
+def build_shaft(side: OutputSide, output: str, parts: VehicleParts = NO_PARTS) -> list[Element]:
+    """Build the output shaft behind the node `output`, the final drive and the wheel."""
+    fields: dict[str, Any] = {"a": output, "b": AXLE, "damping": side.c_o}
+    table = parts.shaft_table
+    if table is not None:
+        curve = {"twist": list(table.twist), "torque": list(table.torque)}
+        shaft = build_element("spring_table", SHAFT, **fields, **curve)
+    elif parts.gap > 0.0:
+        shaft = build_element("backlash", SHAFT, **fields, stiffness=side.k_o, gap=parts.gap)
+    else:
+        shaft = build_element("spring_damper", SHAFT, **fields, stiffness=side.k_o)
+    inertia = side.J_v if parts.tyre is None else parts.tyre.rim_inertia
+    return [
+        shaft,
+        build_element("gear", "i_f", a=AXLE, b=WHEEL, ratio=side.i_f),
+        build_element("inertia", "J_v", node=WHEEL, inertia=inertia),
+        *_build_drag("brake drag", WHEEL, parts.brake_drag),
+    ]
+
+
+def build_vehicle(side: OutputSide, parts: VehicleParts = NO_PARTS) -> list[Element]:
+    """Build the load at the wheel, or the vehicle with its load behind a tyre."""
+    body, tyre = WHEEL, parts.tyre
+    elements = []
+    if tyre is not None:
+        body, inertia = VEHICLE, side.J_v - tyre.rim_inertia
+        fields = {"slip_stiffness": tyre.slip_stiffness, "least_speed": _LEAST_SPEED}
+        elements = [
+            build_element("tyre", "tyre", a=WHEEL, b=VEHICLE, **fields),
+            build_element("inertia", "vehicle", node=VEHICLE, inertia=inertia),
+        ]
+    elements.append(build_element("road_load", "load", node=body, **vars(side.load)))
+    if parts.walk is not None:
+        elements.append(build_element("torque", WALK, node=body, input=WALK))
+    return elements
+
+
+def _build_drag(name: str, node: str, torque: float) -> Sequence[Element]:
+    """Build a Coulomb torque [N m] between a node and the ground; nothing without torque."""
+    if torque == 0.0:
+        return []
+    table = {"speed": [0.0, 1.0], "torque": [torque, torque], "peak": 1.0}
+    return [build_element("bearing", name, a=node, b="ground", **table)]

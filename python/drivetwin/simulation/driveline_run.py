@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""Runs of a driveline with parts, and their exact derivatives by any unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.simulation import dual_clutch
+from drivetwin.simulation.driveline import (
+    CRANK,
+    ENGINE,
+    OUTPUT,
+    SHAFT,
+    WALK,
+    WHEEL,
+    build_driveline,
+)
+from drivetwin.simulation.driveline_start import build_start
+from drivetwin.simulation.dual_clutch import (
+    ENGINE_TORQUE,
+    DualClutch,
+    Signal,
+    State,
+    Trajectory,
+)
+from drivetwin.simulation.network import NetworkRun, Output, Start, simulate
+from drivetwin.simulation.network_sensitivity import differentiate_variables
+from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
+
+
+@dataclass(frozen=True, eq=False)
+class DrivelineTask:
+    """A dual clutch with `parts`, its acting inputs, start, and the `time` (n,) [s] of the run.
+
+    `pressures` [Pa] are by shift element. The twist of `start` is the one that makes torque.
+    """
+
+    model: DualClutch
+    parts: VehicleParts
+    engine_torque: Signal
+    pressures: Mapping[str, Signal]
+    start: State
+    time: FloatArray
+
+    @property
+    def inputs(self) -> dict[str, Signal]:
+        """Inputs of the network by name."""
+        found = {**self.pressures, ENGINE_TORQUE: self.engine_torque}
+        if self.parts.walk is not None:
+            found[WALK] = Signal(self.parts.walk.time, -self.parts.walk.values)
+        return found
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the shift elements."""
+        return [one.name for one in self.model.elements]
+
+    def simulate(self) -> Trajectory:
+        """Simulate; a failed run returns its status.
+
+        Raises InputError where the description is inconsistent.
+        """
+        if self.parts is NO_PARTS:
+            inputs = (self.engine_torque, self.pressures, self.start, self.time)
+            return dual_clutch.simulate(self.model, *inputs)
+        run = simulate(
+            build_driveline(self.model, self.parts),
+            self.inputs,
+            self._build_start(),
+            self.time,
+            self._list_outputs(),
+        )
+        return build_trajectory(run, self.names)
+
+    def differentiate(self, count: int) -> tuple[Trajectory, Trajectory]:
+        """Simulate, and differentiate by the `count` unknowns of the variables in the task.
+
+        Returns
+        -------
+        tuple of Trajectory
+            The run, and the derivatives of its columns, (n, count) each.
+
+        Raises
+        ------
+        InputError
+            Where the description is inconsistent.
+        """
+        found = differentiate_variables(
+            build_driveline(self.model, self.parts),
+            self.inputs,
+            self._build_start(),
+            self.time,
+            self._list_outputs(),
+            count,
+        )
+        slopes = NetworkRun(self.time, found.derivatives, (), found.run.status, None)
+        return build_trajectory(found.run, self.names), build_trajectory(slopes, self.names)
+
+    def _list_outputs(self) -> list[Output]:
+        crank: list[Output] = [] if self.parts.front is None else [("speed", CRANK)]
+        return [*list_motion_outputs(self.names), *crank]
+
+    def _build_start(self) -> Start:
+        time = float(self.time[0])
+        return build_start(self.model, self.parts, self.start, self.engine_torque, time)
+
+
+def list_motion_outputs(elements: list[str], output: str = OUTPUT) -> list[Output]:
+    """List the outputs of a trajectory for the shift elements of these names.
+
+    `output` is the node of the gearbox output.
+    """
+    return [
+        *(("speed", node) for node in (ENGINE, output, WHEEL)),
+        ("twist", SHAFT),
+        ("shaft_torque", SHAFT),
+        *(("slip", name) for name in elements),
+        *(("friction_torque", name) for name in elements),
+    ]
+
+
+def build_trajectory(run: NetworkRun, elements: list[str], output: str = OUTPUT) -> Trajectory:
+    """Build the trajectory from a run with the outputs of `list_motion_outputs`."""
+    motion = run.columns
+    return Trajectory(
+        time=run.time,
+        engine_speed=motion["speed", ENGINE],
+        output_speed=motion["speed", output],
+        wheel_speed=motion["speed", WHEEL],
+        twist=motion["twist", SHAFT],
+        shaft_torque=motion["shaft_torque", SHAFT],
+        clutch_torque={name: motion["friction_torque", name] for name in elements},
+        slip={name: motion["slip", name] for name in elements},
+        events=run.events,
+        status=run.status,
+        audit=run.audit,
+        crank_speed=motion.get(("speed", CRANK)),
+    )
