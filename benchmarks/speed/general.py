@@ -11,13 +11,15 @@ import numpy as np
 from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality
 from benchmarks.speed.shift import PROGRAM
-from drivetwin.export.modelica.dual_clutch import build_network, build_network_start
 from drivetwin.gearbox import load_gearbox
 from drivetwin.gearbox import reduce as reduce_shift
-from drivetwin.gearbox.compare import SHAFT, WHEEL, build_dual_clutch_form, build_whole_gearbox
+from drivetwin.gearbox.compare import build_dual_clutch_form, build_whole_gearbox
 from drivetwin.gearbox.maneuver import build_signals, build_time_grid, plan
+from drivetwin.simulation.driveline import SHAFT, WHEEL, build_driveline
+from drivetwin.simulation.driveline_start import build_start
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.simulation.network import Element, Output, Start, simulate
+from drivetwin.simulation.vehicle_parts import NO_PARTS
 from reference import tables
 from reference.problem import ROOT, load
 from tests.support.upshift.scenario import OUTPUTS, Scenario
@@ -136,7 +138,13 @@ def plan_gearbox_shifts() -> dict[str, Scenario]:
             time,
             [*speeds, ("shaft_torque", SHAFT)],
         ),
-        FORM: Scenario(build_network(form), inputs, build_network_start(start), time, OUTPUTS),
+        FORM: Scenario(
+            build_driveline(form),
+            inputs,
+            build_start(form, NO_PARTS, start, torque, 0.0),
+            time,
+            OUTPUTS,
+        ),
     }
 
 

@@ -138,7 +138,7 @@ _SPECS = (
         "efficiency of a gear less that of the gear before it", -0.5, 0.5,
     ),
     ParameterSpec(
-        "input_drag", "input drag", "T_d", "N*m", "drag torque at the gearbox input", -1e5, 1e5,
+        "input_drag", "input drag", "T_d", "N*m", "drag torque at the gearbox input", -1e6, 1e6,
     ),
 )  # fmt: skip
 

@@ -40,12 +40,13 @@ def test_unknown_or_impossible_shifts_are_refused() -> None:
         build_subject(bare)
 
 
-def test_a_plant_with_a_part_is_refused() -> None:
+def test_modelica_takes_a_plant_with_parts_and_c_refuses_it() -> None:
     plain = twin()
     play = replace(plain.parameters["eta"], id="backlash", value=0.01)
     parted = replace(plain, parameters={**plain.parameters, "backlash": play})
-    with pytest.raises(InputError, match=r"backlash of 0\.01 rad"):
-        build_subject(parted)
+    assert "ElastoBacklash" in format_modelica(build_subject(parted))
+    with pytest.raises(InputError, match="hold the dual clutch alone"):
+        generate_twin_source(build_subject(parted))
     assert build_subject(parted.drop_part()).model == build_subject(plain).model
 
 

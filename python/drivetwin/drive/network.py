@@ -14,11 +14,18 @@ from drivetwin.drive.powertrain import Powertrain
 from drivetwin.errors import InputError
 from drivetwin.gearbox import Drive, Gearbox, build_network_elements, solve_gear
 from drivetwin.gearbox.spec import ElementKind
+from drivetwin.simulation.driveline import (
+    CRANK,
+    SHAFT,
+    WHEEL,
+    build_shaft,
+    build_vehicle,
+    require_own_nodes,
+)
 from drivetwin.simulation.network import Element, Output, Start, build_element
 
 ENGINE, CONVERTER = "map", "converter"
-CRANK, AXLE, WHEEL = "crankshaft", "axle beyond the shaft", "wheel of the vehicle"
-SHAFT, ROAD = "shaft to the axle", "rolling resistance"
+ROAD = "load"
 LOCK_UP, BRAKE = "lock-up", "service brake"
 """Friction elements beside those of the gearbox; the inputs of their names are the pressure [Pa]
 and the brake torque [N m]."""
@@ -39,10 +46,12 @@ def build_driveline_elements(gearbox: Gearbox, powertrain: Powertrain) -> list[E
             f"{gearbox.name} shifts with dogs ({', '.join(dogs)})",
             "choose a gearbox whose gears are made by clutches and brakes alone",
         )
+    gearing = build_network_elements(gearbox)
+    require_own_nodes(gearing)
     return [
         *_build_engine(powertrain, drive),
         *_build_converter(powertrain, gearbox.input),
-        *build_network_elements(gearbox),
+        *gearing,
         *_build_vehicle(powertrain, drive, gearbox.output),
     ]
 
@@ -76,16 +85,12 @@ def _build_converter(powertrain: Powertrain, turbine: str) -> list[Element]:
 
 
 def _build_vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]:
-    road = asdict(powertrain.road)
+    side = drive.build_output_side(powertrain.road)
     # A disc brake by its torque: unit gain and friction make the input a capacity in N m.
     unit = {"slip": [0.0], "mu": [1.0]}
     return [
-        build_element(
-            "spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o
-        ),
-        build_element("gear", "final drive", a=AXLE, b=WHEEL, ratio=drive.i_f),
-        build_element("inertia", "vehicle", node=WHEEL, inertia=drive.vehicle_inertia),
-        build_element("road_load", ROAD, node=WHEEL, **road),
+        *build_shaft(side, output),
+        *build_vehicle(side),
         build_element(
             "clutch",
             BRAKE,

@@ -11,17 +11,15 @@ import numpy as np
 from drivetwin.drive.network import (
     BRAKE,
     CONVERTER,
-    CRANK,
     ENGINE,
     PEDAL,
     ROAD,
-    SHAFT,
-    WHEEL,
     list_friction_elements,
 )
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schedule import Schedule
 from drivetwin.gearbox import Gearbox
+from drivetwin.simulation.driveline import CRANK, SHAFT, WHEEL
 from drivetwin.simulation.dual_clutch import EnergyAudit, Event, FloatArray
 from drivetwin.simulation.network import NetworkRun, Output
 

@@ -18,7 +18,6 @@ import numpy as np
 from drivetwin._util.progress import notify_progress
 from drivetwin.drive.network import (
     BRAKE,
-    CRANK,
     LOCK_UP,
     PEDAL,
     build_driveline_elements,
@@ -41,6 +40,7 @@ from drivetwin.drive.schedule import Knots, Schedule
 from drivetwin.drive.shift import CLOSE, FILL, OPEN, RAMP, ShiftPlan, compute_pressure
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, Reduction, reduce
+from drivetwin.simulation.driveline import CRANK
 from drivetwin.simulation.dual_clutch import FloatArray
 from drivetwin.simulation.network import NetworkRun, Output, simulate
 

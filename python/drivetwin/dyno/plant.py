@@ -21,6 +21,7 @@ from drivetwin.simulation.driveline import (
     build_engine_side,
     build_shaft,
     build_vehicle,
+    require_own_nodes,
 )
 from drivetwin.simulation.driveline_run import build_trajectory, list_motion_outputs
 from drivetwin.simulation.dual_clutch import (
@@ -91,10 +92,12 @@ class Plant:
     def _build_elements(self, model: DualClutch) -> list[Element]:
         loss = {"law": model.loss_law, "eta": model.eta}
         box, side = self.gearbox, OutputSide.from_model(model)
+        gearing = build_network_elements(box)
+        require_own_nodes(gearing)
         return [
             *build_engine_side(model.J1),
             build_element("gear", "losses", a=ENGINE, b=box.input, ratio=1.0, loss=loss),
-            *build_network_elements(box),
+            *gearing,
             *build_shaft(side, box.output),
             *build_vehicle(side),
         ]

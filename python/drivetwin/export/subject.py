@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from drivetwin.errors import InputError
 from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
 from drivetwin.simulation.dual_clutch import DualClutch, State
+from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 from drivetwin.twin.nominal_shift import build_nominal_shift
 from drivetwin.twin.twin import Twin
 
@@ -25,17 +27,25 @@ class Subject:
     """Origin of the numbers, one line."""
     delays: InputDelays = ACTING_INPUTS
     """Delays between the inputs of a log and the acting inputs."""
+    parts: VehicleParts = NO_PARTS
+    """Parts beside the model."""
+
+    def require_dual_clutch(self) -> None:
+        """Raise InputError for parts that the reduced form of C and FMU does not have."""
+        if self.parts is not NO_PARTS:
+            raise InputError(
+                f"C and FMU hold the dual clutch alone, and {self.name!r} also has other parts",
+                "export it as Modelica, or use --drop-part to leave them out",
+            )
 
 
 def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
     """The model of the shift between two gears of a twin; by default its first upshift.
 
     It starts in the old gear at the mean engine speed of the twin's logs, without acceleration.
-    Raises InputError for a shift that the twin does not have and for a plant with a part beside the
-    dual clutch, MissingParameterError where a
+    Raises InputError for a shift that the twin does not have, MissingParameterError where a
     parameter that the simulation needs was not identified.
     """
-    twin.require_dual_clutch("the export")
     shift = build_nominal_shift(twin, gears)
     model = twin.build_dual_clutch(shift)
     delays = InputDelays.from_twin(twin)
@@ -45,6 +55,7 @@ def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
         start=compute_steady_start(model, shift.offgoing, _compute_usual_speed(twin)),
         note=build_note(twin, delays),
         delays=delays,
+        parts=twin.build_parts(model),
     )
 
 

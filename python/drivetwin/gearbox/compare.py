@@ -14,6 +14,14 @@ from drivetwin.gearbox.maneuver import Maneuver, build_signals, build_time_grid,
 from drivetwin.gearbox.network import build_network_elements
 from drivetwin.gearbox.reduction import Reduction
 from drivetwin.gearbox.traces import CouplingError, Traces
+from drivetwin.simulation.driveline import (
+    SHAFT,
+    WHEEL,
+    build_engine_side,
+    build_shaft,
+    build_vehicle,
+    require_own_nodes,
+)
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
@@ -23,10 +31,9 @@ from drivetwin.simulation.dual_clutch import (
     State,
 )
 from drivetwin.simulation.dual_clutch import simulate as simulate_dual_clutch
-from drivetwin.simulation.network import Element, Start, build_element
+from drivetwin.simulation.network import Element, Start
 from drivetwin.simulation.network import simulate as simulate_network
 
-AXLE, WHEEL, SHAFT = "axle beyond the shaft", "wheel of the vehicle", "shaft to the axle"
 _COMPLETED = "completed"
 
 
@@ -91,7 +98,9 @@ def build_whole_gearbox(reduction: Reduction, maneuver: Maneuver) -> WholeGearbo
     gearbox = reduction.gearbox
     torque, pressures = build_signals(reduction, maneuver)
     dogs = [name for name in reduction.common if name in gearbox.dogs]
-    elements = [*build_network_elements(gearbox, dogs), *_build_surroundings(reduction, maneuver)]
+    gearing = build_network_elements(gearbox, dogs)
+    require_own_nodes(gearing)
+    elements = [*gearing, *_build_surroundings(reduction, maneuver)]
     names = [e["name"] for e in elements if e["type"] == "clutch"]
     zero = Signal(torque.time, np.zeros_like(torque.time))
     inputs = {ENGINE_TORQUE: torque} | {name: pressures.get(name, zero) for name in names}
@@ -128,23 +137,10 @@ def _simulate_whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: Floa
 
 def _build_surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
     """Engine, shaft, final drive, vehicle and load around the gearbox."""
-    drive, output = maneuver.drive, reduction.gearbox.output
-    engine = reduction.gearbox.engine_member
-    load = maneuver.load * drive.i_f
-    return [
-        build_element(
-            "inertia", "inertia of the engine", node=engine, inertia=drive.engine_inertia
-        ),
-        build_element("torque", "torque of the engine", node=engine, input=ENGINE_TORQUE),
-        build_element(
-            "spring_damper", SHAFT, a=output, b=AXLE, stiffness=drive.k_o, damping=drive.c_o
-        ),
-        build_element("gear", "drive to the wheel", a=AXLE, b=WHEEL, ratio=drive.i_f),
-        build_element(
-            "inertia", "inertia of the vehicle", node=WHEEL, inertia=drive.vehicle_inertia
-        ),
-        build_element("road_load", "load", node=WHEEL, constant=load, rolling=0.0, aero=0.0),
-    ]
+    drive, gearbox = maneuver.drive, reduction.gearbox
+    side = drive.build_output_side(RoadLoad(constant=maneuver.load * drive.i_f))
+    engine = build_engine_side(drive.engine_inertia, node=gearbox.engine_member)
+    return [*engine, *build_shaft(side, gearbox.output), *build_vehicle(side)]
 
 
 def build_dual_clutch_form(

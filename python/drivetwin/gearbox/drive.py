@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from drivetwin.simulation.driveline import OutputSide
+from drivetwin.simulation.dual_clutch import RoadLoad
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -28,3 +31,7 @@ class Drive:
     load: float
     torque_phase: float
     inertia_phase: float
+
+    def build_output_side(self, load: RoadLoad) -> OutputSide:
+        """Build the output side with a load at the wheel."""
+        return OutputSide(self.k_o, self.c_o, self.i_f, self.vehicle_inertia, load)

@@ -12,7 +12,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, RoadLoad, ShiftElement
+from drivetwin.simulation.element_schema import list_ports
 from drivetwin.simulation.network import Element, build_element
 from drivetwin.simulation.vehicle_parts import NO_PARTS, InputShaft, OpenConverter, VehicleParts
 
@@ -59,28 +61,33 @@ def build_driveline(model: DualClutch, parts: VehicleParts = NO_PARTS) -> list[E
     ]
 
 
-def build_engine_side(J1: float, parts: VehicleParts = NO_PARTS) -> list[Element]:
-    """Build the inertia J1 [kg m^2] with the engine torque, and what is in front of the gearbox."""
-    front, node, inertia = parts.front, ENGINE, J1
+def build_engine_side(
+    J1: float, parts: VehicleParts = NO_PARTS, node: str = ENGINE
+) -> list[Element]:
+    """Build the inertia J1 [kg m^2] with the engine torque, and the parts before the gearbox.
+
+    `node` is the one on which J1 turns.
+    """
+    front, gearbox, inertia = parts.front, node, J1
     elements = []
     if isinstance(front, InputShaft):
         node, inertia = CRANK, J1 - front.inertia
         fields = {"stiffness": front.stiffness, "damping": front.damping}
         elements = [
             build_element("inertia", "engine inertia", node=CRANK, inertia=front.inertia),
-            build_element("spring_damper", INPUT_SHAFT, a=CRANK, b=ENGINE, **fields),
+            build_element("spring_damper", INPUT_SHAFT, a=CRANK, b=gearbox, **fields),
         ]
     elif isinstance(front, OpenConverter):
-        node, ends = CRANK, {"pump": CRANK, "turbine": ENGINE}
+        node, ends = CRANK, {"pump": CRANK, "turbine": gearbox}
         elements = [
             build_element("inertia", "engine inertia", node=CRANK, inertia=front.engine_inertia),
             build_element("torque_converter", CONVERTER, **ends, map=asdict(front.converter)),
         ]
     return [
-        build_element("inertia", "J1", node=ENGINE, inertia=inertia),
+        build_element("inertia", "J1", node=gearbox, inertia=inertia),
         build_element("torque", "engine", node=node, input=ENGINE_TORQUE),
         *elements,
-        *_build_drag("input drag", ENGINE, parts.input_drag),
+        *_build_drag("input drag", gearbox, parts.input_drag),
     ]
 
 
@@ -148,6 +155,18 @@ def build_vehicle(side: OutputSide, parts: VehicleParts = NO_PARTS) -> list[Elem
     if parts.walk is not None:
         elements.append(build_element("torque", WALK, node=body, input=WALK))
     return elements
+
+
+def require_own_nodes(gearing: Sequence[Element]) -> None:
+    """Raise InputError where a gearbox has a node that belongs to the vehicle around it."""
+    used = {node for element in gearing for node in list_ports(element).values()}
+    taken = [node for node in (CRANK, AXLE, WHEEL, VEHICLE) if node in used]
+    if taken:
+        raise InputError(
+            f"{', '.join(map(repr, taken))}: a member of the gearbox has the name of a node of the "
+            "vehicle",
+            "rename the member on the gearbox card",
+        )
 
 
 def _build_drag(name: str, node: str, torque: float) -> Sequence[Element]:

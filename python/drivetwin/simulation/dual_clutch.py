@@ -109,8 +109,8 @@ class RoadLoad:
 
     def evaluate(self, wheel_speed: float) -> float:
         """Load torque at the wheel [N m] at a speed [rad/s] of either sign."""
-        turning = self.rolling * sign(wheel_speed)
-        return self.constant + turning + self.aero * wheel_speed * abs(wheel_speed)
+        square = self.aero * wheel_speed * abs(wheel_speed)
+        return self.constant + self.rolling * sign(wheel_speed) + square
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ Seeded = tuple[float, list[tuple[int, float]]]
 class Variable(float):
     """Number with its derivatives `slopes` (p,) by p unknowns.
 
-    Sums, products, quotients, powers and `exp` keep the derivatives; comparisons are those of the
+    Sums, products, quotients, powers, magnitudes and `exp` keep the derivatives; comparisons are those of the
     value. Anything else, such as a function of NumPy, returns the value alone.
     """
 
@@ -36,6 +36,9 @@ class Variable(float):
 
     def __neg__(self) -> Variable:
         return Variable(-float(self), -self.slopes)
+
+    def __abs__(self) -> Variable:
+        return -self if self < 0.0 else self
 
     def __add__(self, other: float) -> Variable:
         return _combine(self, other, float(self) + float(other), 1.0, 1.0)

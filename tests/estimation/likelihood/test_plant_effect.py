@@ -69,7 +69,7 @@ def test_derivatives_by_all_unknowns_are_exact(effect: EffectId) -> None:
     for k, name in enumerate(point.names):
         if name in ("te_delay", "te_offset"):
             continue
-        size = np.linalg.norm(slopes[:, k] / part.record.sigma)
+        size = float(np.linalg.norm(slopes[:, k] / part.record.sigma))
         step = 0.3 / size if size else 1e-3
         whole, half = (_difference(part, point, k, one) for one in (step, 0.5 * step))
         miss = np.linalg.norm(((4.0 * half - whole) / 3.0 - slopes[:, k]) / part.record.sigma)

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from drivetwin.export.modelica.dual_clutch import SHAFT, build_network, build_network_start
+from drivetwin.simulation.driveline import SHAFT, build_driveline
+from drivetwin.simulation.driveline_start import build_start
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
@@ -20,6 +21,7 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.simulation.network import Element, Output, Sine, Start
+from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.support.upshift.statement import Inputs, Problem, start
 
 _CLUTCHES = ("2", "3")
@@ -101,10 +103,12 @@ def build_signals(given: Inputs) -> dict[str, Signal]:
 
 def build_scenario(of: Problem, given: Inputs) -> Scenario:
     """Return the shift as a run of the network."""
+    model, signals = build_model(of), build_signals(given)
+    begin = float(given.time[0])
     return Scenario(
-        build_network(build_model(of)),
-        build_signals(given),
-        build_network_start(build_state(of, given)),
+        build_driveline(model),
+        signals,
+        build_start(model, NO_PARTS, build_state(of, given), signals[ENGINE_TORQUE], begin),
         given.time,
         OUTPUTS,
     )

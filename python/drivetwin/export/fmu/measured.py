@@ -34,10 +34,8 @@ def build_measured_subject(
     """Model of the first shift of a log between `gears` (None: any), and that shift's inputs.
 
     With `as_logged` the inputs are the log's own signals, and the model runs later by their delay.
-    Raises InputError for a plant with a part beside the dual clutch, NoShiftError where there is
-    no such shift, and what the validation of a shift raises.
+    Raises NoShiftError where there is no such shift, and what the validation of a shift raises.
     """
-    twin.require_dual_clutch("the export")
     found = require_shifts(log, twin.build_card()).shifts
     wanted = [one for one in found if gears in (None, (one.start_gear, one.end_gear))]
     if not wanted:
@@ -62,6 +60,7 @@ def build_measured_subject(
         start=get_start_state(shift),
         note=build_note(twin, delays),
         delays=delays,
+        parts=twin.build_parts(shift.model),
     )
     return subject, Experiment(f"shift {name} of {source}", time, inputs, DEFAULT_STEP)
 

@@ -464,15 +464,13 @@ impl<T: Number, const N: usize> Form<T, N> {
     }
 }
 
-impl<L: Copy, const N: usize> Propagator<L, N> {
+impl<L: KernelFloat, const N: usize> Propagator<L, N> {
     /// Columns worth a product: few are taken as they are, so that their loop unrolls.
     #[inline(always)]
     pub fn columns(&self) -> usize {
         if N <= 4 { N } else { self.states }
     }
-}
 
-impl<L: KernelFloat, const N: usize> Propagator<L, N> {
     /// Rows worth a product: all of plain numbers, which the processor takes together, those in use where a
     /// number is a vector already.
     #[inline(always)]
