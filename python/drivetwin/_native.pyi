@@ -21,6 +21,7 @@ __all__ = [
     "simulate_batch",
     "simulate_controlled",
     "simulate_network",
+    "solve_banded",
 ]
 
 _Array = NDArray[np.float64]
@@ -85,6 +86,7 @@ def batch_sensitivities(
     wanted: tuple[_Array, str],
     options: tuple[Sequence[_Output], int],
 ) -> tuple[_Ends, tuple[_Array, _Array, _Array, list[tuple[int, str]]]]: ...
+def solve_banded(factor: _Array, columns: _Array) -> _Array: ...
 def simulate_network(
     driveline: str,
     outputs: Sequence[_Output],

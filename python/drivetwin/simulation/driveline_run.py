@@ -26,8 +26,16 @@ from drivetwin.simulation.dual_clutch import (
     Trajectory,
 )
 from drivetwin.simulation.network import NetworkRun, Output, Start, simulate
-from drivetwin.simulation.network_sensitivity import differentiate_variables
+from drivetwin.simulation.network_sensitivity import NetworkTask
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
+
+COMPARED: Mapping[str, Output] = {
+    "output_torque": ("shaft_torque", SHAFT),
+    "engine_speed": ("speed", ENGINE),
+    "output_speed": ("speed", OUTPUT),
+    "wheel_speed": ("speed", WHEEL),
+}
+"""Outputs that a log is compared with, by the role of the channel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,29 +82,28 @@ class DrivelineTask:
         )
         return build_trajectory(run, self.names)
 
-    def differentiate(self, count: int) -> tuple[Trajectory, Trajectory]:
+    def differentiate(self, count: int) -> tuple[Trajectory, Mapping[Output, FloatArray]]:
         """Simulate, and differentiate by the `count` unknowns of the variables in the task.
 
         Returns
         -------
-        tuple of Trajectory
-            The run, and the derivatives of its columns, (n, count) each.
+        tuple of Trajectory and mapping
+            The run, and the derivatives (n, count) of `COMPARED`.
 
         Raises
         ------
         InputError
             Where the description is inconsistent.
         """
-        found = differentiate_variables(
+        task = NetworkTask(
             build_driveline(self.model, self.parts),
             self.inputs,
             self._build_start(),
             self.time,
             self._list_outputs(),
-            count,
         )
-        slopes = NetworkRun(self.time, found.derivatives, (), found.run.status, None)
-        return build_trajectory(found.run, self.names), build_trajectory(slopes, self.names)
+        found = task.differentiate(count, tuple(COMPARED.values()))
+        return build_trajectory(found.run, self.names), found.derivatives
 
     def _list_outputs(self) -> list[Output]:
         crank: list[Output] = [] if self.parts.front is None else [("speed", CRANK)]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -65,17 +65,71 @@ class NetworkSensitivities:
 
 
 @dataclass(frozen=True, eq=False)
-class _Task:
-    """Network with inputs and start, whose numbers may be variables."""
+class _Pass:
+    """Result of the core for the unknowns of one pass."""
+
+    values: FloatArray
+    events: list[tuple[float, str, str, float]]
+    status: str
+    slopes: list[FloatArray]
+    event_times: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkTask:
+    """Run of a network whose numbers may be variables; arguments as in `network.simulate`."""
 
     elements: Sequence[Element]
     inputs: Mapping[str, Signal | Sine]
     start: Start
     time: FloatArray
-    requests: Sequence[Request]
-    accuracy: Accuracy
+    outputs: Sequence[Output]
+    accuracy: Accuracy = field(default_factory=Accuracy)
 
-    def list_acting(self, count: int) -> list[int]:
+    def differentiate(
+        self, count: int, wanted: Sequence[Output] | None = None
+    ) -> NetworkSensitivities:
+        """Simulate, and differentiate by the unknowns of the variables.
+
+        Parameters
+        ----------
+        count
+            Number of unknowns; they are named by their numbers.
+        wanted
+            Outputs whose derivatives are formed, by default all.
+
+        Returns
+        -------
+        NetworkSensitivities
+            Run with derivatives (n, count) by output, SI.
+
+        Raises
+        ------
+        InputError
+            Where the description is inconsistent.
+        """
+        requests = resolve_outputs(self.elements, self.inputs, self.outputs)
+        acting = self._list_acting(count)
+        passes = [acting[k : k + LANES] for k in range(0, max(len(acting), 1), LANES)]
+        found = [self._run(requests, lanes) for lanes in passes]
+        events = tuple(Event(*event) for event in found[0].events)
+        values = combine_columns(requests, found[0].values)
+        columns = dict(zip(self.outputs, values, strict=True))
+        run = NetworkRun(self.time, columns, events, found[0].status, None)
+        kept = self.outputs if wanted is None else wanted
+        derivatives = {output: np.zeros((self.time.size, count)) for output in kept}
+        event_times = np.zeros((len(events), count))
+        for lanes, one in zip(passes, found, strict=True):
+            slopes = combine_columns(requests, one.slopes)
+            for output, column in zip(self.outputs, slopes, strict=True):
+                if output in derivatives:
+                    derivatives[output][:, lanes] = column[:, : len(lanes)]
+            if events:
+                event_times[:, lanes] = one.event_times[:, : len(lanes)]
+        unknowns = tuple(str(k) for k in range(count))
+        return NetworkSensitivities(run, unknowns, derivatives, event_times)
+
+    def _list_acting(self, count: int) -> list[int]:
         """List the unknowns, of `count`, that a number depends on."""
         delays = [one.delay for one in self.inputs.values() if isinstance(one, Signal)]
         acting = np.zeros(count, dtype=bool)
@@ -84,7 +138,7 @@ class _Task:
             acting |= one.slopes != 0.0
         return np.flatnonzero(acting).tolist()
 
-    def run(self, lanes: Sequence[int]) -> _Pass:
+    def _run(self, requests: Sequence[Request], lanes: Sequence[int]) -> _Pass:
         """Simulate with the derivatives by the unknowns of one pass."""
         sampled = {name: one for name, one in self.inputs.items() if isinstance(one, Signal)}
         samples = [
@@ -98,7 +152,7 @@ class _Task:
         try:
             found = network_sensitivities(
                 as_json(seed_description(self.elements, lanes)),
-                [one for request in self.requests for one in request.native],
+                [one for request in requests for one in request.native],
                 (samples, to_core_sines(self.inputs)),
                 (speeds, twists, as_names(self.start.locked)),
                 run_time(self.time),
@@ -108,17 +162,6 @@ class _Task:
             remedy = "correct the elements, their inputs or the start"
             raise InputError(str(error), remedy) from error
         return _Pass(*found)
-
-
-@dataclass(frozen=True, eq=False)
-class _Pass:
-    """Result of the core for the unknowns of one pass."""
-
-    values: FloatArray
-    events: list[tuple[float, str, str, float]]
-    status: str
-    slopes: list[FloatArray]
-    event_times: FloatArray
 
 
 def differentiate(
@@ -164,44 +207,9 @@ def differentiate(
     seeded = _Description(json.loads(as_json(elements)), dict(inputs), start)
     for path, derivative in slopes.items():
         seeded = seeded.place_variable(path, derivative)
-    found = differentiate_variables(
-        seeded.elements, seeded.inputs, seeded.start, time, outputs, len(named), accuracy
-    )
+    given = (seeded.elements, seeded.inputs, seeded.start, time, outputs)
+    found = NetworkTask(*given, accuracy or Accuracy()).differentiate(len(named))
     return replace(found, unknowns=tuple(named))
-
-
-def differentiate_variables(
-    elements: Sequence[Element],
-    inputs: Mapping[str, Signal | Sine],
-    start: Start,
-    time: FloatArray,
-    outputs: Sequence[Output],
-    count: int,
-    accuracy: Accuracy | None = None,
-) -> NetworkSensitivities:
-    """Simulate a network and differentiate its outputs by the unknowns of the variables in it.
-
-    `count` is the number of the unknowns, which are named by their numbers. Other arguments,
-    returns and raises are those of `differentiate`.
-    """
-    requests = resolve_outputs(elements, inputs, outputs)
-    task = _Task(elements, inputs, start, time, requests, accuracy or Accuracy())
-    acting = task.list_acting(count)
-    passes = [acting[k : k + LANES] for k in range(0, max(len(acting), 1), LANES)]
-    found = [task.run(lanes) for lanes in passes]
-    events = tuple(Event(*event) for event in found[0].events)
-    values = combine_columns(requests, found[0].values)
-    run = NetworkRun(time, dict(zip(outputs, values, strict=True)), events, found[0].status, None)
-    derivatives = {output: np.zeros((time.size, count)) for output in outputs}
-    event_times = np.zeros((len(events), count))
-    for lanes, one in zip(passes, found, strict=True):
-        columns = combine_columns(requests, one.slopes)
-        for output, column in zip(outputs, columns, strict=True):
-            derivatives[output][:, lanes] = column[:, : len(lanes)]
-        if events:
-            event_times[:, lanes] = one.event_times[:, : len(lanes)]
-    unknowns = tuple(str(k) for k in range(count))
-    return NetworkSensitivities(run, unknowns, derivatives, event_times)
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,13 +266,13 @@ def _find_place(element: dict[str, Any], fields: Sequence[str], path: str) -> tu
     """Return the group or list of an element with the number at `fields`, and its key there."""
     place: Any = {"": element}
     key: Any = ""
-    for field in fields:
+    for name in fields:
         place = place[key]
-        key = int(field) if isinstance(place, list) and field.isdigit() else field
+        key = int(name) if isinstance(place, list) and name.isdigit() else name
         known = range(len(place)) if isinstance(place, list) else place
         if not isinstance(place, dict | list) or key not in known:
-            hint = suggest_spelling(field, place) if isinstance(place, dict) else ""
-            raise InputError(f"unknown {path!r}: no field {field!r}{hint}", _HOW)
+            hint = suggest_spelling(name, place) if isinstance(place, dict) else ""
+            raise InputError(f"unknown {path!r}: no field {name!r}{hint}", _HOW)
     if not fields:
         raise InputError(f"unknown {path!r} names no field", _HOW)
     return place, key

@@ -22,8 +22,8 @@ Seeded = tuple[float, list[tuple[int, float]]]
 class Variable(float):
     """Number with its derivatives `slopes` (p,) by p unknowns.
 
-    Sums, products, quotients, powers, magnitudes and `exp` keep the derivatives; comparisons are those of the
-    value. Anything else, such as a function of NumPy, returns the value alone.
+    Sums, products, quotients, powers, magnitudes and `exp` keep the derivatives; comparisons are
+    those of the value. Functions of NumPy are refused.
     """
 
     slopes: FloatArray

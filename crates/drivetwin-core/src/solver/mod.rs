@@ -8,6 +8,7 @@
 //! `hybrid` holds modes, events and Taylor steps, `exponential` the propagators of whole input
 //! samples, `lockstep` several runs in the lanes of SIMD vectors.
 
+mod banded;
 mod cache;
 mod exponential;
 mod hybrid;
@@ -24,6 +25,7 @@ mod single;
 mod status;
 mod tolerances;
 
+pub use banded::BandedFactor;
 pub use cache::SolverCache;
 pub use exponential::plan::supports_fixed_step;
 pub use exponential::samples::{BLOCK, Samples};

@@ -21,6 +21,8 @@ from drivetwin.estimation.likelihood.data.input_smoothing import (
     smooth_pressure,
 )
 from drivetwin.estimation.likelihood.data.quantization import Quantization, estimate_quantization
+from drivetwin.simulation import network
+from drivetwin.simulation.driveline_run import COMPARED
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal, Trajectory
 from drivetwin.vehicle.spec import PriorValue
 
@@ -102,7 +104,10 @@ class Output:
         return replace(self, window=window, centre=centre)
 
     def sample(self, time: FloatArray, column: FloatArray) -> FloatArray:
-        """Sample a quantity (N,) on the grid `time` (N,) as this sensor does; shape (n,)."""
+        """Sample a quantity (N,) on the grid `time` (N,) as this sensor does; shape (n,).
+
+        Also several quantities, (N, k) to (n, k).
+        """
         if self.window == 0.0:
             return column[self.place]
         return self._compute_means(time, column, self.window)
@@ -116,8 +121,18 @@ class Output:
 
     def _compute_means(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
         """Compute means (n,) over the `window` [s] before each stamp."""
-        total = np.concatenate([[0.0], np.cumsum(0.5 * (column[1:] + column[:-1]) * np.diff(time))])
-        before = np.interp(time[self.place] - window, time, total)
+        step = np.diff(time)
+        if column.ndim > 1:
+            step = step[:, None]
+        sums = np.cumsum(0.5 * (column[1:] + column[:-1]) * step, axis=0)
+        total = np.concatenate([np.zeros_like(column[:1]), sums])
+        begin = time[self.place] - window
+        if column.ndim == 1:
+            before = np.interp(begin, time, total)
+        else:
+            after = np.clip(np.searchsorted(time, begin), 1, time.size - 1)
+            share = np.clip((begin - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
+            before = total[after - 1] + share[:, None] * (total[after] - total[after - 1])
         return np.asarray((total[self.place] - before) / window)
 
 
@@ -172,14 +187,11 @@ class ShiftRecord:
         columns = get_columns(run)
         return np.concatenate([out.sample(run.time, columns[out.name]) for out in self.outputs])
 
-    def sample_derivatives(self, derivatives: Trajectory) -> FloatArray:
-        """Sample derivatives of a trajectory by p unknowns at the measured stamps; (size, p)."""
-        columns = get_columns(derivatives)
-        found = [
-            np.column_stack([out.sample(derivatives.time, one) for one in columns[out.name].T])
-            for out in self.outputs
-        ]
-        return np.concatenate(found)
+    def sample_derivatives(self, derivatives: Mapping[network.Output, FloatArray]) -> FloatArray:
+        """Sample derivatives (N, p) of a trajectory at the measured stamps; (size, p)."""
+        columns = [derivatives[COMPARED[out.name]] for out in self.outputs]
+        pairs = zip(self.outputs, columns, strict=True)
+        return np.concatenate([out.sample(self.time, column) for out, column in pairs])
 
     def sample_stamps(self, run: Trajectory) -> FloatArray:
         """Return a trajectory at the measured stamps whatever the samples are; shape (size,)."""

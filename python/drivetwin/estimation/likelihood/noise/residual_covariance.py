@@ -30,6 +30,7 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_array
 
+from drivetwin._native import solve_banded
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.estimation.likelihood.noise.linear_response import (
@@ -150,6 +151,8 @@ class Whitener:
         """Expected disturbance of the state (4N,) or (4N, q), given residual columns."""
         variance = self.variance if columns.ndim == 1 else self.variance[:, None]
         pull = path.seen.T @ (columns / variance)
+        if columns.ndim > 1 and columns.shape[1] > 1:
+            return solve_banded(path.factor, np.ascontiguousarray(pull))
         return np.asarray(cho_solve_banded((path.factor, True), pull, check_finite=False))
 
 
@@ -171,6 +174,7 @@ def add_input_noise(model: DualClutch, record: ShiftRecord, response: LinearResp
         lower=True,
         check_finite=False,
     )
+    factor = np.ascontiguousarray(factor)
     path = NoisePath(response, power, inverse, _build_observation(model, record), factor, share)
     return Whitener(record.sigma**2, path)
 
