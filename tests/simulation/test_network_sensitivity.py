@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import Accuracy, Signal
+from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.network import (
     NetworkRun,
     Output,
@@ -162,36 +162,56 @@ def _simulate_network(net: RandomNetwork) -> NetworkRun:
     return simulate(net.elements, inputs, start, grid, outputs, accuracy=EXACT)
 
 
-def _extrapolate(net: RandomNetwork, path: str) -> Mapping[Any, tuple[Any, bool]] | None:
+@dataclass
+class _Count:
+    """Columns compared and left out, networks that graze at their start, and the worst error."""
+
+    compared: int = 0
+    left_out: int = 0
+    grazing: int = 0
+    worst: float = 0.0
+
+
+def _extrapolate(
+    net: RandomNetwork, base: NetworkRun, path: str
+) -> Mapping[Output, tuple[FloatArray, bool]]:
     """Estimate relative derivatives by differences of two steps, and whether both agree.
 
-    None where a changed start is refused or a changed run has other events.
+    They do not where a changed start is refused or a changed run has other events.
     """
-    slopes, kinds = [], set()
+    slopes = []
+    kinds = {(base.status, tuple((e.kind, e.element) for e in base.events))}
     for step in (1e-4, 5e-5):
         try:
             runs = [_simulate_network(_change(net, path, 1.0 + k * step)) for k in (1.0, -1.0)]
         except InputError:
-            return None
+            return {output: (np.zeros(1), False) for output in base.columns}
         kinds |= {(run.status, tuple((e.kind, e.element) for e in run.events)) for run in runs}
         ahead, behind = (run.columns for run in runs)
         slopes.append({o: (ahead[o] - behind[o]) / (2.0 * step) for o in ahead})
-    if len(kinds) > 1:
-        return None
     wide, narrow = slopes
     found = {}
     for output, values in narrow.items():
         best = (4.0 * values - wide[output]) / 3.0
         largest = float(np.max(np.abs(best)))
-        agree = float(np.max(np.abs(values - wide[output]))) < 1e-4 * largest
-        found[output] = (best, agree or largest < 1e-6)
+        near = float(np.max(np.abs(values - wide[output]))) <= 1e-6 * max(largest, 1e-2)
+        found[output] = (np.asarray(best), near and len(kinds) == 1)
     return found
 
 
-def test_random_networks_have_the_derivatives_of_differences() -> None:
-    """Columns on which two steps disagree are left out: another order of events is near."""
-    compared = left_out = 0
-    for seed in range(24):
+def _starts_at_a_corner(net: RandomNetwork) -> bool:
+    """Return whether an element starts without slip and is not among the locked ones."""
+    speeds = {**net.speeds, "ground": 0.0}
+    return any(
+        speeds[e["a"]] == speeds[e["b"]] and e["name"] not in net.locked
+        for e in net.elements
+        if e["type"] == "clutch"
+    )
+
+
+def _compare_networks(seeds: range) -> _Count:
+    count = _Count()
+    for seed in seeds:
         net = draw_plain_network(seed)
         unknowns = _list_unknowns(net)
         inputs = {name: Signal(*one) for name, one in net.inputs.items()}
@@ -199,21 +219,39 @@ def test_random_networks_have_the_derivatives_of_differences() -> None:
             base = _simulate_network(net)
         except InputError:
             continue
+        if _starts_at_a_corner(net):
+            count.grazing += 1
+            continue
         found = differentiate(
             net.elements, inputs, Start(net.speeds, {}, net.locked), base.time,
             list(base.columns), unknowns, accuracy=EXACT,
         )  # fmt: skip
         for k, path in enumerate(unknowns):
-            expected = _extrapolate(net, path)
             head, *fields = path.split(".")
             value = net.speeds[fields[0]] if head == "start" else _get_number(net, path)
-            for output, (best, agree) in (expected or {}).items():
-                compared, left_out = compared + agree, left_out + (not agree)
-                error = np.max(np.abs(found.derivatives[output][:, k] * value - best))
-                limit = 1e-5 * np.max(np.abs(best)) + 1e-7
-                assert not agree or error < limit, (seed, path, output)
-    assert compared > 500
-    assert left_out < 0.1 * compared
+            for output, (best, agree) in _extrapolate(net, base, path).items():
+                count.compared, count.left_out = (
+                    count.compared + agree,
+                    count.left_out + (not agree),
+                )
+                if agree:
+                    error = np.max(np.abs(found.derivatives[output][:, k] * value - best))
+                    # The round-off of a difference is about 1e-10 of the speeds.
+                    error = max(float(error) - 1e-7, 0.0) / max(float(np.max(np.abs(best))), 1e-9)
+                    count.worst = max(count.worst, error)
+    return count
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(24), pytest.param(range(24, 324), marks=pytest.mark.exhaustive)]
+)
+def test_random_networks_have_the_derivatives_of_differences(seeds: range) -> None:
+    """Columns on which two steps disagree are left out: another order of events is near."""
+    count = _compare_networks(seeds)
+    print(count)
+    assert count.worst < 1e-5
+    assert count.compared > 15 * len(seeds)
+    assert count.left_out < 0.1 * (count.compared + count.left_out)
 
 
 def _get_number(net: RandomNetwork, path: str) -> float:
