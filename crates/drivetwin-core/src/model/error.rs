@@ -19,7 +19,7 @@ pub enum ModelError {
         /// The offending value, SI.
         value: f64,
         /// Accepted values.
-        requirement: &'static str,
+        requirement: String,
     },
     /// A friction table or map has unequal lengths or does not increase.
     #[error("{element}: {table} {problem}")]
@@ -70,13 +70,13 @@ pub(crate) fn require<V: Values>(
     field: &'static str,
     value: V,
     accept: impl Fn(f64) -> bool,
-    requirement: &'static str,
+    requirement: &dyn fmt::Display,
 ) -> Result<(), ModelError> {
     if value.decide(|value| value.is_finite() && accept(value)) {
         Ok(())
     } else {
-        let value = value.leading();
-        Err(ModelError::Value { element: element.to_owned(), field, value, requirement })
+        let (element, requirement) = (element.to_owned(), requirement.to_string());
+        Err(ModelError::Value { element, field, value: value.leading(), requirement })
     }
 }
 
