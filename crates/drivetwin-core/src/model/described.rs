@@ -42,7 +42,8 @@ impl<T: Number> Described<T> for T {
         path.is_empty().then_some(self)
     }
 
-    #[inline]
+    // The range is a constant of each field: inlined, a check is one or two comparisons.
+    #[inline(always)]
     fn check_range(&self, element: &str, field: &Field) -> Result<(), ModelError> {
         require(element, field.name, self.re(), |value| field.limit.holds(value), field)
     }
@@ -60,7 +61,7 @@ impl<T, D: Described<T>> Described<T> for Option<D> {
         self.as_mut()?.number_mut(path)
     }
 
-    #[inline]
+    #[inline(always)]
     fn check_range(&self, element: &str, field: &Field) -> Result<(), ModelError> {
         self.as_ref().map_or(Ok(()), |part| part.check_range(element, field))
     }

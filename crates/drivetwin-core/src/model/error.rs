@@ -65,6 +65,7 @@ impl fmt::Display for ModelFaults {
 }
 
 /// Require a finite number that satisfies `accept`.
+#[inline(always)]
 pub(crate) fn require<V: Values>(
     element: &str,
     field: &'static str,
@@ -75,9 +76,20 @@ pub(crate) fn require<V: Values>(
     if value.decide(|value| value.is_finite() && accept(value)) {
         Ok(())
     } else {
-        let (element, requirement) = (element.to_owned(), requirement.to_string());
-        Err(ModelError::Value { element, field, value: value.leading(), requirement })
+        Err(refusal(element, field, value.leading(), requirement))
     }
+}
+
+/// Kept out of the checks, so that they are inlined.
+#[cold]
+fn refusal(
+    element: &str,
+    field: &'static str,
+    value: f64,
+    requirement: &dyn fmt::Display,
+) -> ModelError {
+    let (element, requirement) = (element.to_owned(), requirement.to_string());
+    ModelError::Value { element, field, value, requirement }
 }
 
 /// Require two flanges on different nodes.

@@ -79,7 +79,7 @@ impl Limit {
     pub const FINITE: Self = Self { least: None, above: None, most: None, not: &[] };
 
     /// Return true for an accepted value.
-    #[inline]
+    #[inline(always)]
     pub fn holds(&self, value: f64) -> bool {
         value.is_finite()
             && self.least.is_none_or(|least| value >= least)
