@@ -12,6 +12,7 @@ __all__ = [
     "TableScanner",
     "actuator_pressure",
     "batch_sensitivities",
+    "element_schema",
     "gear_statics",
     "linearise",
     "network_sensitivities",
@@ -97,6 +98,7 @@ def simulate_network(
     grid: _Array,
     options: _Options,
 ) -> _Run: ...
+def element_schema() -> str: ...
 def network_sensitivities(
     driveline: str,
     outputs: Sequence[_Output],

@@ -34,6 +34,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(actuator::actuator_pressure, module)?)?;
     module.add_function(wrap_pyfunction!(linear::linearise, module)?)?;
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
+    module.add_function(wrap_pyfunction!(network::element_schema, module)?)?;
     module.add_function(wrap_pyfunction!(network_sensitivity::network_sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::reduce_shift, module)?)?;

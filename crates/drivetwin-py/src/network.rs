@@ -63,6 +63,13 @@ pub fn simulate_network<'py>(
     Ok((columns, events, trajectory.status.to_string(), trajectory.audit.map(as_array)))
 }
 
+/// Schema of the elements as JSON: a list of types, each with its fields.
+#[pyfunction]
+pub fn element_schema() -> PyResult<String> {
+    let schema = drivetwin_core::model::element_schema();
+    serde_json::to_string(&schema).map_err(|e| PyValueError::new_err(e.to_string()))
+}
+
 /// Read the elements; where that fails one by one, so that a fault names its element.
 pub fn parse<T: DeserializeOwned>(elements: &str) -> PyResult<Driveline<T>> {
     if let Ok(elements) = serde_json::from_str(elements) {

@@ -53,8 +53,7 @@ pub fn network_sensitivities<'py>(
 }
 
 /// Inputs, start and grid.
-type Given<'py> =
-    ((Vec<Delayed<'py>>, Vec<Sine>), StartState, PyReadonlyArray1<'py, f64>);
+type Given<'py> = ((Vec<Delayed<'py>>, Vec<Sine>), StartState, PyReadonlyArray1<'py, f64>);
 
 fn differentiate<'py, const P: usize>(
     py: Python<'py>,

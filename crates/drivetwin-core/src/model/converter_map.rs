@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: MIT
 //! Steady-state map of a torque converter over the speed ratio (paper section "Driveline modeling").
 
+use super::declare::described;
 use super::error::ModelError;
-use serde::{Deserialize, Serialize};
 
-/// Pump torque `capacity(ν) ω_p²` and turbine torque `torque_ratio(ν) capacity(ν) ω_p²` over the speed
-/// ratio ν = ω_t / ω_p, both factors linear between points and held beyond the ends. Overrun is the
-/// part of the map with ν > 1, where the capacity is negative. A pump that turns backwards takes the
-/// opposite torques.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ConverterMap {
-    /// ν, increasing.
-    pub speed_ratio: Vec<f64>,
-    /// Pump torque over squared pump speed, N·m·s²/rad².
-    pub capacity: Vec<f64>,
-    /// Turbine torque over pump torque.
-    pub torque_ratio: Vec<f64>,
+described! {
+    /// Map of a torque converter over the speed ratio ν = ω_t / ω_p.
+    ///
+    /// Pump torque `capacity(ν) ω_p²` and turbine torque `torque_ratio(ν) capacity(ν) ω_p²`, both factors
+    /// linear between points and held beyond the ends. Overrun is the part of the map with ν > 1, where the
+    /// capacity is negative. A pump that turns backwards takes the opposite torques.
+    pub struct ConverterMap {
+        /// Speed ratio ν: at least two, increasing; overrun is the part beyond 1.
+        pub speed_ratio: Vec<f64> = Axis(),
+        /// Pump torque over squared pump speed; negative in overrun.
+        pub capacity: Vec<f64> = Axis("N·m·s²/rad²"),
+        /// Turbine torque over pump torque.
+        pub torque_ratio: Vec<f64> = Axis(),
+    }
 }
 
 /// One cell: `capacity = c0 + c1 ν`, `torque ratio = m0 + m1 ν` within a span of ν.

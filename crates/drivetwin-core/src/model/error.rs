@@ -19,7 +19,7 @@ pub enum ModelError {
         /// The offending value, SI.
         value: f64,
         /// Accepted values.
-        requirement: &'static str,
+        requirement: String,
     },
     /// A friction table or map has unequal lengths or does not increase.
     #[error("{element}: {table} {problem}")]
@@ -65,19 +65,31 @@ impl fmt::Display for ModelFaults {
 }
 
 /// Require a finite number that satisfies `accept`.
+#[inline(always)]
 pub(crate) fn require<V: Values>(
     element: &str,
     field: &'static str,
     value: V,
     accept: impl Fn(f64) -> bool,
-    requirement: &'static str,
+    requirement: &dyn fmt::Display,
 ) -> Result<(), ModelError> {
     if value.decide(|value| value.is_finite() && accept(value)) {
         Ok(())
     } else {
-        let value = value.leading();
-        Err(ModelError::Value { element: element.to_owned(), field, value, requirement })
+        Err(refusal(element, field, value.leading(), requirement))
     }
+}
+
+/// Kept out of the checks, so that they are inlined.
+#[cold]
+fn refusal(
+    element: &str,
+    field: &'static str,
+    value: f64,
+    requirement: &dyn fmt::Display,
+) -> ModelError {
+    let (element, requirement) = (element.to_owned(), requirement.to_string());
+    ModelError::Value { element, field, value, requirement }
 }
 
 /// Require two flanges on different nodes.

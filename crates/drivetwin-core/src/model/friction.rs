@@ -1,35 +1,42 @@
 // SPDX-License-Identifier: MIT
 //! μ over slip: the Stribeck law of a wet clutch (paper Figure 8), or a table.
 
-use super::error::{ModelError, require};
+use super::declare::described;
+use super::described::Described;
+use super::error::ModelError;
+use super::field::Field;
+use super::schema::FieldSchema;
 use crate::number::{INVERSE, Number, Series, TERMS, Values};
 use serde::{Deserialize, Serialize};
 
-/// `μ(s) = μ_c + (μ_s - μ_c) exp(-|s|/v_s) + μ_v |s|`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Stribeck<T> {
-    /// Level after the exponential has died out, 1.
-    pub mu_c: T,
-    /// Value at zero slip, 1.
-    pub mu_s: T,
-    /// Slip over which the exponential falls by e, rad/s. Must be > 0.
-    pub v_s: T,
-    /// Viscous slope, s/rad.
-    pub mu_v: T,
+described! {
+    /// Stribeck law of a wet clutch.
+    ///
+    /// `μ(s) = μ_c + (μ_s - μ_c) exp(-|s|/v_s) + μ_v |s|`.
+    pub struct Stribeck<T> {
+        /// Friction coefficient after the exponential has died out.
+        pub mu_c: T = Number().at_least(0.0),
+        /// Friction coefficient at zero slip.
+        pub mu_s: T = Number().at_least(0.0),
+        /// Slip over which the exponential falls by e.
+        pub v_s: T = Number("rad/s").above(0.0),
+        /// Viscous slope.
+        pub mu_v: T = Number("s/rad"),
+    }
 }
 
-/// μ linear between points of |slip|; beyond the last constant, or along the last piece.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FrictionTable<T> {
-    /// |slip|, rad/s, increasing from 0.
-    pub slip: Vec<f64>,
-    /// μ at each slip.
-    pub mu: Vec<T>,
-    /// True if the last piece continues beyond the last point.
-    #[serde(default)]
-    pub extend: bool,
+described! {
+    /// Friction coefficient μ linear between points of |slip|; beyond the last constant, or along the last
+    /// piece.
+    pub struct FrictionTable<T> {
+        /// |slip|, increasing from 0.
+        pub slip: Vec<f64> = Axis("rad/s").at_least(0.0),
+        /// Friction coefficient at each slip.
+        pub mu: Vec<T> = Numbers().at_least(0.0),
+        /// True if the last piece continues beyond the last point.
+        #[serde(default)]
+        pub extend: bool = Flag().absent("false"),
+    }
 }
 
 /// μ over |slip|.
@@ -81,22 +88,33 @@ impl<T: Number> Decay<T> {
     }
 }
 
-impl<T> FrictionLaw<T> {
-    /// Convert the law to another number type.
-    pub(crate) fn map<U>(&self, f: &impl Fn(&T) -> U) -> FrictionLaw<U> {
+impl<T: Number> Described<T> for FrictionLaw<T> {
+    type Over<U> = FrictionLaw<U>;
+
+    fn map<U>(&self, f: &impl Fn(&T) -> U) -> FrictionLaw<U> {
         match self {
-            Self::Stribeck(law) => FrictionLaw::Stribeck(Stribeck {
-                mu_c: f(&law.mu_c),
-                mu_s: f(&law.mu_s),
-                v_s: f(&law.v_s),
-                mu_v: f(&law.mu_v),
-            }),
-            Self::Table(table) => FrictionLaw::Table(FrictionTable {
-                slip: table.slip.clone(),
-                mu: table.mu.iter().map(f).collect(),
-                extend: table.extend,
-            }),
+            Self::Stribeck(law) => FrictionLaw::Stribeck(law.map(f)),
+            Self::Table(table) => FrictionLaw::Table(table.map(f)),
         }
+    }
+
+    fn number_mut(&mut self, path: &[&str]) -> Option<&mut T> {
+        match self {
+            Self::Stribeck(law) => law.number_mut(path),
+            Self::Table(table) => table.number_mut(path),
+        }
+    }
+
+    #[inline]
+    fn check_range(&self, element: &str, field: &Field) -> Result<(), ModelError> {
+        match self {
+            Self::Stribeck(law) => law.check_range(element, field),
+            Self::Table(table) => table.check_range(element, field),
+        }
+    }
+
+    fn alternatives() -> Vec<Vec<FieldSchema>> {
+        [Stribeck::<T>::alternatives(), FrictionTable::<T>::alternatives()].concat()
     }
 }
 
@@ -133,15 +151,10 @@ impl<T: Number> FrictionLaw<T> {
         }
     }
 
-    /// Refuse laws that are no friction: μ must be finite and not negative where it is tabulated.
+    /// Refuse tables that are no friction: μ must be finite and not negative where it is tabulated.
     pub(crate) fn check(&self, element: &str) -> Result<(), ModelError> {
         match self {
-            Self::Stribeck(law) => {
-                require(element, "mu_c", law.mu_c.re(), |v| v >= 0.0, ">= 0")?;
-                require(element, "mu_s", law.mu_s.re(), |v| v >= 0.0, ">= 0")?;
-                require(element, "mu_v", law.mu_v.re(), |_| true, "finite")?;
-                require(element, "v_s", law.v_s.re(), |v| v > 0.0, "> 0 rad/s")
-            }
+            Self::Stribeck(_) => Ok(()),
             Self::Table(table) => table.check(element),
         }
     }

@@ -1,33 +1,36 @@
 // SPDX-License-Identifier: MIT
 //! Losses as data sheets state them: tables over speed and torque.
 
+use super::declare::described;
 use super::error::ModelError;
 use super::torque_map::TorqueMap;
-use serde::{Deserialize, Serialize};
 
-/// Loss torque over speed and transmitted torque, bilinear between grid points. Below the first speed it falls
-/// in proportion to the speed, outside the grid the value at its border holds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LossTable {
-    /// Magnitude of the speed, rad/s, > 0 and increasing.
-    pub speed: Vec<f64>,
-    /// Torque that enters, N·m, increasing; positive where its power does. If none is negative, the table
-    /// holds for both directions of power.
-    pub torque: Vec<f64>,
-    /// Loss torque [N·m] by torque (rows) and speed (columns). Must be >= 0 and grow less than the torque.
-    pub loss: Vec<Vec<f64>>,
+described! {
+    /// Loss torque over speed and transmitted torque, bilinear between grid points.
+    ///
+    /// Below the first speed it falls in proportion to the speed, outside the grid the value at its border
+    /// holds.
+    pub struct LossTable {
+        /// Magnitude of the speed, increasing.
+        pub speed: Vec<f64> = Axis("rad/s").above(0.0),
+        /// Torque that enters, increasing; positive where its power does. If none is negative, the table
+        /// holds for both directions of power.
+        pub torque: Vec<f64> = Axis("N·m"),
+        /// Loss torque by torque (rows) and speed (columns). It must grow less than the torque.
+        pub loss: Vec<Vec<f64>> = Rows("N·m").at_least(0.0),
+    }
 }
 
-/// Drag torque over the slip of a clutch, linear between points; below the first in proportion to the slip,
-/// beyond the last constant.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DragTable {
-    /// Magnitude of the slip, rad/s, > 0 and increasing.
-    pub slip: Vec<f64>,
-    /// Drag torque, N·m. Must be >= 0.
-    pub torque: Vec<f64>,
+described! {
+    /// Drag torque over the slip of a clutch, linear between points.
+    ///
+    /// Below the first point it falls in proportion to the slip, beyond the last it is constant.
+    pub struct DragTable {
+        /// Magnitude of the slip, increasing.
+        pub slip: Vec<f64> = Axis("rad/s").above(0.0),
+        /// Drag torque at each slip.
+        pub torque: Vec<f64> = Axis("N·m").at_least(0.0),
+    }
 }
 
 impl LossTable {

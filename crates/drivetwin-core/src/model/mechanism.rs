@@ -24,6 +24,11 @@ pub enum LossLaw {
     Dissipative,
 }
 
+impl LossLaw {
+    /// Names in JSON.
+    pub const NAMES: &[&str] = &["paper", "dissipative"];
+}
+
 /// Loss of a constraint: the driven entries of its force row carry the efficiency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loss<T> {

@@ -5,16 +5,21 @@
 //! on an integrator.
 
 pub mod converter_map;
+mod declare;
+mod described;
 pub mod dual_clutch;
 pub mod elements;
 mod error;
+pub mod field;
 pub mod friction;
 pub mod loss_table;
 pub mod mechanism;
+pub mod schema;
 pub mod torque_map;
 
+pub use described::Described;
 pub use dual_clutch::DualClutch;
-pub use elements::Element;
+pub use elements::{Element, element_schema};
 pub use error::{ModelError, ModelFaults};
 pub use friction::{FrictionLaw, FrictionTable, Stribeck};
 pub use loss_table::{DragTable, LossTable};
@@ -22,6 +27,7 @@ pub use mechanism::Mechanism;
 
 use crate::number::Number;
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 
 /// Name of an element, a node or an input. Short ones stand in place: to compile a driveline, which is
 /// done anew for every run of a batch, takes few blocks of memory.
@@ -39,6 +45,22 @@ pub struct Driveline<T> {
 }
 
 impl<T: Number> Driveline<T> {
+    /// Convert all numbers.
+    pub fn map<U>(&self, f: &impl Fn(&T) -> U) -> Driveline<U> {
+        Driveline { elements: self.elements.iter().map(|element| element.map(f)).collect() }
+    }
+
+    /// Find a number by the name of its element and its path of fields: `B2.friction.mu_c`,
+    /// `B2.friction.mu.3` for a point of a table. Names may contain dots: the longest one counts.
+    pub fn number_mut(&mut self, path: &str) -> Option<&mut T> {
+        let fields_of =
+            |element: &Element<T>| path.strip_prefix(element.name().as_str())?.strip_prefix('.');
+        let named = self.elements.iter_mut().filter(|element| fields_of(element).is_some());
+        let element = named.max_by_key(|element| element.name().len())?;
+        let fields: SmallVec<[&str; 4]> = fields_of(element)?.split('.').collect();
+        element.number_mut(&fields)
+    }
+
     /// State every element's law; all faults of the description are reported together.
     pub fn mechanism(&self) -> Result<Mechanism<T>, ModelFaults> {
         let mut faults = Vec::new();
@@ -55,5 +77,12 @@ impl<T: Number> Driveline<T> {
             }
         }
         if faults.is_empty() { Ok(mechanism) } else { Err(ModelFaults(faults)) }
+    }
+}
+
+impl Driveline<f64> {
+    /// Convert the driveline to another number type.
+    pub fn promote<T: Number>(&self) -> Driveline<T> {
+        self.map(&|&value| T::of(value))
     }
 }

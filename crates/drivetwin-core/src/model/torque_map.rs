@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
 //! Torque over throttle and speed, bilinear between grid points (paper eq. 2).
 
+use super::declare::described;
 use super::error::ModelError;
-use serde::{Deserialize, Serialize};
 
-/// A steady-state engine map. Outside the grid the border cell's border value holds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TorqueMap {
-    /// Throttle positions, 1, increasing.
-    pub throttle: Vec<f64>,
-    /// Engine speeds, rad/s, increasing.
-    pub speed: Vec<f64>,
-    /// Torque [N·m] by throttle (rows) and speed (columns).
-    pub torque: Vec<Vec<f64>>,
+described! {
+    /// Steady-state map of an engine. Outside the grid the border value of the border cell holds.
+    pub struct TorqueMap {
+        /// Throttle positions, increasing.
+        pub throttle: Vec<f64> = Axis(),
+        /// Engine speeds, increasing.
+        pub speed: Vec<f64> = Axis("rad/s"),
+        /// Torque by throttle (rows) and speed (columns).
+        pub torque: Vec<Vec<f64>> = Rows("N·m"),
+    }
 }
 
 /// One cell: `t00 + t10 θ + t01 ω + t11 θ ω`, valid within the spans.

@@ -94,7 +94,7 @@ pub(super) fn check_names(
     }
 }
 
-fn place<'m, T>(
+fn place<'m, T: Number>(
     model: &'m mut DualClutch<T>,
     start: &'m mut DualClutchStart<T>,
     name: &str,

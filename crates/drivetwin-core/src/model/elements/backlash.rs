@@ -2,35 +2,34 @@
 //! A coupling with play.
 
 use crate::model::Name;
-use crate::model::error::{ModelError, require, require_apart};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_apart};
 use crate::model::mechanism::{Mechanism, Region, Spring, SpringLaw, Stop, TwistForm};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 
-/// No torque while the twist lies within the gap; beyond it a spring-damper that can only push.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Backlash<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Driving end.
-    pub a: Name,
-    /// Driven end.
-    pub b: Name,
-    /// N·m/rad. Must be > 0.
-    pub stiffness: T,
-    /// N·m·s/rad. Must be >= 0.
-    pub damping: T,
-    /// Total gap, rad. Must be >= 0.
-    pub gap: T,
+described! {
+    /// Coupling with play.
+    ///
+    /// No torque while the twist lies within the gap; beyond it a spring-damper that can only push.
+    pub struct Backlash<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Driving end.
+        pub a: Name = Node(),
+        /// Driven end, or the ground.
+        pub b: Name = Node(),
+        /// Stiffness in contact.
+        pub stiffness: T = Number("N·m/rad").above(0.0),
+        /// Damping in contact.
+        pub damping: T = Number("N·m·s/rad").at_least(0.0).preset(0.0),
+        /// Total play.
+        pub gap: T = Number("rad").at_least(0.0),
+    }
 }
 
 impl<T: Number> Backlash<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
-        require_apart(&self.name, &self.a, &self.b)?;
-        require(&self.name, "stiffness", self.stiffness.re(), |v| v > 0.0, "> 0 N m/rad")?;
-        require(&self.name, "damping", self.damping.re(), |v| v >= 0.0, ">= 0 N m s/rad")?;
-        require(&self.name, "gap", self.gap.re(), |v| v >= 0.0, ">= 0 rad")
+        require_apart(&self.name, &self.a, &self.b)
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {

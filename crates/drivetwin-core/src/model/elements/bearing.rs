@@ -2,36 +2,37 @@
 //! Dry and viscous friction of a bearing.
 
 use crate::model::Name;
-use crate::model::error::{ModelError, require, require_apart};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_apart};
 use crate::model::friction::{FrictionLaw, FrictionTable};
 use crate::model::mechanism::{Friction, Mechanism, Normal};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 
-/// Torque against the relative speed of `a` and `b` from a table over its magnitude; at rest up to
-/// `peak` times the first value is held.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Bearing<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Shaft.
-    pub a: Name,
-    /// Housing; the ground as a rule.
-    pub b: Name,
-    /// Relative speed, rad/s, increasing from 0; the last piece goes on beyond the table.
-    pub speed: Vec<f64>,
-    /// Friction torque, N·m. Must be >= 0.
-    pub torque: Vec<T>,
-    /// Static over kinetic torque at rest. Must be >= 1.
-    pub peak: T,
+described! {
+    /// Dry and viscous friction of a bearing.
+    ///
+    /// Torque against the relative speed of `a` and `b` from a table over its magnitude; at rest up to
+    /// `peak` times the first value is held.
+    pub struct Bearing<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Shaft.
+        pub a: Name = Node(),
+        /// Housing, as a rule the ground.
+        pub b: Name = Node().grounded(),
+        /// Relative speed, increasing from 0; the last piece goes on beyond the table.
+        pub speed: Vec<f64> = Axis("rad/s").at_least(0.0),
+        /// Friction torque at each speed.
+        pub torque: Vec<T> = Numbers("N·m").at_least(0.0),
+        /// Static over kinetic torque at rest.
+        pub peak: T = Number().at_least(1.0).preset(1.0),
+    }
 }
 
 impl<T: Number> Bearing<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
-        self.law().check(&self.name)?;
-        require(&self.name, "peak", self.peak.re(), |v| v >= 1.0, ">= 1")
+        self.law().check(&self.name)
     }
 
     fn law(&self) -> FrictionLaw<T> {

@@ -1,51 +1,47 @@
 // SPDX-License-Identifier: MIT
 //! A friction clutch, or a brake where one side is the ground (paper eqs. 4-6).
 
-use crate::model::error::{ModelError, require, require_apart};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_apart};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Friction, Inertia, Mechanism, Normal};
 use crate::model::{DragTable, Name};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 
-/// Slip `s = ω_a - ω_b`; torque `cap · Sgn(s)` on `b`, opposite on `a`;
-/// `cap = μ(|s|) · gain · max(0, P - P0)`, static `peak · μ(0) · gain · max(0, P - P0)`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Clutch<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Driving side.
-    pub a: Name,
-    /// Driven side, or the ground for a brake.
-    pub b: Name,
-    /// μ over |slip|.
-    pub friction: FrictionLaw<T>,
-    /// N·D·A·r: surfaces, de-rating, area, effective radius, m³. Must be >= 0.
-    pub gain: T,
-    /// Pressure at which the fill ends, Pa.
-    pub p0: T,
-    /// Static over kinetic capacity at zero slip. Must be >= 1.
-    pub peak: T,
-    /// Name of the pressure input, Pa.
-    pub pressure: Name,
-    /// Inertia that turns with the slip (a brake's drum in the dual-clutch picture,
-    /// THEORY section 2), kg·m². Must be >= 0.
-    pub drum_inertia: T,
-    /// Drag torque over the slip, beside the friction; none if absent.
-    #[serde(default)]
-    pub drag: Option<DragTable>,
+described! {
+    /// Friction clutch, or a brake where `b` is the ground.
+    ///
+    /// Slip `s = ω_a - ω_b`; torque `cap · Sgn(s)` on `b`, opposite on `a`;
+    /// `cap = μ(|s|) · gain · max(0, P - P0)`, static `peak · μ(0) · gain · max(0, P - P0)`.
+    pub struct Clutch<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Driving side.
+        pub a: Name = Node(),
+        /// Driven side, or the ground for a brake.
+        pub b: Name = Node(),
+        /// Friction coefficient over the magnitude of the slip.
+        pub friction: FrictionLaw<T> = Group(),
+        /// Product of surfaces, de-rating, area and effective radius.
+        pub gain: T = Number("m³").at_least(0.0).preset(1.0),
+        /// Pressure at which the fill ends.
+        pub p0: T = Number("Pa").preset(0.0),
+        /// Static over kinetic capacity at zero slip.
+        pub peak: T = Number().at_least(1.0).preset(1.0),
+        /// Name of the pressure input.
+        pub pressure: Name = Input("Pa"),
+        /// Inertia that turns with the slip (docs/theory.md, section 2), such as the drum of a brake.
+        pub drum_inertia: T = Number("kg·m²").at_least(0.0).preset(0.0),
+        /// Drag torque over the slip, beside the friction.
+        pub drag: Option<DragTable> = Group().absent("no drag"),
+    }
 }
 
 impl<T: Number> Clutch<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         self.friction.check(&self.name)?;
-        self.drag.as_ref().map_or(Ok(()), |drag| drag.check(&self.name))?;
-        require(&self.name, "gain", self.gain.re(), |v| v >= 0.0, ">= 0 m^3")?;
-        require(&self.name, "p0", self.p0.re(), |_| true, "finite")?;
-        require(&self.name, "peak", self.peak.re(), |v| v >= 1.0, ">= 1")?;
-        require(&self.name, "drum_inertia", self.drum_inertia.re(), |v| v >= 0.0, ">= 0 kg m^2")
+        self.drag.as_ref().map_or(Ok(()), |drag| drag.check(&self.name))
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {

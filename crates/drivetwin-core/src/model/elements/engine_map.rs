@@ -2,35 +2,34 @@
 //! An engine by its steady-state map over throttle and speed (paper eq. 2).
 
 use crate::model::Name;
-use crate::model::error::{ModelError, require, require_moving};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::model::torque_map::TorqueMap;
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 
-/// Torque on one node from a map over a throttle input and the node's speed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EngineMap<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Node of the crankshaft.
-    pub node: Name,
-    /// Name of the throttle input, 1.
-    pub throttle: Name,
-    /// Torque over throttle and speed.
-    pub map: TorqueMap,
-    /// Time constant with which the torque follows the map, s; at once if absent.
-    #[serde(default = "Option::default")]
-    pub lag: Option<T>,
+described! {
+    /// Engine by its steady-state map over throttle and speed.
+    ///
+    /// Torque on one node from a map over a throttle input and the speed of the node. With a lag it follows
+    /// the map by `lag · T' = map - T`, from T = 0 at the start.
+    pub struct EngineMap<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Node of the crankshaft.
+        pub node: Name = Node(),
+        /// Name of the throttle input.
+        pub throttle: Name = Input(),
+        /// Torque over throttle and speed.
+        pub map: TorqueMap = Group(),
+        /// Time constant with which the torque follows the map.
+        pub lag: Option<T> = Number("s").above(0.0).absent("none"),
+    }
 }
 
 impl<T: Number> EngineMap<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_moving(&self.name, &self.node)?;
-        if let Some(lag) = self.lag {
-            require(&self.name, "lag", lag.re(), |v| v > 0.0, "> 0 s")?;
-        }
         self.map.check(&self.name)
     }
 

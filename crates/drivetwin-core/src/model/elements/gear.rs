@@ -1,47 +1,33 @@
 // SPDX-License-Identifier: MIT
 //! A gear pair, with a lumped efficiency where stated (THEORY section 3).
 
-use crate::model::error::{ModelError, require, require_apart, require_moving};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_apart, require_moving};
 use crate::model::mechanism::{Constraint, Loss, LossLaw, Mechanism};
 use crate::model::{LossTable, Name};
 use crate::number::{Number, Values};
-use serde::{Deserialize, Serialize};
 
-/// Lumped efficiency of a gear.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GearLoss<T> {
-    /// Law by name.
-    pub law: LossLaw,
-    /// Efficiency with power from `a` to `b`. Must be > 0; at most 1.5, so that fits may stray.
-    pub eta: T,
-    /// Efficiency with power from `b` to `a`; as `eta` if absent. A low value makes the gear
-    /// self-locking.
-    #[serde(default = "Option::default")]
-    pub eta_backward: Option<T>,
-    /// Drag torque at `a` with power from `a` to `b`, N·m; none if absent. Must be >= 0.
-    #[serde(default = "Option::default")]
-    pub drag: Option<T>,
-    /// Drag torque at `a` with power from `b` to `a`, N·m; as `drag` if absent. Must be >= 0.
-    #[serde(default = "Option::default")]
-    pub drag_backward: Option<T>,
+described! {
+    /// Lumped efficiency of a gear.
+    pub struct GearLoss<T> {
+        /// Loss law: `paper` applies `eta` in either direction of power, `dissipative` by direction.
+        pub law: LossLaw = Text().one_of(LossLaw::NAMES),
+        // At most 1.5 rather than 1, so that a fit may pass through impossible values.
+        /// Efficiency with power from `a` to `b`.
+        pub eta: T = Number().above(0.0).at_most(1.5),
+        /// Efficiency with power from `b` to `a`. A low value makes the gear self-locking.
+        pub eta_backward: Option<T> = Number().above(0.0).at_most(1.5).absent("eta"),
+        /// Drag torque at `a` with power from `a` to `b`.
+        pub drag: Option<T> = Number("N·m").at_least(0.0).absent("0"),
+        /// Drag torque at `a` with power from `b` to `a`.
+        pub drag_backward: Option<T> = Number("N·m").at_least(0.0).absent("drag"),
+    }
 }
 
 impl<T: Number> GearLoss<T> {
     /// A loss by its efficiency alone.
     pub fn by_efficiency(law: LossLaw, eta: T) -> Self {
         Self { law, eta, eta_backward: None, drag: None, drag_backward: None }
-    }
-
-    fn check(&self, element: &str) -> Result<(), ModelError> {
-        let efficient = |v: f64| v > 0.0 && v <= 1.5;
-        require(element, "eta", self.eta.re(), efficient, "in (0, 1.5]")?;
-        let backward = self.eta_backward.unwrap_or(self.eta);
-        require(element, "eta_backward", backward.re(), efficient, "in (0, 1.5]")?;
-        for drag in [self.drag, self.drag_backward].into_iter().flatten() {
-            require(element, "drag", drag.re(), |v| v >= 0.0, ">= 0 N m")?;
-        }
-        Ok(())
     }
 
     fn state(&self, driving: usize) -> Loss<T> {
@@ -61,32 +47,29 @@ impl<T: Number> GearLoss<T> {
     }
 }
 
-/// `ω_a = ratio · ω_b`; the torque T_g that enters at `a` leaves at `b` as `ratio · φ(T_g)`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Gear<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Driving node.
-    pub a: Name,
-    /// Driven node.
-    pub b: Name,
-    /// Speed of `a` over speed of `b`. Must not be 0.
-    pub ratio: T,
-    /// Loss; none if absent.
-    #[serde(default = "Option::default")]
-    pub loss: Option<GearLoss<T>>,
-    /// Loss torque at `a` over its speed and the torque that enters there; taken off before
-    /// `loss`.
-    #[serde(default)]
-    pub losses: Option<LossTable>,
+described! {
+    /// Gear pair, with losses where stated.
+    ///
+    /// `ω_a = ratio · ω_b`; the torque T_g that enters at `a` leaves at `b` as `ratio · φ(T_g)`.
+    pub struct Gear<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Driving node.
+        pub a: Name = Node(),
+        /// Driven node.
+        pub b: Name = Node(),
+        /// Speed of `a` over speed of `b`.
+        pub ratio: T = Number().not(&[0.0]),
+        /// Lumped efficiency.
+        pub loss: Option<GearLoss<T>> = Group().absent("no loss"),
+        /// Loss torque at `a` over its speed and the torque that enters there; taken off before `loss`.
+        pub losses: Option<LossTable> = Group().absent("no loss"),
+    }
 }
 
 impl<T: Number> Gear<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
-        require(&self.name, "ratio", self.ratio.re(), |v| v != 0.0, "not 0")?;
-        self.loss.as_ref().map_or(Ok(()), |loss| loss.check(&self.name))?;
         let Some(losses) = &self.losses else { return Ok(()) };
         require_moving(&self.name, &self.a)?;
         losses.check(&self.name)

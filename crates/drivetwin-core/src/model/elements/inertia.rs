@@ -2,27 +2,28 @@
 //! A rotating mass.
 
 use crate::model::Name;
-use crate::model::error::{ModelError, require, require_moving};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_moving};
 use crate::model::mechanism::{self, Mechanism};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 
-/// Inertia on one node: `inertia · ω' = Σ torques`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Inertia<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Node it turns with.
-    pub node: Name,
-    /// kg·m². Must be >= 0.
-    pub inertia: T,
+described! {
+    /// Inertia on one node.
+    ///
+    /// `inertia · ω' = Σ torques`. Several inertias on one node add up.
+    pub struct Inertia<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Node it turns with.
+        pub node: Name = Node(),
+        /// Inertia.
+        pub inertia: T = Number("kg·m²").at_least(0.0),
+    }
 }
 
 impl<T: Number> Inertia<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
-        require_moving(&self.name, &self.node)?;
-        require(&self.name, "inertia", self.inertia.re(), |v| v >= 0.0, ">= 0 kg m^2")
+        require_moving(&self.name, &self.node)
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {

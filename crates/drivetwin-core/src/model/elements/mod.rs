@@ -33,9 +33,11 @@ pub use torque::Torque;
 pub use torque_converter::TorqueConverter;
 pub use tyre::Tyre;
 
-use super::Name;
 use super::error::ModelError;
+use super::field::Field;
 use super::mechanism::Mechanism;
+use super::schema::ElementSchema;
+use super::{Described, Name};
 use crate::number::Number;
 use serde::{Deserialize, Serialize};
 
@@ -56,13 +58,33 @@ macro_rules! elements {
 
             /// Refuse impossible values.
             pub fn check(&self) -> Result<(), ModelError> {
-                match self { $(Self::$kind(e) => e.check()),* }
+                match self {
+                    $(Self::$kind(e) => {
+                        e.check_range(&e.name, &Field::WHOLE)?;
+                        e.check()
+                    }),*
+                }
             }
 
             /// Add the element's law to the mechanism.
             pub fn state_law(&self, mechanism: &mut Mechanism<T>) {
                 match self { $(Self::$kind(e) => e.state_law(mechanism)),* }
             }
+
+            /// Convert all numbers.
+            pub fn map<U>(&self, f: &impl Fn(&T) -> U) -> Element<U> {
+                match self { $(Self::$kind(e) => Element::$kind(e.map(f))),* }
+            }
+
+            /// Find a number by its path of fields.
+            pub fn number_mut(&mut self, path: &[&str]) -> Option<&mut T> {
+                match self { $(Self::$kind(e) => e.number_mut(path)),* }
+            }
+        }
+
+        /// List the schemas of all elements.
+        pub fn element_schema() -> Vec<ElementSchema> {
+            vec![$(schema_of::<$kind<f64>>(stringify!($kind))),*]
         }
     };
 }
@@ -84,3 +106,8 @@ elements!(
     EngineMap,
     PrescribedSpeed,
 );
+
+fn schema_of<D: Described<f64>>(name: &str) -> ElementSchema {
+    let fields = D::alternatives().into_iter().flatten().collect();
+    ElementSchema::of(name, D::ABOUT, fields)
+}

@@ -1,47 +1,44 @@
 // SPDX-License-Identifier: MIT
 //! A planetary gear set.
 
+use crate::model::declare::described;
 use crate::model::error::{ModelError, require};
 use crate::model::mechanism::{Constraint, Inertia, Mechanism};
 use crate::model::{LossTable, Name};
 use crate::number::{Number, Values};
-use serde::{Deserialize, Serialize};
 
-/// `ω_sun + z ω_ring = (1 + z) ω_carrier` with z = teeth of ring over teeth of sun, negative for a
-/// dual-pinion set (Willis).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Planetary<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Node of the sun.
-    pub sun: Name,
-    /// Node of the ring.
-    pub ring: Name,
-    /// Node of the carrier.
-    pub carrier: Name,
-    /// Ring over sun teeth. Must not be 0 or -1.
-    pub z: T,
-    /// Spin inertia of all planets together about their own axes, kg·m²; none if absent. For single
-    /// pinions (z > 1), 0 for others. Their orbiting mass belongs to the carrier. Must be >= 0.
-    #[serde(default = "Option::default")]
-    pub planet_inertia: Option<T>,
-    /// Loss torque between sun and carrier over their relative speed and the torque that enters at the sun;
-    /// none if absent.
-    #[serde(default)]
-    pub losses: Option<LossTable>,
+described! {
+    /// Planetary gear set.
+    ///
+    /// `ω_sun + z ω_ring = (1 + z) ω_carrier` with z = teeth of ring over teeth of sun (Willis).
+    pub struct Planetary<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Node of the sun.
+        pub sun: Name = Node(),
+        /// Node of the ring.
+        pub ring: Name = Node(),
+        /// Node of the carrier.
+        pub carrier: Name = Node(),
+        /// Teeth of the ring over teeth of the sun; negative for a dual-pinion set.
+        pub z: T = Number().not(&[0.0, -1.0]),
+        /// Spin inertia of all planets together about their own axes. Only a set with single pinions (z > 1)
+        /// may have one. The orbiting mass of the planets belongs to the carrier.
+        pub planet_inertia: Option<T> = Number("kg·m²").at_least(0.0).absent("0"),
+        /// Loss torque between sun and carrier over their relative speed and the torque that enters at the
+        /// sun.
+        pub losses: Option<LossTable> = Group().absent("no loss"),
+    }
 }
 
 impl<T: Number> Planetary<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
-        require(&self.name, "z", self.z.re(), |z| z != 0.0 && z != -1.0, "neither 0 nor -1")?;
         self.losses.as_ref().map_or(Ok(()), |losses| losses.check(&self.name))?;
         let Some(spin) = self.planet_inertia else { return Ok(()) };
-        require(&self.name, "planet_inertia", spin.re(), |v| v >= 0.0, ">= 0 kg m^2")?;
         if spin.re().decide(|v| v == 0.0) {
             return Ok(());
         }
-        require(&self.name, "z", self.z.re(), |z| z > 1.0, "> 1 for a set with planet inertia")
+        require(&self.name, "z", self.z.re(), |z| z > 1.0, &"> 1 for a set with planet inertia")
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {

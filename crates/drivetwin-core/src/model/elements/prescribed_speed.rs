@@ -2,25 +2,27 @@
 //! A node that is driven at a given speed whatever torque that takes.
 
 use crate::model::Name;
+use crate::model::declare::described;
 use crate::model::error::{ModelError, require_moving};
 use crate::model::mechanism::{Mechanism, Prescribed};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
-/// `ω_node` equals an input. A friction element that would have to hold against it slips.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PrescribedSpeed<T> {
-    /// Unique name.
-    pub name: Name,
-    /// The node.
-    pub node: Name,
-    /// Name of the speed input, rad/s; it must not jump.
-    pub input: Name,
-    /// The element has no number of its own.
-    #[serde(skip)]
-    pub number: PhantomData<T>,
+described! {
+    /// Node that is driven at a given speed, whatever torque that takes.
+    ///
+    /// `ω_node` equals an input. A friction element that would have to hold against it slips.
+    pub struct PrescribedSpeed<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Node it drives.
+        pub node: Name = Node(),
+        /// Name of the speed input, which must not jump.
+        pub input: Name = Input("rad/s"),
+        /// The element has no number of its own.
+        #[serde(skip)]
+        pub number: PhantomData<T> = Hidden(),
+    }
 }
 
 impl<T: Number> PrescribedSpeed<T> {

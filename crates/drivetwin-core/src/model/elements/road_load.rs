@@ -2,34 +2,33 @@
 //! External resistance of the vehicle (paper eq. 9): grade, rolling, aerodynamic.
 
 use crate::model::Name;
-use crate::model::error::{ModelError, require, require_moving};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_moving};
 use crate::model::friction::FrictionLaw;
 use crate::model::mechanism::{Account, Force, ForceLaw, Friction, Mechanism, Normal};
 use crate::number::{Number, Values};
-use serde::{Deserialize, Serialize};
 
-/// Torque against positive speed: `constant + rolling · Sgn(ω) + aero · ω|ω|`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RoadLoad<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Node of the wheel.
-    pub node: Name,
-    /// Independent of the direction of motion (grade, dynamometer), N·m.
-    pub constant: T,
-    /// Rolling resistance, opposes the motion and holds the vehicle at rest, N·m. Must be >= 0.
-    pub rolling: T,
-    /// ½ ρ c_d A r³, N·m·s²/rad²; one below zero drives.
-    pub aero: T,
+described! {
+    /// External resistance of the vehicle: grade, rolling, aerodynamic.
+    ///
+    /// Torque against positive speed: `constant + rolling · Sgn(ω) + aero · ω|ω|`.
+    pub struct RoadLoad<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Node of the wheel.
+        pub node: Name = Node(),
+        /// Torque independent of the direction of motion: grade, dynamometer.
+        pub constant: T = Number("N·m").preset(0.0),
+        /// Rolling resistance; opposes the motion and holds the vehicle at rest.
+        pub rolling: T = Number("N·m").at_least(0.0).preset(0.0),
+        /// Aerodynamic coefficient ½ ρ c_d A r³; a negative one drives.
+        pub aero: T = Number("N·m·s²/rad²").preset(0.0),
+    }
 }
 
 impl<T: Number> RoadLoad<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
-        require_moving(&self.name, &self.node)?;
-        require(&self.name, "constant", self.constant.re(), |_| true, "finite")?;
-        require(&self.name, "rolling", self.rolling.re(), |v| v >= 0.0, ">= 0 N m")?;
-        require(&self.name, "aero", self.aero.re(), |_| true, "finite")
+        require_moving(&self.name, &self.node)
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {

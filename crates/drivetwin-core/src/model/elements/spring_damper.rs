@@ -2,32 +2,32 @@
 //! A compliant shaft (paper eq. 8).
 
 use crate::model::Name;
-use crate::model::error::{ModelError, require, require_apart};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_apart};
 use crate::model::mechanism::{Mechanism, Spring, SpringLaw};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 
-/// `twist' = ω_a - ω_b`; torque `k · twist + c · twist'` on `b`, opposite on `a`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SpringDamper<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Driving end.
-    pub a: Name,
-    /// Driven end.
-    pub b: Name,
-    /// N·m/rad. Must be >= 0.
-    pub stiffness: T,
-    /// N·m·s/rad. Must be >= 0.
-    pub damping: T,
+described! {
+    /// Compliant shaft.
+    ///
+    /// `twist' = ω_a - ω_b`; torque `k · twist + c · twist'` on `b`, opposite on `a`.
+    pub struct SpringDamper<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Driving end.
+        pub a: Name = Node(),
+        /// Driven end, or the ground.
+        pub b: Name = Node(),
+        /// Stiffness.
+        pub stiffness: T = Number("N·m/rad").at_least(0.0),
+        /// Damping.
+        pub damping: T = Number("N·m·s/rad").at_least(0.0).preset(0.0),
+    }
 }
 
 impl<T: Number> SpringDamper<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
-        require_apart(&self.name, &self.a, &self.b)?;
-        require(&self.name, "stiffness", self.stiffness.re(), |v| v >= 0.0, ">= 0 N m/rad")?;
-        require(&self.name, "damping", self.damping.re(), |v| v >= 0.0, ">= 0 N m s/rad")
+        require_apart(&self.name, &self.a, &self.b)
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {

@@ -2,33 +2,34 @@
 //! A compliant shaft whose stiffness depends on its twist.
 
 use crate::model::Name;
-use crate::model::error::{ModelError, require, require_apart};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_apart};
 use crate::model::mechanism::{Mechanism, Region, Spring, SpringLaw, Stop, TwistForm};
 use crate::number::{Number, Values};
-use serde::{Deserialize, Serialize};
 
-/// `twist' = ω_a - ω_b`; torque on `b` linear between points of the twist, plus `damping · twist'`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SpringTable<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Driving end.
-    pub a: Name,
-    /// Driven end.
-    pub b: Name,
-    /// Twist, rad, increasing through 0; the first and last piece go on beyond the table.
-    pub twist: Vec<f64>,
-    /// Torque, N·m, not falling; 0 at twist 0.
-    pub torque: Vec<T>,
-    /// N·m·s/rad. Must be >= 0.
-    pub damping: T,
+described! {
+    /// Compliant shaft whose stiffness depends on its twist.
+    ///
+    /// `twist' = ω_a - ω_b`; torque on `b` linear between points of the twist, plus `damping · twist'`.
+    pub struct SpringTable<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Driving end.
+        pub a: Name = Node(),
+        /// Driven end, or the ground.
+        pub b: Name = Node(),
+        /// Twist: at least two points, increasing through 0; the first and last piece go on beyond the table.
+        pub twist: Vec<f64> = Axis("rad"),
+        /// Torque at each twist, not falling; 0 at twist 0.
+        pub torque: Vec<T> = Numbers("N·m"),
+        /// Damping.
+        pub damping: T = Number("N·m·s/rad").at_least(0.0).preset(0.0),
+    }
 }
 
 impl<T: Number> SpringTable<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
-        require(&self.name, "damping", self.damping.re(), |v| v >= 0.0, ">= 0 N m s/rad")?;
         let fault = |problem| {
             let element = self.name.to_string();
             Err(ModelError::Table { element, table: "spring table", problem })

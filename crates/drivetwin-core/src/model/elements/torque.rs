@@ -2,28 +2,30 @@
 //! A prescribed torque, such as a measured engine torque or that of a motor between two shafts.
 
 use crate::model::Name;
+use crate::model::declare::described;
 use crate::model::error::{ModelError, require_apart, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
-/// Torque on a node from an input, N·m, positive with the speed; another node may take the reaction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Torque<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Node it acts on.
-    pub node: Name,
-    /// Node that takes the opposite torque; the ground or none for a torque from outside.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reaction: Option<Name>,
-    /// Name of the input.
-    pub input: Name,
-    /// The element has no number of its own.
-    #[serde(skip)]
-    pub number: PhantomData<T>,
+described! {
+    /// Prescribed torque, such as a measured engine torque or that of a motor between two shafts.
+    ///
+    /// Torque on a node from an input, N·m, positive with the speed; another node may take the reaction.
+    pub struct Torque<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Node it acts on.
+        pub node: Name = Node(),
+        /// Node that takes the opposite torque, as of a motor between two shafts.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub reaction: Option<Name> = Node().absent("from outside"),
+        /// Name of the torque input.
+        pub input: Name = Input("N·m"),
+        /// The element has no number of its own.
+        #[serde(skip)]
+        pub number: PhantomData<T> = Hidden(),
+    }
 }
 
 impl<T: Number> Torque<T> {

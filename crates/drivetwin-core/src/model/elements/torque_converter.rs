@@ -3,27 +3,29 @@
 
 use crate::model::Name;
 use crate::model::converter_map::ConverterMap;
+use crate::model::declare::described;
 use crate::model::error::{ModelError, require_apart, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
-/// Couples pump and turbine, in drive and in overrun; the lock-up clutch is a clutch beside it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TorqueConverter<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Node of the pump (impeller).
-    pub pump: Name,
-    /// Node of the turbine.
-    pub turbine: Name,
-    /// Steady-state map.
-    pub map: ConverterMap,
-    /// The map is data, not a number with derivatives.
-    #[serde(skip)]
-    pub number: PhantomData<T>,
+described! {
+    /// Hydrodynamic torque converter by its steady-state map.
+    ///
+    /// Couples pump and turbine, in drive and in overrun; the lock-up clutch is a clutch in parallel.
+    pub struct TorqueConverter<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Node of the pump (impeller).
+        pub pump: Name = Node(),
+        /// Node of the turbine.
+        pub turbine: Name = Node(),
+        /// Steady-state map.
+        pub map: ConverterMap = Group(),
+        /// The map has no number with derivatives.
+        #[serde(skip)]
+        pub number: PhantomData<T> = Hidden(),
+    }
 }
 
 impl<T: Number> TorqueConverter<T> {

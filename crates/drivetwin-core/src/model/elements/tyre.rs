@@ -2,34 +2,34 @@
 //! A tyre whose force grows linearly with its longitudinal slip, without relaxation.
 
 use crate::model::Name;
-use crate::model::error::{ModelError, require, require_apart, require_moving};
+use crate::model::declare::described;
+use crate::model::error::{ModelError, require_apart, require_moving};
 use crate::model::mechanism::{Account, Force, ForceLaw, Mechanism};
 use crate::number::Number;
-use serde::{Deserialize, Serialize};
 
-/// Torque `slip_stiffness · (ω_a - ω_b) / max(|ω_b|, least_speed)` on `b`, opposite on `a`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Tyre<T> {
-    /// Unique name.
-    pub name: Name,
-    /// Rim.
-    pub a: Name,
-    /// Vehicle, its speed over the rolling radius.
-    pub b: Name,
-    /// Torque over slip, N·m. Must be > 0.
-    pub slip_stiffness: T,
-    /// Speed of `b` below which the torque is that of a damper, rad/s. Must be > 0.
-    pub least_speed: f64,
+described! {
+    /// Tyre whose force grows linearly with its longitudinal slip, without relaxation.
+    ///
+    /// Torque `slip_stiffness · (ω_a - ω_b) / max(|ω_b|, least_speed)` on `b`, opposite on `a`.
+    pub struct Tyre<T> {
+        /// Unique name.
+        pub name: Name = Name(),
+        /// Rim.
+        pub a: Name = Node(),
+        /// Vehicle; its speed is that over the rolling radius.
+        pub b: Name = Node(),
+        /// Torque over slip.
+        pub slip_stiffness: T = Number("N·m").above(0.0),
+        /// Speed of `b` below which the torque is that of a damper.
+        pub least_speed: f64 = Constant("rad/s").above(0.0).preset(0.5),
+    }
 }
 
 impl<T: Number> Tyre<T> {
     pub(crate) fn check(&self) -> Result<(), ModelError> {
         require_apart(&self.name, &self.a, &self.b)?;
         require_moving(&self.name, &self.a)?;
-        require_moving(&self.name, &self.b)?;
-        require(&self.name, "slip_stiffness", self.slip_stiffness.re(), |v| v > 0.0, "> 0 N m")?;
-        require(&self.name, "least_speed", self.least_speed, |v| v > 0.0, "> 0 rad/s")
+        require_moving(&self.name, &self.b)
     }
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {

@@ -126,12 +126,7 @@ pub struct WaveResponse<T, const N: usize> {
 
 impl<T: Number, const N: usize> WaveResponse<T, N> {
     /// For a step over which the wave turns by at most [`MAX_WAVE_ANGLE`].
-    pub fn of<const F: bool>(
-        s: &PhiFunctions<T, N>,
-        force: &[T; N],
-        omega: f64,
-        n: usize,
-    ) -> Self {
+    pub fn of<const F: bool>(s: &PhiFunctions<T, N>, force: &[T; N], omega: f64, n: usize) -> Self {
         let mut parts = [[T::zero_(); N]; 2];
         for k in 0..2 {
             let first = apply::<T, F, N>(&s[1 + k], force, n);

@@ -307,7 +307,10 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
         let mut responses_to_waves = self.responses_to_waves::<F>(&s);
         let mut length = first;
         for _ in 0..doublings {
-            responses_to_waves.iter_mut().flatten().for_each(|wave| wave.double::<F>(&s, length, n));
+            responses_to_waves
+                .iter_mut()
+                .flatten()
+                .for_each(|wave| wave.double::<F>(&s, length, n));
             double_phi_functions::<T, F, N>(&mut s, length, n);
             length *= 2.0;
         }
