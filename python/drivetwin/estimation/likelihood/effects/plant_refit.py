@@ -98,8 +98,9 @@ class Minimum(Protocol):
 def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     """Choose the plant that the log supports; `fit` is that of the dual clutch.
 
-    A part is kept where the card states its size, or where its evidence is enough and no other
-    effect has more. Otherwise the covariance grows by the move that the part would cause, times its
+    A part is kept where the card states its size, or where its evidence is enough, no other effect
+    has more, and its own columns at the minimum of the dual clutch have clearly less: where they
+    describe it as well, they move the values as the plant would. Otherwise the covariance grows by the move that the part would cause, times its
     probability.
     """
     if not fit.problem.parts[0].scale_known or fit.plant is not None:
@@ -116,8 +117,9 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     own = best.plant.effect
     stated = priors.get_prior(own, fit.problem.parts[0].structure.driveline).value
     rivals = [one.nats for group, one in evidence.items() if group.effect not in (None, own)]
+    columns = [one.nats for group, one in evidence.items() if group.effect is own]
     most = max([0.0, *rivals])
-    if stated or best.plant.nats > max(PLANT.evidence, most):
+    if stated or best.plant.nats > max(PLANT.evidence, most, SHOWN + max(columns, default=0.0)):
         return best
     shown = most if most > SHOWN else 0.0
     return _widen(fit, [one for one in refits if one.plant is not None], shown)
