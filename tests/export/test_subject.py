@@ -17,6 +17,7 @@ from drivetwin.export.input_kind import InputKind
 from drivetwin.export.modelica.dual_clutch import format_modelica
 from drivetwin.export.subject import build_note, build_subject, compute_steady_start
 from drivetwin.simulation.dual_clutch import RoadLoad
+from drivetwin.simulation.vehicle_parts import VehicleParts
 from tests.export.cases import paper_model
 from tests.export.parameters.sample import twin
 
@@ -40,14 +41,24 @@ def test_unknown_or_impossible_shifts_are_refused() -> None:
         build_subject(bare)
 
 
-def test_modelica_takes_a_plant_with_parts_and_c_refuses_it() -> None:
+def test_modelica_holds_the_parts_and_c_names_them_as_left_out() -> None:
     plain = twin()
     play = replace(plain.parameters["eta"], id="backlash", value=0.01)
     parted = replace(plain, parameters={**plain.parameters, "backlash": play})
-    assert "ElastoBacklash" in format_modelica(build_subject(parted))
-    with pytest.raises(InputError, match="hold the dual clutch alone"):
-        generate_twin_source(build_subject(parted))
-    assert build_subject(parted.drop_part()).model == build_subject(plain).model
+    subject = build_subject(parted)
+    assert "ElastoBacklash" in format_modelica(subject)
+    assert "without backlash in the output shaft" in generate_twin_source(subject)
+    assert replace(subject.reduce(), note="") == replace(build_subject(plain), note="")
+
+
+def test_the_error_of_the_reduced_form_is_that_of_its_run() -> None:
+    """The torque goes through zero: with play it is late by the time that the gap takes."""
+    subject = replace(build_subject(twin()), parts=VehicleParts(gap=0.02))
+    time = np.linspace(0.0, 1.0, 1001)
+    torque = np.interp(time, [0.0, 0.3, 0.4, 1.0], [600.0, 600.0, -2500.0, -2500.0])
+    inputs = np.column_stack([torque, np.full(1001, 14e5), np.zeros(1001)])
+    assert 0.02 < subject.compute_reduction_error(time, inputs) < 1.0
+    assert subject.reduce().compute_reduction_error(time, inputs) == 0.0
 
 
 def test_rolling_resistance_opposes_the_motion() -> None:

@@ -11,7 +11,7 @@ import pytest
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingChannelError, MissingParameterError
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import TORQUE_LIKE
-from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import estimate_torques
 from drivetwin.observer.result import Band, FloatArray
@@ -55,6 +55,20 @@ def test_bands_hold_the_truth(bench: Bench, by: Observer, rmse: float, width: fl
         assert _deviates(band, truth) < 2.0, name
         assert np.sqrt(np.mean((band.value - truth) ** 2)) < rmse, name
         assert band.std.mean() < width, name
+
+
+def test_parts_of_the_twin_widen_the_bands_of_the_smoother(bench: Bench) -> None:
+    log = _without(bench.log, "output_torque")
+    plain = estimate_torques(bench.twin, log, bench.shift)
+    play = Estimate("tyre_slip", 0.004, 1e-4, Verdict.IDENTIFIED, "given")
+    reference = Estimate("shaft_reference", 5e3, 0.0, Verdict.IDENTIFIED, "given")
+    own = {**bench.twin.parameters, "tyre_slip": play, "shaft_reference": reference}
+    found = estimate_torques(replace(bench.twin, parameters=own), log, bench.shift)
+    assert "slip of the tyres" in found.notes[-1]
+    for name, band in found.bands.items():
+        assert band.value == pytest.approx(plain.bands[name].value)
+        assert np.all(band.std >= plain.bands[name].std)
+    assert np.max(found.output_torque.std) > 1.5 * np.max(plain.output_torque.std)
 
 
 def test_a_measured_output_torque_changes_nothing(bench: Bench) -> None:

@@ -124,14 +124,6 @@ def find_mapping(channels: Path | None, log: Path) -> Mapped:
     return read_project_mapping(log) if channels is None else read_mapping(channels)
 
 
-def load_plant(path: Path, *, drop_part: bool) -> Twin:
-    """Load a twin, with `drop_part` without the part of its plant beside the dual clutch."""
-    from drivetwin.files.twin_conversion import load_twin
-
-    twin = load_twin(path)
-    return twin.drop_part() if drop_part else twin
-
-
 def _load_twin_card(twin: Twin, vehicle: Path | None) -> VehicleCard:
     """Return the card in the file `vehicle`, without one the twin's own.
 

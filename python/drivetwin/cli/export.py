@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, DropPart, TwinFile, load_plant, read_twin_log
+from drivetwin.cli.arguments import ChannelsFile, TwinFile, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
 from drivetwin.cli.outputs import Output, Shape
 from drivetwin.errors import InputError, Where
@@ -108,7 +108,6 @@ def export(
         FmiVersion, typer.Option("--fmi", help="For fmu: version of the standard.")
     ] = FmiVersion.FMI2,
     platforms: _Platforms = None,
-    drop_part: DropPart = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Write the identified model for another program.
@@ -117,7 +116,9 @@ def export(
     components of the Standard Library. ssv, cdfx, dcm, m, json, csv: parameter files with units and
     intervals.
     """
-    model = load_plant(twin, drop_part=drop_part)
+    from drivetwin.files.twin_conversion import load_twin
+
+    model = load_twin(twin)
     path = output or Path(f"{twin.stem}.{to.ending}")
     load = partial(_load_subject, shift=shift, log=log, channels=channels, as_logged=as_logged)
     with show_step(f"writing {path.name}"):
@@ -128,14 +129,14 @@ def export(
                 subject, experiment = load(model)
                 write_c(subject, path)
                 _write_inputs(subject, experiment, inputs)
-                listed: dict[str, object] = {}
+                listed: dict[str, object] = _report_reduction(subject, experiment, as_json)
             case Target.FMU:
                 from drivetwin.export.fmu.build import BuildOptions, build_fmu
 
                 subject, experiment = load(model)
                 build_fmu(subject, path, BuildOptions(fmi, tuple(platforms or ()), experiment))
                 _write_inputs(subject, experiment, inputs)
-                listed = {"fmi": fmi.value}
+                listed = {"fmi": fmi.value, **_report_reduction(subject, experiment, as_json)}
             case Target.MODELICA:
                 from drivetwin.export.modelica.dual_clutch import write_modelica
 
@@ -154,6 +155,25 @@ def export(
         print_json({"file": str(path), **listed})
     else:
         print_line(f"wrote {path}")
+
+
+def _report_reduction(
+    subject: Subject, experiment: Experiment | None, as_json: bool
+) -> dict[str, object]:
+    """Report the parts that C and FMU leave out, and their error in the shift of the log."""
+    if not subject.part_names:
+        return {}
+    text = f"left out: {subject.part_names}"
+    listed: dict[str, object] = {"left_out": subject.part_names}
+    if experiment is None:
+        text += "; give a shift with --log to see the error"
+    else:
+        error = subject.compute_reduction_error(experiment.time, experiment.inputs)
+        listed["largest_error"] = error
+        text += f"; the output torque differs by up to {100.0 * error:.2g} % of its largest value"
+    if not as_json:
+        print_paragraph(text)
+    return listed
 
 
 def _write_inputs(subject: Subject, experiment: Experiment | None, path: Path | None) -> None:

@@ -12,11 +12,9 @@ import typer
 
 from drivetwin.cli.arguments import (
     ChannelsFile,
-    DropPart,
     LogFile,
     OptionalVehicleFile,
     TwinFile,
-    load_plant,
     read_twin_log,
 )
 from drivetwin.cli.output import (
@@ -63,7 +61,6 @@ def observe(
             ".html; repeatable.",
         ),
     ] = None,
-    drop_part: DropPart = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Estimate torques of output shaft and clutches in the shifts of a log, with 95 % bands.
@@ -71,11 +68,12 @@ def observe(
     The log needs no output torque; if it has one, it is not used.
     """
     from drivetwin._util.atomic import write_text
+    from drivetwin.files.twin_conversion import load_twin
     from drivetwin.observer.observe import estimate_torques
     from drivetwin.report.observer import render_observations
     from drivetwin.shifts.detect import require_shifts
 
-    model = load_plant(twin, drop_part=drop_part)
+    model = load_twin(twin)
     recording, card = read_twin_log(model, log, vehicle, channels)
     shifts = require_shifts(recording, card)
     found, left_out = _observe_shifts(

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from drivetwin.errors import InputError
+import numpy as np
+
 from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
-from drivetwin.simulation.dual_clutch import DualClutch, State
+from drivetwin.simulation.driveline_run import DrivelineTask
+from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, State
+from drivetwin.simulation.part_parameters import describe_parts
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 from drivetwin.twin.nominal_shift import build_nominal_shift
 from drivetwin.twin.twin import Twin
@@ -29,14 +32,40 @@ class Subject:
     """Delays between the inputs of a log and the acting inputs."""
     parts: VehicleParts = NO_PARTS
     """Parts beside the model."""
+    part_names: str = ""
+    """Names of the parts in words."""
 
-    def require_dual_clutch(self) -> None:
-        """Raise InputError for parts that the reduced form of C and FMU does not have."""
-        if self.parts is not NO_PARTS:
-            raise InputError(
-                f"C and FMU hold the dual clutch alone, and {self.name!r} also has other parts",
-                "export it as Modelica, or use --drop-part to leave them out",
-            )
+    def reduce(self) -> Subject:
+        """Return the dual clutch alone, as C and FMU hold it; the note names what is left out."""
+        if self.parts is NO_PARTS:
+            return self
+        note = f"{self.note}; without {self.part_names}" if self.note else self.part_names
+        return replace(self, parts=NO_PARTS, part_names="", note=note)
+
+    def compute_reduction_error(self, time: FloatArray, inputs: FloatArray) -> float:
+        """Compute the largest error of the output torque by the parts that `reduce` leaves out.
+
+        Parameters
+        ----------
+        time : (n,)
+            Instants [s].
+        inputs : (n, 3)
+            Engine torque [N m] and pressures [Pa] of both elements.
+
+        Returns
+        -------
+        float
+            Error over the largest output torque [-]; NaN where a run does not complete.
+        """
+        torque, *pressures = (Signal(time, column) for column in inputs.T)
+        names = (one.name for one in self.model.elements)
+        acting = dict(zip(names, pressures, strict=True))
+        whole, reduced = (
+            DrivelineTask(self.model, parts, torque, acting, self.start, time).simulate()
+            for parts in (self.parts, NO_PARTS)
+        )
+        error = np.max(np.abs(reduced.shaft_torque - whole.shaft_torque))
+        return float(error / np.max(np.abs(whole.shaft_torque)))
 
 
 def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
@@ -56,6 +85,7 @@ def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
         note=build_note(twin, delays),
         delays=delays,
         parts=twin.build_parts(model),
+        part_names=describe_parts(twin.part_values),
     )
 
 

@@ -87,15 +87,16 @@ def simulate_observed(
             found.append(one)
     notes = () if len(found) == runs else (f"{runs - len(found)} of {runs} runs did not complete",)
     bands = {
-        name: _compute_band(column, [_collect_torques(one)[name] for one in found])
-        for name, column in _collect_torques(run).items()
+        name: _compute_band(column, [collect_torques(one)[name] for one in found])
+        for name, column in collect_torques(run).items()
     }
     return Observation(
         shift, Observer.SIMULATION, run.time, bands.pop("output_torque"), bands, notes
     )
 
 
-def _collect_torques(run: Trajectory) -> dict[str, FloatArray]:
+def collect_torques(run: Trajectory) -> dict[str, FloatArray]:
+    """Collect the torques (n,) of a run [N m]: `output_torque`, and those of the elements."""
     return {"output_torque": run.shaft_torque, **run.clutch_torque}
 
 

@@ -34,7 +34,7 @@ def generate_twin_source(subject: Subject) -> str:
 
     Raises InputError for a model that the C sources cannot hold.
     """
-    subject.require_dual_clutch()
+    subject = subject.reduce()
     model, start = subject.model, subject.start
     check_exportable(model, start)
     names = ", ".join(format_c_string(element.name) for element in model.elements)

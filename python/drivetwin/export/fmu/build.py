@@ -60,7 +60,7 @@ def build_fmu(subject: Subject, path: Path, options: BuildOptions | None = None)
     Raises InputError for a model that C cannot represent and for a platform that the FMI version
     does not support, CompilerError, MissingExtraError, OSError.
     """
-    options = options or BuildOptions()
+    options, subject = options or BuildOptions(), subject.reduce()
     _check_platforms(options)
     header, sources = _collect_sources(subject, options)
     files = {

@@ -20,6 +20,7 @@ from drivetwin.shifts.detect import require_shifts
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.part_parameters import describe_parts
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import simulate_shift
 
@@ -61,6 +62,7 @@ def build_measured_subject(
         note=build_note(twin, delays),
         delays=delays,
         parts=twin.build_parts(shift.model),
+        part_names=describe_parts(twin.part_values),
     )
     return subject, Experiment(f"shift {name} of {source}", time, inputs, DEFAULT_STEP)
 

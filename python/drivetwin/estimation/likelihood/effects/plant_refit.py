@@ -100,8 +100,8 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
 
     A part is kept where the card states its size, or where its evidence is enough, no other effect
     has more, and its own columns at the minimum of the dual clutch have clearly less: where they
-    describe it as well, they move the values as the plant would. Otherwise the covariance grows by the move that the part would cause, times its
-    probability.
+    describe it as well, they move the values as the plant would. Otherwise the covariance grows by
+    the move that the part would cause, times its probability.
     """
     if not fit.problem.parts[0].scale_known or fit.plant is not None:
         return fit
