@@ -113,3 +113,37 @@ def test_a_stated_effect_in_the_plant_has_no_column(monkeypatch: pytest.MonkeyPa
 def test_a_mode_that_is_off_is_not_tried() -> None:
     _, plain = swinging()
     assert select_plant(plain, EffectPriors({MODE: EffectPrior(0.0)})) is plain
+
+
+TYRE = EffectId.TYRE_SLIP
+
+
+@shared
+def slipping() -> tuple[Bench, LikelihoodFit]:
+    """A vehicle whose tyres slip by 0.6 %, and its fit by the dual clutch."""
+    scenario = load_scenario(ScenarioName.THROTTLE_STEPS)
+    made = record_bench(scenario, 0, ROUGH, effects={TYRE: 6e-3})
+    posed, start = problem(made)
+    return made, fit_multistart(posed, start, [made.signals.shift])
+
+
+def test_a_large_slip_of_the_tyres_is_estimated_in_the_plant() -> None:
+    """Its column at the minimum of the dual clutch leaves a fifth of the noise."""
+    made, plain = slipping()
+    found = select_plant(plain, EffectPriors())
+    assert plain.chi2 > 1.15
+    assert found.chi2 < 1.02
+    assert found.plant is not None
+    assert found.plant.effect is TYRE
+    size, std = np.exp(found.point.values[-1]), np.sqrt(found.covariance[-1, -1])
+    assert size == pytest.approx(6e-3, rel=max(3.0 * std, 0.04))
+    truth = made.run.scenario.model.k_o
+    assert _count_deviations(found, "k_o", truth) < 3.0
+
+
+def test_a_part_that_its_columns_describe_as_well_stays_out_of_the_plant() -> None:
+    scenario = load_scenario(ScenarioName.THROTTLE_STEPS)
+    made = record_bench(scenario, 0, ROUGH, effects={EffectId.PROGRESSIVE_SHAFT: 0.05})
+    posed, start = problem(made)
+    plain = fit_multistart(posed, start, [made.signals.shift])
+    assert select_plant(plain, EffectPriors()).plant is None
