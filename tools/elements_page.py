@@ -26,7 +26,8 @@ def fill_page(page: str) -> str:
         start = page.index(heading) + len(heading)
         written = page.startswith(_START, start)
         end = page.index(_END, start) + len(_END) if written else start
-        page = f"{page[:start]}{text}{page[end:]}"
+        gap = "" if page.startswith("\n", end) else "\n"
+        page = f"{page[:start]}{text}{gap}{page[end:]}"
         before = heading
     return page
 

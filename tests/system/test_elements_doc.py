@@ -15,7 +15,7 @@ import pytest
 from drivetwin._native import simulate_network
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import Signal
-from drivetwin.simulation.element_schema import ELEMENT_FIELDS
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS, GROUND, list_ports
 from drivetwin.simulation.network import OutputKind, Start, simulate
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "elements.md").read_text(
@@ -50,9 +50,7 @@ def example(kind: str) -> dict[str, Any]:
 
 def run(element: Mapping[str, Any]) -> str:
     """Status of a short run in which every node of the element has an inertia and stands still."""
-    flanges = {"node", "a", "b", "sun", "ring", "carrier", "pump", "turbine", "reaction"}
-    flanges &= set(element)
-    nodes = sorted({element[flange] for flange in flanges} - {"ground"})
+    nodes = sorted(set(list_ports(element).values()) - {GROUND})
     masses = [
         {"type": "inertia", "name": f"mass of {node}", "node": node, "inertia": 1.0}
         for node in nodes

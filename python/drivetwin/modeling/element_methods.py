@@ -64,6 +64,13 @@ class ElementMethods(ModelParts):
         """Dry and viscous friction of a bearing."""
         return self._add("bearing", name, a=a, b=b, speed=speed, torque=torque, peak=peak)
 
+    def viscous_coupling(
+        self, name: str, a: Place | None = None, b: Place | None = None, *, slip: Sequence[float],
+        torque: Sequence[float]
+    ) -> Part:
+        """Viscous coupling: torque over the slip, without stiction."""
+        return self._add("viscous_coupling", name, a=a, b=b, slip=slip, torque=torque)
+
     def spring_damper(
         self, name: str, a: Place | None = None, b: Place | None = None, *, stiffness: float,
         damping: float = 0.0
