@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import is_dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,8 +35,7 @@ class FieldKind(StrEnum):
     GROUP = "group"
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(NamedTuple):
     """Range of a number, None where it has no such bound, and values that are refused."""
 
     least: float | None
@@ -51,8 +50,7 @@ class Limit:
         return ", ".join(f"{sign} {value:g}" for sign, value in bounds if value is not None)
 
 
-@dataclass(frozen=True)
-class Field:
+class Field(NamedTuple):
     """Field of an element or group.
 
     `absent` is the meaning of a missing optional field, `default` the value that the builder takes.
@@ -70,8 +68,7 @@ class Field:
     help: str
 
 
-@dataclass(frozen=True)
-class ElementType:
+class ElementType(NamedTuple):
     """Type of elements: noun phrase, law, fields beside `type` and `name`."""
 
     help: str
