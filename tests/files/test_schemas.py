@@ -20,6 +20,7 @@ from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.files.result_file import ResultFile
 from drivetwin.files.schemas import FileKind, build_json_schema
 from drivetwin.files.twin_conversion import save_twin
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind, Limit
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report import sample
@@ -40,6 +41,12 @@ def fenced(page: Path, language: str) -> list[str]:
 
 def twin() -> Twin:
     return build_twin(sample.identification(), sample.card())
+
+
+def elements() -> list[dict[str, Any]]:
+    """Examples of the reference page, one of each type."""
+    found = map(json.loads, fenced(REFERENCE / "elements.md", "json"))
+    return [one for one in found if isinstance(one, dict)]
 
 
 def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
@@ -71,7 +78,7 @@ def _toml(kind: FileKind, folder: Path) -> list[str]:
             return toml_files(folder)
 
 
-@pytest.mark.parametrize("kind", FileKind)
+@pytest.mark.parametrize("kind", [kind for kind in FileKind if kind is not FileKind.ELEMENTS])
 def test_files_of_the_program_fit_their_schema_and_a_wrong_key_does_not(
     kind: FileKind, tmp_path: Path
 ) -> None:
@@ -83,6 +90,45 @@ def test_files_of_the_program_fit_their_schema_and_a_wrong_key_does_not(
     for document in found:
         validator.validate(document)
         assert not validator.is_valid({**document, "nonsense": 1})
+
+
+def network_validator() -> Draft202012Validator:
+    schema = build_json_schema("elements")
+    Draft202012Validator.check_schema(schema)
+    return Draft202012Validator(schema)
+
+
+@pytest.mark.parametrize("example", elements(), ids=lambda one: str(one["type"]))
+def test_a_network_fits_its_schema_and_wrong_fields_do_not(example: Mapping[str, Any]) -> None:
+    validator, fields = network_validator(), ELEMENT_FIELDS[example["type"]]
+    validator.validate([example])
+    validator.validate([{**example, **{key: None for key in fields if not fields[key].required}}])
+    assert not validator.is_valid([{**example, "nonsense": 1}])
+    assert not validator.is_valid([{**example, "type": "nonsense"}])
+    for key, field in fields.items():
+        assert not validator.is_valid([{**example, key: []}]), key
+        rest = {name: value for name, value in example.items() if name != key}
+        assert validator.is_valid([rest]) != field.required, key
+        if field.kind is FieldKind.NUMBER and field.limit and field.limit.describe():
+            assert not validator.is_valid([{**example, key: refused(field.limit)}]), key
+
+
+def refused(limit: Limit) -> float:
+    """Return a number just outside a range."""
+    if limit.least is not None:
+        return limit.least - 1e-9
+    return limit.excluded[0] if limit.above is None else limit.above
+
+
+def test_the_schema_of_a_network_has_units_ranges_and_descriptions() -> None:
+    spring = build_json_schema("elements")["$defs"]["spring_damper"]["properties"]
+    assert spring["damping"] == {
+        "type": "number",
+        "minimum": 0.0,
+        "description": "Damping.",
+        "unit": "N·m·s/rad",
+        "default": 0.0,
+    }
 
 
 def test_the_page_lists_every_kind() -> None:

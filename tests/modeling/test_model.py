@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -14,8 +15,10 @@ import pytest
 from drivetwin.errors import InputError
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.part import Part
+from drivetwin.modeling.plates import Plates
 from drivetwin.modeling.units import RPM
 from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS
 from drivetwin.simulation.network import Sine
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "build-a-model.md"
@@ -133,6 +136,35 @@ def test_all_faults_are_reported_together_with_suggestions() -> None:
     ):
         assert part in text, part
     assert "expected one of" not in text
+
+
+def test_signatures_and_help_of_the_methods_come_from_the_core() -> None:
+    signature = inspect.signature(Model.spring_damper).parameters
+    assert list(signature) == ["self", "name", "a", "b", "stiffness", "damping"]
+    assert signature["damping"].default == 0.0
+    text = inspect.getdoc(Model.spring_damper) or ""
+    assert "damping : float, N·m·s/rad, ≥ 0, default 0.0\n    Damping." in text
+    assert "twist' = ω_a - ω_b" in text
+    assert set(ELEMENT_FIELDS) <= set(dir(Model))
+
+
+def test_plates_have_the_defaults_of_a_clutch() -> None:
+    fields = ELEMENT_FIELDS["clutch"]
+    for name in ("gain", "p0", "peak", "drum_inertia"):
+        assert getattr(Plates(), name) == fields[name].default
+
+
+def test_a_one_way_clutch_takes_a_parallel_clutch_and_a_converter_its_fields() -> None:
+    model = Model("parallel")
+    engine, load = model.inertia("engine", 1.0), model.inertia("load", 1.0)
+    parallel = {"friction": {"slip": [0.0], "mu": [0.1]}, "gain": 1.0, "p0": 0.0, "peak": 1.0}
+    free = model.one_way_clutch("F", load, engine, clutch={**parallel, "pressure": 50.0})
+    fields = {"speed_ratio": [0.0, 1.0], "capacity": [0.1, 0.0], "torque_ratio": [2.0, 1.0]}
+    model.torque_converter("converter", engine, load, map=fields)
+    model.start({engine: 10.0, load: 0.0})
+    run = model.simulate(0.1, record=[free.torque])
+    assert run.status == "completed"
+    assert run[free.torque][1] == pytest.approx(-5.0)
 
 
 def test_a_schematic_names_nodes_and_elements() -> None:

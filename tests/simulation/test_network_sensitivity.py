@@ -14,6 +14,7 @@ import pytest
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.network import (
+    Element,
     NetworkRun,
     Output,
     Sine,
@@ -53,6 +54,36 @@ SPEEDS: list[Output] = [("speed", "a"), ("speed", "b")]
 def _differentiate_braked(unknowns: Unknowns) -> NetworkSensitivities:
     start = Start({"a": 20.0, "b": 20.0}, {"shaft": 0.05})
     return differentiate(BRAKED, PRESSED, start, TIME, SPEEDS, unknowns, accuracy=EXACT)
+
+
+def test_a_viscous_coupling_has_the_derivatives_of_differences() -> None:
+    """The slip passes both corners of the table; differences err by their step squared."""
+    numbers = [8.0, 15.0]
+    start, step = Start({"a": 30.0, "b": 0.0}), 1e-4
+
+    def build(torque: list[float]) -> list[Element]:
+        coupling = {"slip": [4.0, 10.0], "torque": torque}
+        return [
+            build_element("inertia", "first", node="a", inertia=2.0),
+            build_element("inertia", "second", node="b", inertia=1.0),
+            build_element("viscous_coupling", "coupling", a="a", b="b", **coupling),
+        ]
+
+    def run(torque: list[float]) -> NetworkRun:
+        return simulate(build(torque), {}, start, TIME, SPEEDS, accuracy=EXACT)
+
+    unknowns = ["coupling.torque.0", "coupling.torque.1"]
+    found = differentiate(build(numbers), {}, start, TIME, SPEEDS, unknowns, accuracy=EXACT)
+    assert found.run.status == "completed"
+    slip = found.run.columns[SPEEDS[0]] - found.run.columns[SPEEDS[1]]
+    assert slip[0] > 10.0
+    assert slip[-1] < 4.0
+    for k in range(2):
+        up, down = ([n + s * (i == k) for i, n in enumerate(numbers)] for s in (step, -step))
+        for speed in SPEEDS:
+            difference = (run(up).columns[speed] - run(down).columns[speed]) / (2.0 * step)
+            assert found.derivatives[speed][:, k] == pytest.approx(difference, abs=1e-7)
+            assert np.abs(difference).max() > 0.05
 
 
 def test_a_rotor_has_the_derivatives_of_its_closed_form() -> None:

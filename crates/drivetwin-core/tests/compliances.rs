@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-//! Tyres, tabulated springs and backlash against closed forms and their limits.
+//! Tyres, tabulated springs, backlash and viscous couplings against closed forms and their limits.
 
 mod common;
 
 use common::{compile, constant, grid, inertia, load, shaft, simulate, start, torque};
 use drivetwin_core::model::Driveline;
-use drivetwin_core::model::elements::{Backlash, Element, SpringTable, Tyre};
+use drivetwin_core::model::elements::{Backlash, Element, SpringTable, Tyre, ViscousCoupling};
 use drivetwin_core::network::Network;
 use drivetwin_core::simulate::{Output, Start, Trajectory};
 use drivetwin_core::solver::Status;
@@ -20,6 +20,11 @@ fn tyre(slip_stiffness: f64, least_speed: f64) -> Element<f64> {
 fn table(twist: Vec<f64>, torque: Vec<f64>, damping: f64) -> Element<f64> {
     let (name, a, b) = ("table".into(), "a".into(), "b".into());
     Element::SpringTable(SpringTable { name, a, b, twist, torque, damping })
+}
+
+fn viscous(a: &str, b: &str, slip: Vec<f64>, torque: Vec<f64>) -> Element<f64> {
+    let (name, a, b) = ("viscous".into(), a.into(), b.into());
+    Element::ViscousCoupling(ViscousCoupling { name, a, b, slip, torque })
 }
 
 /// A driven wheel below a vehicle with air drag.
@@ -187,6 +192,10 @@ fn impossible_tables_and_tyres_are_refused_by_name() {
         (table(vec![0.0, 1.0], vec![0.0, -1.0], 0.0), "do not fall"),
         (table(vec![0.5, 1.0], vec![0.0, 1.0], 0.0), "twist 0"),
         (table(vec![0.0, 1.0], vec![0.0, 1.0], -1.0), "damping"),
+        (viscous("a", "b", vec![0.0, 1.0], vec![0.0, 1.0]), "from one above 0"),
+        (viscous("a", "b", vec![1.0], vec![1.0, 2.0]), "as many torques"),
+        (viscous("a", "b", vec![1.0], vec![-1.0]), "negative"),
+        (viscous("a", "b", vec![1.0, 2.0], vec![2.0, 1.0]), "do not fall"),
         (tyre(0.0, 1.0), "slip_stiffness"),
         (tyre(1.0, 0.0), "least_speed"),
     ];
@@ -217,4 +226,69 @@ fn backlash_without_a_gap_is_a_spring_damper_while_it_is_pressed() {
     }
     assert_balanced(&run);
     assert_balanced(&swing(play(0.01), 0.05));
+}
+
+/// Slip over time of two masses without other torques, the run audited.
+fn slow_down(element: Element<f64>, slip: f64) -> (Trajectory<f64>, Vec<f64>) {
+    let network = compile(vec![inertia("a", 2.0), inertia("b", 6.0), element]);
+    let begin = start(&[("a", slip), ("b", 0.0)], &[]);
+    let outputs = ["a", "b"].map(|node| Output::Speed(node.into()));
+    let run = simulate(&network, &[], &begin, &grid(END, 201), &outputs);
+    assert_balanced(&run);
+    let slips = run.columns[0].iter().zip(&run.columns[1]).map(|(a, b)| a - b).collect();
+    (run, slips)
+}
+
+/// Both masses against each other, kg·m².
+const REDUCED: f64 = 1.5;
+
+#[test]
+fn the_slip_of_a_linear_viscous_coupling_decays_exponentially_into_heat() {
+    for from in [40.0, 5.0, -40.0] {
+        let (run, slips) = slow_down(viscous("a", "b", vec![10.0], vec![20.0]), from);
+        assert!(run.events.is_empty(), "no stiction");
+        for (slip, t) in slips.iter().zip(&run.time) {
+            assert!((slip - from * (-2.0 * t / REDUCED).exp()).abs() < 1e-9, "{slip} at {t} s");
+        }
+        let heat = 0.5 * REDUCED * (from * from - slips[200] * slips[200]);
+        let damper = run.audit.expect("an audited run").shaft;
+        assert!((damper - heat).abs() < 1e-8 * heat, "{damper} and {heat} J");
+    }
+}
+
+#[test]
+fn a_viscous_coupling_follows_its_pieces_beyond_the_table_and_in_either_sense() {
+    // 3 N·m·s/rad up to 4 rad/s, then 0.5: from 20 rad/s, beyond the last point, to below the first.
+    let element = || viscous("a", "b", vec![4.0, 10.0], vec![12.0, 15.0]);
+    let rest: f64 = 4.0 - 12.0 / 0.5;
+    let corner = REDUCED / 0.5 * ((20.0 - rest) / (4.0 - rest)).ln();
+    let closed = |t: f64| {
+        if t < corner {
+            rest + (20.0 - rest) * (-0.5 * t / REDUCED).exp()
+        } else {
+            4.0 * (-3.0 * (t - corner) / REDUCED).exp()
+        }
+    };
+    assert!(corner > 0.5 && corner < 0.9 * END);
+    for side in [1.0, -1.0] {
+        let (run, slips) = slow_down(element(), 20.0 * side);
+        for (slip, &t) in slips.iter().zip(&run.time) {
+            assert!((slip * side - closed(t)).abs() < 1e-8, "{slip} at {t} s");
+        }
+    }
+}
+
+#[test]
+fn a_viscous_coupling_to_the_ground_stops_a_mass_that_must_exist() {
+    let brake = |node: &str| viscous(node, "ground", vec![1.0], vec![3.0]);
+    let network = compile(vec![inertia("a", 2.0), brake("a")]);
+    let begin = start(&[("a", 8.0)], &[]);
+    let run = simulate(&network, &[], &begin, &grid(END, 21), &[Output::Speed("a".into())]);
+    assert_balanced(&run);
+    for (speed, t) in run.columns[0].iter().zip(&run.time) {
+        assert!((speed - 8.0 * (-1.5 * t).exp()).abs() < 1e-9);
+    }
+    let elements = vec![inertia("a", 2.0), shaft("a", "m", 10.0, 0.0), brake("m")];
+    let error = Network::compile(&Driveline { elements }).expect_err("a member without mass");
+    assert!(error.to_string().contains("m"), "{error}");
 }

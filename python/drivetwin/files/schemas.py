@@ -7,6 +7,8 @@ from enum import StrEnum
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from drivetwin.files.element_json_schema import build_network_schema
+
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
@@ -14,7 +16,7 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 class FileKind(StrEnum):
-    """A file of tables whose keys are checked."""
+    """Kind of file, or the elements of a network, whose keys are checked."""
 
     VEHICLE_CARD = "vehicle-card"
     GEARBOX_CARD = "gearbox-card"
@@ -24,6 +26,7 @@ class FileKind(StrEnum):
     RESULT = "result"
     TWIN = "twin"
     PARAMETERS = "parameters"
+    ELEMENTS = "elements"
 
 
 _MODELS = {
@@ -47,6 +50,9 @@ def build_json_schema(kind: FileKind | str) -> dict[str, Any]:
     several keys are checked by the reader only. Raises ValueError for a kind that does not exist.
     """
     kind = FileKind(kind)
+    head = {"$schema": _DIALECT, "title": f"drivetwin {kind}"}
+    if kind is FileKind.ELEMENTS:
+        return {**head, **build_network_schema()}
     module, name = _MODELS[kind]
     model: type[BaseModel] = getattr(import_module(f"drivetwin.{module}"), name)
-    return {"$schema": _DIALECT, **model.model_json_schema(), "title": f"drivetwin {kind}"}
+    return {**model.model_json_schema(), **head}

@@ -18,8 +18,9 @@ import numpy as np
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.export.modelica.model import Run, format_package
 from drivetwin.modeling.draw import draw_schematic
-from drivetwin.modeling.element_methods import ElementMethods, Place
+from drivetwin.modeling.element_methods import ElementMethods
 from drivetwin.modeling.inputs import make_input
+from drivetwin.modeling.model_parts import Place
 from drivetwin.modeling.part import Part
 from drivetwin.modeling.run import ModelRun
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal

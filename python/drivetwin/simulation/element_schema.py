@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Fields of the elements of a network, and the faults of descriptions by them.
+"""Fields of the elements of a network as the core states them, and faults of form by them.
 
 The core refuses what is physically impossible; here the form is checked, all elements at once.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, is_dataclass, replace
-from enum import Enum, auto
-from typing import Any
+from dataclasses import is_dataclass
+from enum import StrEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from drivetwin._native import element_schema
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import InputError
 from drivetwin.simulation.serialize import format_value, is_number
@@ -20,87 +22,88 @@ from drivetwin.simulation.serialize import format_value, is_number
 GROUND = "ground"
 
 
-class FieldKind(Enum):
+class FieldKind(StrEnum):
     """Kind of the content of a field."""
 
-    NODE = auto()
-    INPUT = auto()
-    TEXT = auto()
-    FLAG = auto()
-    NUMBER = auto()
-    NUMBERS = auto()
-    ROWS = auto()
-    GROUP = auto()
+    NODE = "node"
+    INPUT = "input"
+    TEXT = "text"
+    FLAG = "flag"
+    NUMBER = "number"
+    NUMBERS = "numbers"
+    ROWS = "rows"
+    GROUP = "group"
 
 
-@dataclass(frozen=True)
-class Field:
-    """A field of an element or group; a group has the alternatives of its fields."""
+class Limit(NamedTuple):
+    """Range of a number, None where it has no such bound, and values that are refused."""
+
+    least: float | None
+    above: float | None
+    most: float | None
+    excluded: tuple[float, ...]
+
+    def describe(self) -> str:
+        """Return the range as documents state it, empty if any number is accepted."""
+        bounds = [("≥", self.least), (">", self.above), ("≤", self.most)]
+        bounds += (("≠", value) for value in self.excluded)
+        return ", ".join(f"{sign} {value:g}" for sign, value in bounds if value is not None)
+
+
+class Field(NamedTuple):
+    """Field of an element or group.
+
+    `absent` is the meaning of a missing optional field, `default` the value that the builder takes.
+    A group has the alternatives of its fields.
+    """
 
     kind: FieldKind
-    required: bool = True
-    group: tuple[Mapping[str, Field], ...] = ()
+    required: bool
+    absent: str | None
+    default: float | str | None
+    unit: str
+    limit: Limit | None
+    choices: tuple[str, ...]
+    group: tuple[Mapping[str, Field], ...]
+    help: str
 
 
-_NODE, _INPUT = Field(FieldKind.NODE), Field(FieldKind.INPUT)
-_NUMBER, _NUMBERS = Field(FieldKind.NUMBER), Field(FieldKind.NUMBERS)
-_OPTIONAL = replace(_NUMBER, required=False)
-_ENDS = {"a": _NODE, "b": _NODE}
-_STRIBECK = dict.fromkeys(("mu_c", "mu_s", "v_s", "mu_v"), _NUMBER)
-_TABLE = {"slip": _NUMBERS, "mu": _NUMBERS, "extend": Field(FieldKind.FLAG, required=False)}
-_FRICTION = Field(FieldKind.GROUP, group=(_STRIBECK, _TABLE))
-_LAW = {"friction": _FRICTION, "gain": _NUMBER, "p0": _NUMBER, "peak": _NUMBER, "pressure": _INPUT}
-_LOSS = {
-    "law": Field(FieldKind.TEXT),
-    "eta": _NUMBER,
-    **dict.fromkeys(("eta_backward", "drag", "drag_backward"), _OPTIONAL),
+class ElementType(NamedTuple):
+    """Type of elements: noun phrase, law, fields beside `type` and `name`."""
+
+    help: str
+    law: str
+    fields: Mapping[str, Field]
+
+
+def _read_fields(fields: Sequence[Mapping[str, Any]]) -> dict[str, Field]:
+    return {one["name"]: _read_field(one) for one in fields}
+
+
+def _read_field(one: Mapping[str, Any]) -> Field:
+    limit = one["limit"]
+    return Field(
+        kind=FieldKind(one["kind"]),
+        required=one["required"],
+        absent=one["absent"],
+        default=one["default"],
+        unit=one["unit"],
+        limit=limit and Limit(limit["least"], limit["above"], limit["most"], tuple(limit["not"])),
+        choices=tuple(one["choices"]),
+        group=tuple(map(_read_fields, one["alternatives"])),
+        help=one["help"],
+    )
+
+
+ELEMENT_TYPES: Mapping[str, ElementType] = {
+    one["type"]: ElementType(one["help"], one["law"], _read_fields(one["fields"]))
+    for one in json.loads(element_schema())
 }
-_LOSSES = {"speed": _NUMBERS, "torque": _NUMBERS, "loss": Field(FieldKind.ROWS)}
-_DRAG = {"slip": _NUMBERS, "torque": _NUMBERS}
-_CONVERTER = dict.fromkeys(("speed_ratio", "capacity", "torque_ratio"), _NUMBERS)
-_ENGINE = {"throttle": _NUMBERS, "speed": _NUMBERS, "torque": Field(FieldKind.ROWS)}
-
-
-def _group(fields: Mapping[str, Field], *, required: bool = True) -> Field:
-    return Field(FieldKind.GROUP, required, (fields,))
-
-
+"""Types of elements in the order of the documentation."""
 ELEMENT_FIELDS: Mapping[str, Mapping[str, Field]] = {
-    "inertia": {"node": _NODE, "inertia": _NUMBER},
-    "gear": {
-        **_ENDS,
-        "ratio": _NUMBER,
-        "loss": _group(_LOSS, required=False),
-        "losses": _group(_LOSSES, required=False),
-    },
-    "planetary": {
-        **dict.fromkeys(("sun", "ring", "carrier"), _NODE),
-        "z": _NUMBER,
-        "planet_inertia": _OPTIONAL,
-        "losses": _group(_LOSSES, required=False),
-    },
-    "clutch": {
-        **_ENDS,
-        **_LAW,
-        "drum_inertia": _NUMBER,
-        "drag": _group(_DRAG, required=False),
-    },
-    "one_way_clutch": {**_ENDS, "clutch": _group(_LAW, required=False)},
-    "bearing": {**_ENDS, "speed": _NUMBERS, "torque": _NUMBERS, "peak": _NUMBER},
-    "spring_damper": {**_ENDS, "stiffness": _NUMBER, "damping": _NUMBER},
-    "spring_table": {**_ENDS, "twist": _NUMBERS, "torque": _NUMBERS, "damping": _NUMBER},
-    "backlash": {**_ENDS, "stiffness": _NUMBER, "damping": _NUMBER, "gap": _NUMBER},
-    "torque_converter": {"pump": _NODE, "turbine": _NODE, "map": _group(_CONVERTER)},
-    "tyre": {**_ENDS, "slip_stiffness": _NUMBER, "least_speed": _NUMBER},
-    "road_load": {"node": _NODE, "constant": _NUMBER, "rolling": _NUMBER, "aero": _NUMBER},
-    "torque": {"node": _NODE, "reaction": replace(_NODE, required=False), "input": _INPUT},
-    "engine_map": {
-        **{"node": _NODE, "throttle": _INPUT, "map": _group(_ENGINE)},
-        "lag": _OPTIONAL,
-    },
-    "prescribed_speed": {"node": _NODE, "input": _INPUT},
+    kind: one.fields for kind, one in ELEMENT_TYPES.items()
 }
-"""Fields beside `type` and `name` of every type of element, in the order of the documentation."""
+"""Fields beside `type` and `name` of every type of element."""
 
 
 def find_element_faults(elements: Sequence[Mapping[str, Any]]) -> list[str]:

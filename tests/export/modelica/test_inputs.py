@@ -103,6 +103,19 @@ def test_a_tyre_and_a_progressive_shaft_move_as_in_the_core(tmp_path: Path) -> N
     _compare(elements, inputs, start, tmp_path)
 
 
+def test_a_viscous_coupling_moves_as_in_the_core_in_either_sense(tmp_path: Path) -> None:
+    table = {"slip": [4.0, 10.0], "torque": [12.0, 15.0]}
+    elements = [
+        _inertia("a", 0.5),
+        _inertia("b", 0.8),
+        build_element("viscous_coupling", "coupling", a="a", b="b", **table),
+        build_element("torque", "T", node="a", input="T"),
+    ]
+    inputs: dict[str, Signal | Sine] = {"T": Sine(60.0, 1.0)}
+    text = _compare(elements, inputs, Start({"a": 20.0, "b": 0.0}), tmp_path)
+    assert "ViscousCoupling coupling(characteristic=[-10.0, -15.0;" in text
+
+
 def test_a_road_load_that_starts_locked_is_an_initial_equation() -> None:
     load = build_element("road_load", "load", node="a", constant=5.0, rolling=700.0, aero=0.9)
     start = Start({"a": 0.0}, locked=("load",))

@@ -106,6 +106,6 @@ fn increases(axis: &[f64]) -> bool {
     axis.iter().all(|v| v.is_finite()) && axis.windows(2).all(|w| w[0] < w[1])
 }
 
-fn starts_above_zero(axis: &[f64]) -> bool {
+pub(super) fn starts_above_zero(axis: &[f64]) -> bool {
     axis.first().is_some_and(|&first| first > 0.0) && increases(axis)
 }

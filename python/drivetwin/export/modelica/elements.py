@@ -21,7 +21,7 @@ from drivetwin.export.modelica.friction import (
     build_clutch,
     build_one_way_clutch,
 )
-from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR, SPRING_TABLE, TYRE
+from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR, SPRING_TABLE, TYRE, VISCOUS
 from drivetwin.export.modelica.losses import add_planetary_losses, build_loss_gear
 from drivetwin.export.modelica.text import format_matrix
 from drivetwin.simulation.network import Element
@@ -98,6 +98,14 @@ def _build_spring_table(element: Element, names: Names) -> Part:
     modifiers = (("characteristic", rows), *format_values(d=element["damping"]))
     part = _build_compliance(SPRING_TABLE, modifiers, element, names)
     return replace(part, helpers=frozenset({SPRING_TABLE}))
+
+
+def _build_viscous_coupling(element: Element, names: Names) -> Part:
+    points = list(zip(element["slip"], element["torque"], strict=True))
+    backward = [(-slip, -torque) for slip, torque in reversed(points)]
+    modifiers = (("characteristic", format_matrix([*backward, (0.0, 0.0), *points])),)
+    part = _build_compliance(VISCOUS, modifiers, element, names)
+    return replace(part, helpers=frozenset({VISCOUS}))
 
 
 def _build_tyre(element: Element, names: Names) -> Part:
@@ -203,6 +211,7 @@ _TRANSLATIONS = {
     "clutch": build_clutch,
     "one_way_clutch": build_one_way_clutch,
     "bearing": build_bearing,
+    "viscous_coupling": _build_viscous_coupling,
     "spring_damper": _build_spring_damper,
     "spring_table": _build_spring_table,
     "backlash": _build_backlash,

@@ -11,6 +11,7 @@ TYRE = "TyreSlip"
 LOSS_GEAR = "LossTableGear"
 LOSS_PLANETARY = "LossTablePlanetary"
 DRAG = "ClutchDrag"
+VISCOUS = "ViscousCoupling"
 
 HELPERS = {
     SLIP_INERTIA: """\
@@ -133,5 +134,18 @@ HELPERS = {
     table.u = noEvent(abs(w_rel));
     tau = noEvent(if w_rel < 0 then -table.y[1] else table.y[1]);
   end ClutchDrag;
+""",
+    VISCOUS: """\
+  model ViscousCoupling "Torque linear between points of the slip"
+    extends Modelica.Mechanics.Rotational.Interfaces.PartialCompliantWithRelativeStates;
+    parameter Real characteristic[:, 2] "Slip [rad/s], torque [N.m]; it goes on along its ends";
+    Modelica.Blocks.Tables.CombiTable1Ds table(
+      table=characteristic,
+      columns={2},
+      extrapolation=Modelica.Blocks.Types.Extrapolation.LastTwoPoints);
+  equation
+    table.u = w_rel;
+    tau = table.y[1];
+  end ViscousCoupling;
 """,
 }

@@ -11,6 +11,7 @@ from drivetwin.errors import InputError
 from drivetwin.export.modelica.friction import GROUND
 from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.element_schema import list_ports
 from drivetwin.simulation.network import Element, Start
 
 _COMPLIANT = ("spring_damper", "spring_table", "backlash")
@@ -46,7 +47,9 @@ def build_initial_equations(
     relative angle (b less a) of each compliance, as expressions. Elements that start locked go
     before stated speeds; of those, as many are set as are independent.
     """
-    nodes = sorted({node for element in elements for node in _list_nodes(element)} - {GROUND})
+    nodes = sorted(
+        {node for element in elements for node in list_ports(element).values()} - {GROUND}
+    )
     index = {node: place for place, node in enumerate(nodes)}
     rigid = [
         _build_row(pairs, index) for element in elements for pairs in _list_constraints(element)
@@ -107,11 +110,6 @@ def _list_constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...
             yield (element["sun"], 1.0), (element["ring"], z), (element["carrier"], -(1.0 + z))
         case "prescribed_speed":
             yield ((element["node"], 1.0),)
-
-
-def _list_nodes(element: Element) -> list[str]:
-    fields = ("node", "a", "b", "sun", "ring", "carrier", "pump", "turbine", "reaction")
-    return [element[field] for field in fields if field in element]
 
 
 def _build_row(pairs: Iterable[tuple[str, float]], index: Mapping[str, int]) -> FloatArray:

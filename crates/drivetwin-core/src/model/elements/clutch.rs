@@ -28,7 +28,7 @@ described! {
         pub p0: T = Number("Pa").preset(0.0),
         /// Static over kinetic capacity at zero slip.
         pub peak: T = Number().at_least(1.0).preset(1.0),
-        /// Name of the pressure input.
+        /// Pressure input.
         pub pressure: Name = Input("Pa"),
         /// Inertia that turns with the slip (docs/theory.md, section 2), such as the drum of a brake.
         pub drum_inertia: T = Number("kg·m²").at_least(0.0).preset(0.0),

@@ -18,7 +18,7 @@ described! {
         pub name: Name = Name(),
         /// Node of the crankshaft.
         pub node: Name = Node(),
-        /// Name of the throttle input.
+        /// Throttle input.
         pub throttle: Name = Input(),
         /// Torque over throttle and speed.
         pub map: TorqueMap = Group(),

@@ -16,6 +16,7 @@ mod spring_table;
 mod torque;
 mod torque_converter;
 mod tyre;
+mod viscous_coupling;
 
 pub use backlash::Backlash;
 pub use bearing::Bearing;
@@ -32,6 +33,7 @@ pub use spring_table::SpringTable;
 pub use torque::Torque;
 pub use torque_converter::TorqueConverter;
 pub use tyre::Tyre;
+pub use viscous_coupling::ViscousCoupling;
 
 use super::error::ModelError;
 use super::field::Field;
@@ -96,6 +98,7 @@ elements!(
     Clutch,
     OneWayClutch,
     Bearing,
+    ViscousCoupling,
     SpringDamper,
     SpringTable,
     Backlash,

@@ -36,7 +36,7 @@ described! {
         pub p0: T = Number("Pa").preset(0.0),
         /// Static over kinetic capacity at zero slip.
         pub peak: T = Number().at_least(1.0).preset(1.0),
-        /// Name of the pressure input.
+        /// Pressure input.
         pub pressure: Name = Input("Pa"),
     }
 }

@@ -17,7 +17,7 @@ described! {
         pub name: Name = Name(),
         /// Node it drives.
         pub node: Name = Node(),
-        /// Name of the speed input, which must not jump.
+        /// Speed input, which must not jump.
         pub input: Name = Input("rad/s"),
         /// The element has no number of its own.
         #[serde(skip)]

@@ -20,7 +20,7 @@ described! {
         /// Node that takes the opposite torque, as of a motor between two shafts.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub reaction: Option<Name> = Node().absent("from outside"),
-        /// Name of the torque input.
+        /// Torque input.
         pub input: Name = Input("N·m"),
         /// The element has no number of its own.
         #[serde(skip)]

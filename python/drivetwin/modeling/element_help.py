@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""Help of the element methods: law, and parameters with units, ranges and defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from textwrap import fill
+from typing import TypeVar
+
+from drivetwin.modeling.plates import Plates
+from drivetwin.simulation.element_schema import ELEMENT_TYPES, ElementType, Field, FieldKind
+
+FIELD_OF = {"at": "node", "value": "input"}
+"""Fields whose parameter has another name."""
+_TYPES = {
+    FieldKind.NODE: "place",
+    FieldKind.INPUT: "value of an input",
+    FieldKind.NUMBER: "float",
+    FieldKind.NUMBERS: "sequence of floats",
+    FieldKind.ROWS: "rows of floats",
+}
+_WIDTH = 88
+_Class = TypeVar("_Class", bound=type)
+
+
+def document_methods(methods: _Class) -> _Class:
+    """Write the docstrings of the element methods of a class from the schema of the core."""
+    for kind, element in ELEMENT_TYPES.items():
+        method = getattr(methods, kind)
+        code = method.__code__
+        names = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]
+        method.__doc__ = "\n".join(_describe_method(element, names))
+    return methods
+
+
+def _describe_method(element: ElementType, names: tuple[str, ...]) -> Iterator[str]:
+    yield element.help
+    if element.law:
+        yield f"\n{fill(element.law, _WIDTH)}"
+    yield "\nParameters\n----------\nname : str\n    Unique name."
+    for name in names[1:]:
+        field = element.fields.get(FIELD_OF.get(name, name))
+        if field is None:
+            yield f"{name} : Plates\n{_indent(str(Plates.__doc__).split('.')[0])}."
+        else:
+            yield f"{name} : {', '.join(_annotate(field))}\n{_indent(field.help)}"
+
+
+def _annotate(field: Field) -> Iterator[str]:
+    if field.kind is FieldKind.GROUP:
+        yield " or ".join(f"mapping of {', '.join(fields)}" for fields in field.group)
+    else:
+        yield _TYPES[field.kind]
+    if field.unit:
+        yield field.unit
+    if field.limit and (limit := field.limit.describe()):
+        yield limit
+    if field.default is not None:
+        yield f"default {field.default}"
+    elif field.absent:
+        yield f"default: {field.absent}"
+
+
+def _indent(text: str) -> str:
+    return fill(" ".join(text.split()), _WIDTH, initial_indent="    ", subsequent_indent="    ")
