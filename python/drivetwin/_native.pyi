@@ -22,7 +22,7 @@ __all__ = [
     "simulate_batch",
     "simulate_controlled",
     "simulate_network",
-    "solve_banded",
+    "whiten",
 ]
 
 _Array = NDArray[np.float64]
@@ -87,7 +87,9 @@ def batch_sensitivities(
     wanted: tuple[_Array, str],
     options: tuple[Sequence[_Output], int],
 ) -> tuple[_Ends, tuple[_Array, _Array, _Array, list[tuple[int, str]]]]: ...
-def solve_banded(factor: _Array, columns: _Array) -> _Array: ...
+def whiten(
+    factor: _Array, samples: tuple[_Array, NDArray[np.uint32], _Array], columns: _Array
+) -> _Array: ...
 def simulate_network(
     driveline: str,
     outputs: Sequence[_Output],

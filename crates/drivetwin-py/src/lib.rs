@@ -4,7 +4,6 @@
 //! Private to the package; the Python modules of the same names are its face.
 
 mod actuator;
-mod banded;
 mod batch;
 mod border;
 mod controlled;
@@ -16,6 +15,7 @@ mod network_sensitivity;
 mod output;
 mod plain;
 mod table;
+mod whitening;
 
 use pyo3::prelude::*;
 
@@ -38,7 +38,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(network_sensitivity::network_sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::reduce_shift, module)?)?;
-    module.add_function(wrap_pyfunction!(banded::solve_banded, module)?)?;
+    module.add_function(wrap_pyfunction!(whitening::whiten, module)?)?;
     module.add_class::<table::TableScanner>()?;
     module.add_class::<table::ScannedTable>()?;
     Ok(())

@@ -24,6 +24,7 @@ mod sine;
 mod single;
 mod status;
 mod tolerances;
+mod whitening;
 
 pub use banded::BandedFactor;
 pub use cache::SolverCache;
@@ -45,3 +46,4 @@ pub(crate) use simd::{Kernel, dispatch_simd};
 pub use single::SampleSink;
 pub use status::Status;
 pub use tolerances::MAX_SPECTRAL_STEP_SLIPPING;
+pub use whitening::Whitening;

@@ -30,7 +30,7 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_array
 
-from drivetwin._native import solve_banded
+from drivetwin._native import whiten
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.estimation.likelihood.noise.linear_response import (
@@ -112,6 +112,11 @@ class Whitener:
         if columns.size == 0:
             return columns
         each = columns.reshape(len(columns), -1)
+        if self.path is not None and self.path.share is None and each.shape[1] > 1:
+            rows = self.path.seen.data.reshape(-1, STATES)
+            first = self.path.seen.indices[::STATES].astype(np.uint32)
+            samples = (rows, first, self.variance)
+            return whiten(self.path.factor, samples, np.ascontiguousarray(each))
         weighted = (each - self.estimate_input_part(each)) / self.variance[:, None]
         if self.path is not None:
             weighted = self.path.apply_adjoint_feedback(weighted)
@@ -151,8 +156,6 @@ class Whitener:
         """Expected disturbance of the state (4N,) or (4N, q), given residual columns."""
         variance = self.variance if columns.ndim == 1 else self.variance[:, None]
         pull = path.seen.T @ (columns / variance)
-        if columns.ndim > 1 and columns.shape[1] > 1:
-            return solve_banded(path.factor, np.ascontiguousarray(pull))
         return np.asarray(cho_solve_banded((path.factor, True), pull, check_finite=False))
 
 
