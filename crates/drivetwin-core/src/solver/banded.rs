@@ -91,8 +91,10 @@ impl Solution<'_> {
 
     #[inline(always)]
     fn store<const B: usize>(&mut self, row: usize, first: usize, sum: [f64; B], pivot: f64) {
-        let entries = &mut self.right[row * self.columns + first..];
-        *entries.first_chunk_mut().expect("a whole block") = sum.map(|value| value / pivot);
+        let entries = &mut self.right[row * self.columns + first..][..B];
+        for k in 0..B {
+            entries[k] = sum[k] / pivot;
+        }
     }
 }
 

@@ -219,12 +219,11 @@ impl<T: Number, const N: usize> Propagator<T, N> {
         forcing_response: &[[[T; N]; N_BASIS]],
     ) -> StepForm<T, N> {
         let mut form = StepForm::idle();
-        let n = self.states;
-        for j in 0..span::<T, N>(n) {
-            form.state[j] = dot::<T, F, N>(row, &self.transition[j], n);
+        for j in 0..span::<T, N>(self.states) {
+            form.state[j] = dot::<T, F, N>(row, &self.transition[j], self.states);
         }
-        form.constant = dot::<T, F, N>(row, &self.constant, n);
-        form.cubics = over_moments::<T, F, N>(row, forcing_response, n);
+        form.constant = dot::<T, F, N>(row, &self.constant, self.states);
+        form.cubics = over_moments::<T, F, N>(row, forcing_response, self.states);
         form
     }
 }
@@ -263,9 +262,8 @@ impl<T: Number, const N: usize> BuildKernel<'_, T, N> {
         for input in 0..self.network.mechanism.inputs.len() {
             if self.network.is_driven_by(input) {
                 let force = forcing(self.mode, self.network.first_input() + input);
-                let n = self.network.states();
-                let respond = |k: usize| apply::<T, F, N>(&s[k], &force, n);
-                let mut step = [respond(1), respond(2)];
+                let first = apply::<T, F, N>(&s[1], &force, operators.states);
+                let mut step = [first, apply::<T, F, N>(&s[2], &force, operators.states)];
                 if let Some(Some(wave)) = responses_to_waves.get(input) {
                     // The offset is there throughout, and the wave is what the input is off it.
                     let offset = self.waves[input].map_or(0.0, |wave| wave.offset);
@@ -473,9 +471,7 @@ impl<L: KernelFloat, const N: usize> Propagator<L, N> {
     pub fn columns(&self) -> usize {
         if N <= 4 { N } else { self.states }
     }
-
-    /// Rows worth a product: all of plain numbers, which the processor takes together, those in use where a
-    /// number is a vector already.
+    /// Rows worth a product: all of plain numbers, which go together, and those in use of vectors.
     #[inline(always)]
     pub fn rows(&self) -> usize {
         if L::DERIVATIVES { self.columns() } else { N }
