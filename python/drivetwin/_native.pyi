@@ -18,7 +18,6 @@ __all__ = [
     "network_sensitivities",
     "reduce_shift",
     "sensitivities",
-    "simulate",
     "simulate_batch",
     "simulate_controlled",
     "simulate_network",
@@ -37,25 +36,21 @@ _Run = tuple[
 _Output = tuple[str, Sequence[str]]
 _Seeded = tuple[float, Sequence[tuple[int, float]]]
 _Ratios = tuple[str, float, float, float]
+_Sines = Sequence[tuple[str, float, float, float, float]]
 _Scenario = tuple[
-    Sequence[tuple[str, _Array, _Array, float]],
-    tuple[float, float, float, float, Sequence[str]],
+    tuple[Sequence[tuple[str, _Array, _Array, float]], _Sines],
+    tuple[Sequence[tuple[str, float]], Sequence[tuple[str, float]], Sequence[str]],
 ]
+_Sets = tuple[Sequence[str], _Array]
+_Unknowns = tuple[int, Sequence[tuple[int, str, _Array]]]
 _Ends = tuple[NDArray[np.uint32], _Array, list[tuple[int, str]]]
 
-def simulate(
-    model: str,
-    signals: Sequence[tuple[str, _Array, _Array]],
-    start: tuple[float, float, float, float, Sequence[str]],
-    grid: _Array,
-    options: _Options,
-) -> _Run: ...
 def sensitivities(
-    model: str,
-    signals: Sequence[tuple[str, _Array, _Array, float]],
-    start: tuple[float, float, float, float, Sequence[str]],
+    driveline: str,
+    outputs: Sequence[_Output],
+    scenario: _Scenario,
     grid: _Array,
-    options: tuple[float, Sequence[str]],
+    unknowns: _Unknowns,
 ) -> tuple[_Array, list[tuple[float, str, str, float]], str, list[list[_Array]], _Array]: ...
 def linearise(
     driveline: str,
@@ -64,28 +59,28 @@ def linearise(
     outputs: Sequence[_Output],
 ) -> tuple[list[_Array], list[str], list[str]]: ...
 def simulate_batch(
-    model: str,
+    driveline: str,
     scenarios: Sequence[_Scenario],
-    sets: tuple[Sequence[str], _Array],
+    sets: _Sets,
     grid: _Array,
     wanted: tuple[_Array, str],
     into: tuple[tuple[Sequence[_Output], int], _Array],
 ) -> _Ends: ...
 def simulate_controlled(
-    model: str,
-    start: tuple[float, float, float, float, Sequence[str]],
-    sets: tuple[Sequence[str], _Array],
+    driveline: str,
+    scenario: _Scenario,
+    sets: _Sets,
     grid: _Array,
-    controlled: tuple[str, str],
+    controlled: tuple[str, str, str],
     into: tuple[tuple[Sequence[_Output], bool, int], _Array],
 ) -> _Ends: ...
 def batch_sensitivities(
-    model: str,
+    driveline: str,
     scenarios: Sequence[_Scenario],
-    sets: tuple[Sequence[str], _Array],
-    grid: tuple[_Array, Sequence[str]],
+    sets: _Sets,
+    grid: _Array,
     wanted: tuple[_Array, str],
-    options: tuple[Sequence[_Output], int],
+    by: tuple[tuple[Sequence[_Output], int], _Unknowns],
 ) -> tuple[_Ends, tuple[_Array, _Array, _Array, list[tuple[int, str]]]]: ...
 def whiten(
     factor: _Array, samples: tuple[_Array, NDArray[np.uint32], _Array], columns: _Array
@@ -93,10 +88,7 @@ def whiten(
 def simulate_network(
     driveline: str,
     outputs: Sequence[_Output],
-    signals: tuple[
-        Sequence[tuple[str, _Array, _Array]], Sequence[tuple[str, float, float, float, float]]
-    ],
-    start: tuple[Sequence[tuple[str, float]], Sequence[tuple[str, float]], Sequence[str]],
+    scenario: _Scenario,
     grid: _Array,
     options: _Options,
 ) -> _Run: ...
@@ -104,10 +96,7 @@ def element_schema() -> str: ...
 def network_sensitivities(
     driveline: str,
     outputs: Sequence[_Output],
-    signals: tuple[
-        Sequence[tuple[str, _Array, _Array, _Seeded]],
-        Sequence[tuple[str, float, float, float, float]],
-    ],
+    signals: tuple[Sequence[tuple[str, _Array, _Array, _Seeded]], _Sines],
     start: tuple[Sequence[tuple[str, _Seeded]], Sequence[tuple[str, _Seeded]], Sequence[str]],
     grid: _Array,
     options: tuple[float, float, int],

@@ -13,13 +13,18 @@ from hypothesis import strategies as st
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import InputError
+from drivetwin.simulation.driveline import build_driveline
 from drivetwin.simulation.dual_clutch import Signal, simulate
+from drivetwin.simulation.network import Output, Start, build_element
+from drivetwin.simulation.network import simulate as simulate_network
 from drivetwin.simulation.shift_control import (
     INPUTS,
     ControlledBatch,
+    ControlledNetwork,
     ControlledPlant,
     ControlledUnit,
     simulate_controlled,
+    simulate_network_controlled,
 )
 from tests.calibration.cases import make_slip_policy, make_upshift
 
@@ -101,7 +106,7 @@ def test_what_makes_no_batch_is_refused() -> None:
     with pytest.raises(InputError, match="unknown"):
         simulate_controlled(replace(plant, parameters={"B9.gain": np.ones(1)}), [CONTROLLER],
                             SHIFT.time)  # fmt: skip
-    with pytest.raises(InputError, match="no signal"):
+    with pytest.raises(InputError, match='clutch "4" is unknown; known are 2, 3'):
         simulate_controlled(plant, [replace(CONTROLLER, oncoming="4")], SHIFT.time)
     with pytest.raises(InputError, match="not a finite number"):
         simulate_controlled(plant, [replace(CONTROLLER, gain=float("nan"))], SHIFT.time)
@@ -109,3 +114,74 @@ def test_what_makes_no_batch_is_refused() -> None:
         replace(CONTROLLER, task=0.0)
     with pytest.raises(InputError, match="engine lag"):
         replace(POLICY.unit, engine_lag=-1.0)
+
+
+def make_network() -> ControlledNetwork:
+    """The shift as a network whose numbers change by path."""
+    begin = SHIFT.build_start()
+    speeds = {"engine": begin.engine_speed, "output": begin.output_speed}
+    speeds["wheel"] = begin.wheel_speed
+    start = Start(speeds, {"output shaft": begin.twist}, begin.locked)
+    gains = {"3.gain": SHIFT.oncoming.gain * np.array([0.95, 1.05])}
+    return ControlledNetwork(build_driveline(SHIFT.model), start, [POLICY.unit] * 2, gains)
+
+
+NETWORK_OUTPUTS: list[Output] = [("shaft_torque", "output shaft"), ("slip", "2"), ("slip", "3")]
+
+
+def test_a_network_runs_as_the_dual_clutch_that_it_is() -> None:
+    network = make_network()
+    plant = ControlledPlant(
+        SHIFT.model, SHIFT.build_start(), network.units, {"3.gain": network.parameters["3.gain"]}
+    )
+    one = simulate_controlled(plant, [CONTROLLER], SHIFT.time, outputs=OUTPUTS, with_inputs=True)
+    other = simulate_network_controlled(
+        network, [CONTROLLER], SHIFT.time, NETWORK_OUTPUTS, with_inputs=True
+    )
+    np.testing.assert_array_equal(one.values, other.values)
+    np.testing.assert_array_equal(one.inputs, other.inputs)
+    np.testing.assert_array_equal(one.last_lock, other.last_lock)
+
+
+def test_other_inputs_act_as_given() -> None:
+    network = make_network()
+    middle = 0.5 * (SHIFT.time[0] + SHIFT.time[-1])
+    times = np.array([SHIFT.time[0], middle, middle + 0.01, SHIFT.time[-1]])
+    brake = Signal(times, np.array([0.0, 0.0, -500.0, -500.0]))
+    elements = [*network.elements, build_element("torque", "brake", node="wheel", input="M")]
+    jump = replace(brake, time=times[[0, 1, 1, 3]])
+    with pytest.raises(InputError, match="'M' jumps"):
+        simulate_network_controlled(
+            replace(network, elements=elements, inputs={"M": jump}),
+            [CONTROLLER], SHIFT.time, NETWORK_OUTPUTS,
+        )  # fmt: skip
+    network = replace(network, elements=elements, inputs={"M": brake})
+    batch = simulate_network_controlled(
+        network, [CONTROLLER], SHIFT.time, NETWORK_OUTPUTS, with_inputs=True
+    )
+    assert not batch.failed
+    columns = dict(zip(INPUTS, batch.inputs[0, 0], strict=True))
+    given = {"engine torque": "engine_torque", "2": "pressure.offgoing", "3": "pressure.oncoming"}
+    inputs = {name: Signal(SHIFT.time, columns[column]) for name, column in given.items()}
+    lighter = [
+        {**one, "gain": network.parameters["3.gain"][0]} if one["name"] == "3" else one
+        for one in elements
+    ]
+    run = simulate_network(
+        lighter, {**inputs, "M": brake}, network.start, SHIFT.time, NETWORK_OUTPUTS
+    )
+    torque = run.columns[NETWORK_OUTPUTS[0]]
+    assert batch.values[0, 0, 0] == pytest.approx(torque, abs=1e-5 * np.abs(torque).max())
+
+
+def test_a_network_without_what_is_controlled_is_refused() -> None:
+    network = make_network()
+    changed = replace(network, parameters={"3.gian": np.ones(2)})
+    with pytest.raises(InputError, match="did you mean 'gain'"):
+        simulate_network_controlled(changed, [CONTROLLER], SHIFT.time, NETWORK_OUTPUTS)
+    other = replace(CONTROLLER, oncoming="load")
+    inputs = {"3": Signal(SHIFT.time, np.zeros(SHIFT.time.size))}
+    with pytest.raises(InputError, match='clutch "load" is unknown; known are 2, 3'):
+        simulate_network_controlled(
+            replace(network, inputs=inputs), [other], SHIFT.time, NETWORK_OUTPUTS
+        )

@@ -65,7 +65,7 @@ def accepted(element: Mapping[str, Any]) -> list[str]:
     """What the core lists where it refuses a field or type."""
     options = (1e-12, np.inf, None, True, False)
     with pytest.raises(ValueError, match=r"expected one of|expected `") as caught:
-        simulate_network(json.dumps([element]), [], ([], []), ([], [], []), TIME, options)
+        simulate_network(json.dumps([element]), [], (([], []), ([], [], [])), TIME, options)
     return re.findall(r"`(\w+)`", str(caught.value))[1:]
 
 

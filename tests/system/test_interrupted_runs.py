@@ -23,9 +23,9 @@ from drivetwin.simulation.batch import (
 )
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
-    FloatArray,
     Signal,
     simulate_sensitivities,
+    to_core_start,
 )
 from drivetwin.simulation.network import Sine, Start, simulate
 from drivetwin.simulation.serialize import as_json
@@ -126,7 +126,7 @@ def test_a_fault_inside_the_core_is_an_error_below_exception() -> None:
         _native.simulate_batch(
             as_json(MODEL),
             [to_plain(scenario())],
-            (["eta"], np.full((4, 1), 0.9)),
+            (["i_in.loss.eta"], np.full((4, 1), 0.9)),
             TIME,
             (np.empty((0, 0)), "last"),
             (([("speed", ("engine",))], 1), values),
@@ -134,9 +134,8 @@ def test_a_fault_inside_the_core_is_an_error_below_exception() -> None:
     assert isinstance(caught.value, Exception)
 
 
-def to_plain(one: Scenario) -> tuple[list[tuple[str, FloatArray, FloatArray, float]], Any]:
+def to_plain(one: Scenario) -> Any:
     """A scenario as the core takes it."""
     inputs = {"engine torque": one.engine_torque, **one.pressures}
-    start = one.start
-    state = (start.engine_speed, start.output_speed, start.wheel_speed, start.twist, ["B2"])
-    return [(name, s.time, s.values, s.delay) for name, s in inputs.items()], state
+    samples = [(name, s.time, s.values, s.delay) for name, s in inputs.items()]
+    return (samples, []), to_core_start(one.start)

@@ -4,13 +4,12 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{paper_driveline, second_gear};
+use common::{motion_outputs, paper_driveline, second_gear};
 use criterion::{Criterion, criterion_group, criterion_main};
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::network::{ModeKey, Network};
 use drivetwin_core::simulate::{
-    Keep, Plan, RunOptions, Sampled, dual_clutch_batch, dual_clutch_outputs,
-    dual_clutch_sensitivities,
+    Differentiation, Keep, ParameterSets, Plan, RunOptions, Scenario, Seed, Unknowns, batch,
 };
 use drivetwin_core::solver::{Settings, Signal, SolverCache};
 use std::hint::black_box;
@@ -33,8 +32,7 @@ fn upshift() -> [Vec<f64>; 4] {
 }
 
 fn kernels(criterion: &mut Criterion) {
-    let model = paper_driveline::<f64>(LossLaw::Paper);
-    let driveline = model.driveline();
+    let driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
     let network = Network::compile(&driveline).expect("a driveline");
     let [time, torque, off, on] = upshift();
     let signals = [
@@ -42,9 +40,9 @@ fn kernels(criterion: &mut Criterion) {
         ("B2", Signal::samples(&time, &off)),
         ("B3", Signal::samples(&time, &on)),
     ];
-    let outputs = dual_clutch_outputs(&model);
+    let outputs = motion_outputs();
     let options = RunOptions { settings: Settings::default(), audit: false };
-    let plan = Plan::new(&network, &signals, &time, &outputs[4..5], options).expect("a plan");
+    let plan = Plan::new(&network, &signals, &time, &outputs[4..], options).expect("a plan");
     let begin = second_gear();
     let state = begin.state(&network).expect("a start");
 
@@ -56,31 +54,40 @@ fn kernels(criterion: &mut Criterion) {
         b.iter(|| network.mode(black_box(key), &[1.0, 1.0]));
     });
     criterion.bench_function("join the inputs", |b| {
-        b.iter(|| Plan::new(&network, black_box(&signals), &time, &outputs[4..5], options));
+        b.iter(|| Plan::new(&network, black_box(&signals), &time, &outputs[4..], options));
     });
     criterion.bench_function("one shift", |b| b.iter(|| plan.run(&network, black_box(&state))));
     criterion.bench_function("one shift, modes known", |b| {
         let mut known = SolverCache::new(&network);
         b.iter(|| plan.run_again(&mut known, black_box(&state)));
     });
-    let sampled = [("engine torque", &torque), ("B2", &off), ("B3", &on)]
-        .map(|(name, values)| Sampled { name, times: &time, values, delay: 0.0 });
-    let names = ["eta", "J1", "k_o", "B3.P0", "B3.mu_c", "B3.mu_s", "start.twist", "delay.B3"];
-    criterion.bench_function("8 derivatives", |b| {
-        let (settings, time) = (Settings::default(), &time);
-        b.iter(|| {
-            let time = black_box(time);
-            dual_clutch_sensitivities(&model, &sampled, &begin, time, settings, &names)
-        });
-    });
+    let paths = [
+        "i_in.loss.eta",
+        "J1.inertia",
+        "output shaft.stiffness",
+        "start.output shaft",
+        "B3.p0",
+        "B3.friction.mu_c",
+        "B3.friction.mu_s",
+        "delay.B3",
+    ];
+    let seed = |(unknown, path)| Seed { unknown, path, weights: &[1.0] };
+    let seeds: Vec<Seed<'_>> = paths.into_iter().enumerate().map(seed).collect();
+    let differentiation = Differentiation {
+        driveline: &driveline,
+        scenario: Scenario { signals: signals.to_vec(), start: begin.clone() },
+        grid: &time,
+        outputs: &outputs,
+        settings: Settings::default(),
+        unknowns: Unknowns { count: seeds.len(), seeds: &seeds },
+    };
+    criterion.bench_function("8 derivatives", |b| b.iter(|| black_box(&differentiation).run()));
     let scenarios = [(plan.clone(), begin.clone())];
-    let sets: Vec<f64> = (0..64).map(|i| 0.80 + 0.001 * f64::from(i)).collect();
+    let values: Vec<f64> = (0..64).map(|i| 0.80 + 0.001 * f64::from(i)).collect();
+    let sets = ParameterSets { paths: &paths[..1], values: &values };
     criterion.bench_function("64 runs, one thread", |b| {
-        let mut ends = vec![0.0; sets.len()];
-        b.iter(|| {
-            let scenarios = black_box(&scenarios);
-            dual_clutch_batch(&model, scenarios, &["eta"], &sets, Keep::Last, 1, &mut ends)
-        });
+        let mut ends = vec![0.0; values.len()];
+        b.iter(|| batch(&driveline, black_box(&scenarios), sets, Keep::Last, 1, &mut ends));
     });
 }
 

@@ -4,17 +4,22 @@
 
 mod common;
 
-use common::{compile, inertia, paper_driveline, second_gear, shaft, start, torque, upshift};
-use drivetwin_core::model::dual_clutch::DualClutch;
+use common::{
+    compile, inertia, motion_outputs, paper_driveline, second_gear, shaft, start, torque, upshift,
+};
+use drivetwin_core::model::Driveline;
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::network::Network;
 use drivetwin_core::number::{KernelFloat, SimdVector};
 use drivetwin_core::simulate::{
-    Batch, Keep, Outcome, Output, Plan, RunOptions, dual_clutch_batch, dual_clutch_outputs, run,
+    Batch, Keep, Outcome, Output, ParameterSets, Plan, RunOptions, batch, run,
 };
 use drivetwin_core::solver::{LANES, Settings, Signal, Status};
 use proptest::prelude::*;
 use std::ops::Deref;
+
+/// Path of the efficiency.
+const ETA: &str = "i_in.loss.eta";
 
 /// A batch with what is kept of it.
 struct Kept {
@@ -30,37 +35,37 @@ impl Deref for Kept {
     }
 }
 
-/// So many numbers of every run under several sets of the named parameters, in one scenario, on one thread.
+/// Columns of every run, so many numbers, under several sets of numbers by path, in one scenario, on one thread.
 fn columns_of(
-    model: &DualClutch<f64>,
+    driveline: &Driveline<f64>,
     plan: Plan<f64>,
-    names: &[&str],
-    sets: &[f64],
+    paths: &[&str],
+    values: &[f64],
     size: usize,
 ) -> Kept {
-    let mut values = vec![f64::INFINITY; sets.len() / names.len() * size];
-    let (scenarios, how) = ([(plan, second_gear())], (Keep::Columns, 1));
-    let batch = dual_clutch_batch(model, &scenarios, names, sets, how.0, how.1, &mut values);
-    Kept { values, batch: batch.expect("names") }
+    let mut kept = vec![f64::INFINITY; values.len() / paths.len() * size];
+    let (scenarios, sets) = ([(plan, second_gear())], ParameterSets { paths, values });
+    let batch = batch(driveline, &scenarios, sets, Keep::Columns, 1, &mut kept);
+    Kept { values: kept, batch: batch.expect("paths of numbers") }
 }
 
-/// Shaft torque of the paper's shift under several sets of the named parameters, one thread.
-fn shifts_of(names: &[&str], sets: &[f64], settings: Settings) -> Kept {
-    let model = paper_driveline::<f64>(LossLaw::Paper);
-    let network = Network::compile(&model.driveline()).expect("a driveline");
+/// Shaft torque of the paper's shift under several sets of numbers by path, one thread.
+fn shifts_of(paths: &[&str], sets: &[f64], settings: Settings) -> Kept {
+    let driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let network = Network::compile(&driveline).expect("a driveline");
     let columns = upshift(1.0);
     let signals: Vec<(&str, Signal<'_, f64>)> =
         columns.iter().map(|(name, t, v)| (*name, Signal::samples(t, v))).collect();
-    let outputs = &dual_clutch_outputs(&model)[4..5];
+    let outputs = &motion_outputs()[4..];
     let grid = &columns[0].1;
     let plan = Plan::new(&network, &signals, grid, outputs, RunOptions { settings, audit: false })
         .expect("a plan");
-    columns_of(&model, plan, names, sets, grid.len())
+    columns_of(&driveline, plan, paths, sets, grid.len())
 }
 
 /// Shaft torque of the paper's shift under several efficiencies, one thread.
 fn shifts(eta: &[f64], settings: Settings) -> Kept {
-    shifts_of(&["eta"], eta, settings)
+    shifts_of(&[ETA], eta, settings)
 }
 
 fn efficiencies(count: usize) -> Vec<f64> {
@@ -138,9 +143,13 @@ fn events_of_all_lanes_within_few_samples_are_located_one_by_one() {
 /// driveline gives the same result as alone, in any lane.
 #[test]
 fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
-    let names = ["eta", "k_o", "B2.gain", "B3.gain", "B3.P0", "B3.mu_s", "start.twist"];
-    let model = paper_driveline::<f64>(LossLaw::Paper);
-    let nominal: Vec<f64> = names.iter().map(|name| nominal(&model, name)).collect();
+    let shaft = ["output shaft.stiffness", "start.output shaft"];
+    let clutches = ["B2.gain", "B3.gain", "B3.p0", "B3.friction.mu_s"];
+    let paths = [&[ETA], &shaft[..1], &clutches, &shaft[1..]].concat();
+    let mut driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let twist = second_gear::<f64>().twists[0].1;
+    let nominal = paths.iter().map(|path| driveline.number_mut(path).map_or(twist, |n| *n));
+    let nominal: Vec<f64> = nominal.collect();
     let mut noise = 1_u64;
     let mut scatter = |by: f64| {
         noise =
@@ -157,7 +166,7 @@ fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
     (sets[2][3], sets[LANES + 1][1], sets[LANES + 3][2]) = (0.0, -1.0, nominal[2] * 1e-3);
     let of = |order: &[usize]| {
         let flat: Vec<f64> = order.iter().flat_map(|&run| sets[run].iter().copied()).collect();
-        shifts_of(&names, &flat, Settings::default())
+        shifts_of(&paths, &flat, Settings::default())
     };
     let forward: Vec<usize> = (0..runs).collect();
     let shuffled: Vec<usize> = (0..runs).map(|i| (i * 8 + 3) % runs).collect();
@@ -184,8 +193,8 @@ fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
 /// and without operators.
 #[test]
 fn jumps_between_samples_are_met_together_and_alone() {
-    let model = paper_driveline::<f64>(LossLaw::Paper);
-    let network = Network::compile(&model.driveline()).expect("a driveline");
+    let driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let network = Network::compile(&driveline).expect("a driveline");
     let grid: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
     let time: Vec<f64> = [&grid[..=500], &grid[500..]].concat();
     let step = |before: f64, after: f64| [vec![before; 501], vec![after; 501]].concat();
@@ -193,12 +202,12 @@ fn jumps_between_samples_are_met_together_and_alone() {
     let columns = [("engine torque", torque), ("B2", off), ("B3", on)];
     let signals: Vec<(&str, Signal<'_, f64>)> =
         columns.iter().map(|(name, values)| (*name, Signal::samples(&time, values))).collect();
-    let outputs = &dual_clutch_outputs(&model)[4..5];
+    let outputs = &motion_outputs()[4..];
     let run = |settings, eta: &[f64]| {
         let plan =
             Plan::new(&network, &signals, &grid, outputs, RunOptions { settings, audit: false })
                 .expect("a plan");
-        columns_of(&model, plan, &["eta"], eta, grid.len())
+        columns_of(&driveline, plan, &[ETA], eta, grid.len())
     };
     let eta = efficiencies(LANES);
     let (fast, exact) = (run(Settings::default(), &eta), run(Settings::exact(), &eta));
@@ -217,15 +226,15 @@ fn jumps_between_samples_are_met_together_and_alone() {
 /// none begin a block: here from sample 61 on, after the on-coming clutch has been filled.
 #[test]
 fn a_coarse_grid_is_met_at_its_points() {
-    let model = paper_driveline::<f64>(LossLaw::Paper);
-    let network = Network::compile(&model.driveline()).expect("a driveline");
+    let driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let network = Network::compile(&driveline).expect("a driveline");
     let mut columns = upshift(1.0);
     for (t, pressure) in columns[0].1.clone().iter().zip(&mut columns[2].2) {
         *pressure = 0.8e5 / 0.0605 * t.min(0.2);
     }
     let signals: Vec<(&str, Signal<'_, f64>)> =
         columns.iter().map(|(name, t, v)| (*name, Signal::samples(t, v))).collect();
-    let outputs = &dual_clutch_outputs(&model)[3..5];
+    let outputs = &motion_outputs()[3..];
     let run = |every: usize| {
         let grid: Vec<f64> = columns[0].1.iter().copied().step_by(every).collect();
         let plan = Plan::new(
@@ -236,7 +245,7 @@ fn a_coarse_grid_is_met_at_its_points() {
             RunOptions { settings: Settings::default(), audit: false },
         );
         let (plan, size) = (plan.expect("a plan"), outputs.len() * grid.len());
-        let batch = columns_of(&model, plan, &["eta"], &efficiencies(LANES), size);
+        let batch = columns_of(&driveline, plan, &[ETA], &efficiencies(LANES), size);
         (batch.values, grid.len())
     };
     let (fine, points) = run(1);
@@ -245,9 +254,4 @@ fn a_coarse_grid_is_met_at_its_points() {
         let expected = fine.chunks_exact(points).flat_map(|column| column.iter().step_by(every));
         assert!(coarse.iter().eq(expected), "every {every}");
     }
-}
-
-fn nominal(model: &DualClutch<f64>, name: &str) -> f64 {
-    let mut model = model.clone();
-    model.parameter_mut(name).copied().unwrap_or_else(|| second_gear::<f64>().twist)
 }

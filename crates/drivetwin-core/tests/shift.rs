@@ -3,29 +3,28 @@
 
 mod common;
 
-use common::{paper_driveline, second_gear, upshift};
+use common::{motion_outputs, paper_driveline, second_gear, upshift};
 use drivetwin_core::model::DualClutch;
 use drivetwin_core::model::mechanism::LossLaw;
+use drivetwin_core::network::Network;
 use drivetwin_core::number::Dual;
 use drivetwin_core::number::Real;
-use drivetwin_core::simulate::{DualClutchRun, RunOptions, simulate_dual_clutch};
+use drivetwin_core::simulate::{RunOptions, Trajectory, run};
 use drivetwin_core::solver::{EventKind, Settings, Signal, Status};
 
 const SHAFT_TORQUE: usize = 4;
 
-fn shift<T: Real>(model: &DualClutch<T>, weak: f64, settings: Settings) -> DualClutchRun<T> {
+fn shift<T: Real>(model: &DualClutch<T>, weak: f64, settings: Settings) -> Trajectory<T> {
+    shift_by(model, weak, RunOptions { settings, audit: true })
+}
+
+fn shift_by<T: Real>(model: &DualClutch<T>, weak: f64, options: RunOptions) -> Trajectory<T> {
     let signals = upshift(weak);
     let borrowed: Vec<(&str, Signal<'_, T>)> =
         signals.iter().map(|s| (s.0, Signal::samples(&s.1, &s.2))).collect();
-    let grid = signals[0].1.clone();
-    simulate_dual_clutch(
-        model,
-        &borrowed,
-        &second_gear(),
-        &grid,
-        RunOptions { settings, audit: true },
-    )
-    .unwrap()
+    let network = Network::compile(&model.driveline()).unwrap();
+    let (grid, outputs) = (&signals[0].1, motion_outputs());
+    run(&network, &borrowed, &second_gear(), grid, &outputs, options).unwrap()
 }
 
 #[test]
@@ -61,7 +60,7 @@ fn events_of_an_upshift_come_in_order() {
 }
 
 /// Error in shaft torque of a fixed order and step against round-off accuracy.
-fn error(order: usize, max_step: f64, exact: &DualClutchRun<f64>) -> f64 {
+fn error(order: usize, max_step: f64, exact: &Trajectory<f64>) -> f64 {
     let settings = Settings { order: Some(order), max_step, ..Settings::exact() };
     let run = shift(&paper_driveline::<f64>(LossLaw::Paper), 1.0, settings);
     let pairs = run.columns[SHAFT_TORQUE].iter().zip(&exact.columns[SHAFT_TORQUE]);
@@ -144,16 +143,6 @@ fn passing_whole_samples_stays_close_to_the_exact_motion() {
     }
 }
 
-fn unaudited(model: &DualClutch<f64>, settings: Settings) -> DualClutchRun<f64> {
-    let signals = upshift(1.0);
-    let inputs: Vec<(&str, Signal<'_, f64>)> =
-        signals.iter().map(|s| (s.0, Signal::samples(&s.1, &s.2))).collect();
-    simulate_dual_clutch(
-        model,
-        &inputs,
-        &second_gear(),
-        &signals[0].1,
-        RunOptions { settings, audit: false },
-    )
-    .unwrap()
+fn unaudited(model: &DualClutch<f64>, settings: Settings) -> Trajectory<f64> {
+    shift_by(model, 1.0, RunOptions { settings, audit: false })
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! Pressure of an actuator by its command; see `drivetwin.actuator.model`.
 
-use crate::batch::refused;
 use crate::border::call;
+use crate::border::refused;
 use drivetwin_core::control::ActuatorModel;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;

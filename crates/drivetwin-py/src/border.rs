@@ -2,9 +2,11 @@
 //! Border between Python and the core: Ctrl-C ends a call, a panic becomes an exception.
 
 use drivetwin_core::solver::with_interrupt;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::any::Any;
 use std::cell::RefCell;
+use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 thread_local! {
@@ -20,6 +22,11 @@ pub fn call<R: Send>(py: Python<'_>, work: impl FnOnce() -> R + Send) -> PyResul
         return Err(error);
     }
     result.map_err(|panic| fault(py, &*panic))
+}
+
+/// Exception with the text of an error.
+pub fn refused(error: &dyn Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }
 
 /// Let Python handle its signals; true where a handler raises.

@@ -7,13 +7,14 @@ mod actuator;
 mod batch;
 mod border;
 mod controlled;
-mod dual_clutch;
 mod gearbox;
 mod linear;
 mod network;
 mod network_sensitivity;
 mod output;
 mod plain;
+mod scenario;
+mod sensitivity;
 mod table;
 mod whitening;
 
@@ -26,8 +27,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 /// The compiled core.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(dual_clutch::simulate, module)?)?;
-    module.add_function(wrap_pyfunction!(dual_clutch::sensitivities, module)?)?;
+    module.add_function(wrap_pyfunction!(sensitivity::sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(batch::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(batch::batch_sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(controlled::simulate_controlled, module)?)?;

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 //! The linear system about an operating point; see `drivetwin.simulation.linearize`.
 
-use crate::border::call;
-use crate::dual_clutch::model_of;
-use crate::network::parse;
+use crate::border::{call, refused};
 use crate::output::{NamedOutput, outputs_of};
+use crate::scenario::parse;
 use drivetwin_core::network::Network;
 use drivetwin_core::network::linalg::Matrix;
 use drivetwin_core::simulate::{Slipping, linearise as linearised};
 use numpy::PyArray2;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// A, B, C, D and the names of states and inputs.
@@ -25,21 +23,16 @@ pub fn linearise<'py>(
     slipping: Vec<(String, f64, f64)>,
     outputs: Vec<NamedOutput>,
 ) -> PyResult<System<'py>> {
-    let refuse = |e: &dyn std::fmt::Display| PyValueError::new_err(e.to_string());
-    let elements = match driveline.trim_start().starts_with('[') {
-        true => parse(driveline)?,
-        false => model_of(driveline)?.driveline(),
-    };
-    let outputs = outputs_of(&outputs)?;
+    let (driveline, outputs) = (parse(driveline)?, outputs_of(&outputs)?);
     let slipping: Vec<Slipping> = slipping
         .into_iter()
         .map(|(element, slip, pressure)| Slipping { element, slip, pressure })
         .collect();
     let system = call(py, || {
-        let network = Network::compile(&elements)?;
+        let network = Network::compile(&driveline)?;
         linearised(&network, &locked, &slipping, &outputs)
     })?
-    .map_err(|e| refuse(&e))?;
+    .map_err(|e| refused(&e))?;
     let array = |m: &Matrix<f64>| {
         let rows: Vec<Vec<f64>> = (0..m.rows).map(|i| m.row(i).to_vec()).collect();
         PyArray2::from_vec2(py, &rows)

@@ -1,26 +1,21 @@
 // SPDX-License-Identifier: MIT
 //! Exact derivatives of the runs of any network; see `drivetwin.simulation.network_sensitivity`.
 
-use crate::border::call;
-use crate::network::{Sine, parse};
+use crate::border::{call, refused};
 use crate::output::{NamedOutput, outputs_of};
 use crate::plain::{Event, events_of, status_of};
+use crate::scenario::{NamedStart, Samples, Sine, parse, signals_of};
 use drivetwin_core::network::Network;
-use drivetwin_core::number::{Dual, Number};
+use drivetwin_core::number::Dual;
 use drivetwin_core::simulate::{LANES, RunOptions, SimulateError, Start, run};
-use drivetwin_core::solver::{Settings, Signal};
+use drivetwin_core::solver::Settings;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// Most unknowns of a narrow pass.
 const FEW: usize = 8;
 /// Value and the weights of its derivatives by lanes.
 type Seeded = (f64, Vec<(usize, f64)>);
-/// Input name, sample times [s], values and delay [s].
-type Delayed<'py> = (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, Seeded);
-/// Speeds [rad/s] by node, twists [rad] by shaft, names of elements at rest.
-type StartState = (Vec<(String, Seeded)>, Vec<(String, Seeded)>, Vec<String>);
 /// Columns (n_outputs, n_time), events, status, derivatives of every column (n_time, lanes) and of every
 /// event time (n_events, lanes).
 type Found<'py> = (
@@ -40,8 +35,8 @@ pub fn network_sensitivities<'py>(
     py: Python<'py>,
     driveline: &str,
     outputs: Vec<NamedOutput>,
-    signals: (Vec<Delayed<'py>>, Vec<Sine>),
-    start: StartState,
+    signals: (Vec<Samples<'py, Seeded>>, Vec<Sine>),
+    start: NamedStart<Seeded>,
     grid: PyReadonlyArray1<'py, f64>,
     options: Options,
 ) -> PyResult<Found<'py>> {
@@ -53,7 +48,8 @@ pub fn network_sensitivities<'py>(
 }
 
 /// Inputs, start and grid.
-type Given<'py> = ((Vec<Delayed<'py>>, Vec<Sine>), StartState, PyReadonlyArray1<'py, f64>);
+type Given<'py> =
+    ((Vec<Samples<'py, Seeded>>, Vec<Sine>), NamedStart<Seeded>, PyReadonlyArray1<'py, f64>);
 
 fn differentiate<'py, const P: usize>(
     py: Python<'py>,
@@ -64,18 +60,7 @@ fn differentiate<'py, const P: usize>(
 ) -> PyResult<Found<'py>> {
     let (driveline, outputs) = (parse::<Dual<P>>(driveline)?, outputs_of(outputs)?);
     let grid = grid.as_slice()?;
-    let (samples, sines) = signals;
-    let mut inputs = samples
-        .iter()
-        .map(|(name, times, values, delay)| {
-            let (times, values, delay) = (times.as_slice()?, values.as_slice()?, seed(delay)?);
-            Ok((name.as_str(), Signal::Samples { times, values, delay }))
-        })
-        .collect::<PyResult<Vec<_>>>()?;
-    inputs.extend(sines.iter().map(|&(ref name, offset, amplitude, frequency, phase)| {
-        let (offset, amplitude) = (Dual::of(offset), Dual::of(amplitude));
-        (name.as_str(), Signal::Sine { offset, amplitude, frequency, phase })
-    }));
+    let inputs = signals_of(&signals.0, &signals.1, seed)?;
     let (speeds, twists, locked) = start;
     let start = Start { speeds: seed_all(speeds)?, twists: seed_all(twists)?, locked };
     let (tolerance, max_step, _) = options;
@@ -84,7 +69,7 @@ fn differentiate<'py, const P: usize>(
     let found = call(py, || -> Result<_, SimulateError> {
         run(&Network::compile(&driveline)?, &inputs, &start, grid, &outputs, options)
     })?
-    .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    .map_err(|e| refused(&e))?;
     let times: Vec<Vec<f64>> = found.events.iter().map(|e| e.time.eps.to_vec()).collect();
     let (run, slopes) = found.split_derivatives();
     let handed = |slopes: Vec<f64>| slopes.into_pyarray(py).reshape([grid.len(), P]);
@@ -98,7 +83,7 @@ fn differentiate<'py, const P: usize>(
 }
 
 fn seed<const P: usize>((value, seeds): &Seeded) -> PyResult<Dual<P>> {
-    let refuse = |lane| PyValueError::new_err(format!("lane {lane} is beyond {P}"));
+    let refuse = |lane| refused(&format!("lane {lane} is beyond {P}"));
     Dual::from_seeds(*value, seeds).map_err(refuse)
 }
 

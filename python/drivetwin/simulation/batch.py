@@ -7,7 +7,7 @@ result depends neither on its neighbours nor on the number of threads.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -18,6 +18,9 @@ from drivetwin._native import batch_sensitivities as native_batch_sensitivities
 from drivetwin._native import simulate_batch as native_simulate_batch
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import (
+    MOTION,
+    CoreSamples,
+    CoreStart,
     DualClutch,
     FloatArray,
     Signal,
@@ -28,6 +31,7 @@ from drivetwin.simulation.dual_clutch import (
     to_core_start,
     to_delayed_core_samples,
 )
+from drivetwin.simulation.dual_clutch_paths import Seed, list_seeds, place_sets
 from drivetwin.simulation.network_output import NativeOutput
 from drivetwin.simulation.serialize import as_array, as_json, as_names
 
@@ -46,6 +50,11 @@ class Scenario:
     engine_torque: Signal
     pressures: Mapping[str, Signal]
     start: State
+
+    @property
+    def inputs(self) -> dict[str, Signal]:
+        """Inputs by their names in the core."""
+        return collect_inputs(self.engine_torque, self.pressures)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,15 +88,6 @@ class BatchSensitivities:
     grazing: Mapping[int, str]
 
 
-OUTPUTS: Mapping[str, NativeOutput] = {
-    "engine_speed": ("speed", ("engine",)),
-    "output_speed": ("speed", ("output",)),
-    "wheel_speed": ("speed", ("wheel",)),
-    "twist": ("twist", ("output shaft",)),
-    "shaft_torque": ("shaft_torque", ("output shaft",)),
-}
-
-
 def simulate_batch(
     model: DualClutch,
     scenarios: Sequence[Scenario],
@@ -100,29 +100,17 @@ def simulate_batch(
 ) -> Batch:
     """Simulate on `time` (n,) [s] once per set of `parameters`, or once per scenario.
 
-    `parameters` maps names as in `driveline.sensitivities` (but for delays) to their values
-    (runs,); with several scenarios there must be one for every run. Outputs are the names of
-    OUTPUTS, and `torque.<element>` or `slip.<element>`. Instead of what to keep, one measured
-    column (n,) per output may be given: kept is then the sum of the squared distances to it, over
-    its samples that are not NaN. `threads` 0 takes all cores.
+    `parameters` maps names as in `dual_clutch.simulate_sensitivities` (but for delays) to their
+    values (runs,); with several scenarios there must be one for every run. Outputs are the names of
+    `dual_clutch.MOTION`, and `torque.<element>` or `slip.<element>`. Instead of what to keep, one
+    measured column (n,) per output may be given: kept is then the sum of the squared distances to
+    it, over its samples that are not NaN. `threads` 0 takes all cores.
     Raises InputError for unknown names, differing lengths or an inconsistent description.
     """
-    if threads < 0:
-        raise InputError(f"{threads} threads", "give a number from 1, or 0 for all cores")
-    asked = _Asked.from_request(scenarios, time, parameters or {}, outputs, keep)
-    values = np.empty(asked.shape)
-    try:
-        ends = native_simulate_batch(
-            as_json(model),
-            asked.scenarios,
-            asked.sets,
-            asked.time,
-            asked.wanted,
-            ((asked.outputs, threads), values.reshape(-1)),
-        )
-    except ValueError as error:
-        raise InputError(str(error), "correct the model, its inputs or the names") from error
-    return _build_batch(values, ends)
+    native = [parse_output(name) for name in as_names(outputs)]
+    plain = _to_core_scenarios(scenarios)
+    asked = BatchRequest.build(plain, time, parameters or {}, native, keep)
+    return asked.simulate(as_json(model), place_sets(model, asked.sets), threads)
 
 
 def simulate_batch_sensitivities(
@@ -137,69 +125,52 @@ def simulate_batch_sensitivities(
 ) -> BatchSensitivities:
     """The runs of `simulate_batch` with exact derivatives of what is kept.
 
-    `by` names what to differentiate by, at least one, as in `driveline.sensitivities` (delays
-    included); with measured columns to keep these are the gradients of the misfits. Takes all
-    cores.
+    `by` names what to differentiate by, at least one, as in `dual_clutch.simulate_sensitivities`
+    (delays included); with measured columns to keep these are the gradients of the misfits. Takes
+    all cores.
     Raises InputError as `simulate_batch`.
     """
     by = as_names(by)
-    if not by:
-        raise InputError("nothing to differentiate by", "name a parameter, or use simulate_batch")
-    for scenario in scenarios:
-        require_delays(collect_inputs(scenario.engine_torque, scenario.pressures), by)
-    asked = _Asked.from_request(scenarios, time, parameters or {}, outputs, keep)
-    try:
-        ends, (values, derivatives, last_lock, grazing) = native_batch_sensitivities(
-            as_json(model),
-            asked.scenarios,
-            asked.sets,
-            (asked.time, by),
-            asked.wanted,
-            (asked.outputs, 0),
-        )
-    except ValueError as error:
-        raise InputError(str(error), "correct the model, its inputs or the names") from error
-    shape = (asked.shape[0], len(by), *asked.shape[1:])
-    return BatchSensitivities(
-        _build_batch(values.reshape(asked.shape), ends),
-        tuple(by),
-        derivatives.reshape(shape),
-        last_lock.reshape(shape[:2]),
-        dict(grazing),
-    )
+    require_unknowns((one.inputs for one in scenarios), by)
+    native = [parse_output(name) for name in as_names(outputs)]
+    plain = _to_core_scenarios(scenarios)
+    asked = BatchRequest.build(plain, time, parameters or {}, native, keep)
+    sets, (_, seeds) = place_sets(model, asked.sets), list_seeds(model, by, asked.sets)
+    return asked.differentiate(as_json(model), sets, by, seeds)
 
 
-_Start = tuple[float, float, float, float, list[str]]
-_Plain = tuple[list[tuple[str, FloatArray, FloatArray, float]], _Start]
+CoreScenario = tuple[
+    tuple[list[CoreSamples], list[tuple[str, float, float, float, float]]], CoreStart
+]
+"""Samples and sines of the inputs, and the start, as the core takes them."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
-    """Arguments of a batch call to the core; `shape` is that of the values kept."""
+class BatchRequest:
+    """Arguments of a batch call to the core; `sets` by name, `shape` that of the values kept."""
 
-    scenarios: Sequence[_Plain]
-    sets: tuple[list[str], FloatArray]
+    scenarios: Sequence[CoreScenario]
+    sets: Mapping[str, FloatArray]
+    outputs: Sequence[NativeOutput]
     time: FloatArray
     wanted: tuple[FloatArray, str]
-    outputs: Sequence[NativeOutput]
     shape: tuple[int, ...]
 
     @classmethod
-    def from_request(
+    def build(
         cls,
-        scenarios: Sequence[Scenario],
+        scenarios: Sequence[CoreScenario],
         time: FloatArray,
         parameters: Mapping[str, FloatArray],
-        outputs: Sequence[str],
+        outputs: Sequence[NativeOutput],
         keep: Keep | Sequence[FloatArray],
-    ) -> _Asked:
+    ) -> BatchRequest:
+        """Check a request. Raises InputError for lengths that do not fit."""
         if isinstance(keep, str) and keep not in tuple(Keep):
             raise InputError(f"{keep!r} cannot be kept", f"choose from {', '.join(Keep)}")
         keep = Keep(keep) if isinstance(keep, str) else keep
-        outputs = as_names(outputs)
         sets = {name: as_array(values) for name, values in parameters.items()}
-        shape = (_count_runs(sets, scenarios), len(outputs), len(time))
-        table = np.stack(list(sets.values()), axis=1) if sets else np.empty((0, 0))
+        shape = (_count_runs(sets, len(scenarios)), len(outputs), len(time))
         wanted = np.empty((0, 0)) if isinstance(keep, Keep) else np.asarray(keep, dtype=np.float64)
         if not isinstance(keep, Keep) and wanted.shape != shape[1:]:
             raise InputError(
@@ -208,13 +179,63 @@ class _Asked:
                 "give one column per output, sampled on the time",
             )
         return cls(
-            [_to_core_scenario(scenario) for scenario in scenarios],
-            (list(sets), np.ascontiguousarray(table)),
+            scenarios,
+            sets,
+            outputs,
             run_time(time),
             (np.ascontiguousarray(wanted), keep.value if isinstance(keep, Keep) else "misfit"),
-            [parse_output(name) for name in outputs],
             shape if keep is Keep.COLUMNS else shape[:2],
         )
+
+    def simulate(self, driveline: str, sets: Mapping[str, FloatArray], threads: int) -> Batch:
+        """Simulate a driveline, given as JSON, under sets by path."""
+        if threads < 0:
+            raise InputError(f"{threads} threads", "give a number from 1, or 0 for all cores")
+        values = np.empty(self.shape)
+        into = ((self.outputs, threads), values.reshape(-1))
+        given = (driveline, self.scenarios, stack_sets(sets), self.time, self.wanted)
+        try:
+            ends = native_simulate_batch(*given, into)
+        except ValueError as error:
+            raise InputError(str(error), "correct the model, its inputs or the names") from error
+        return _build_batch(values, ends)
+
+    def differentiate(
+        self,
+        driveline: str,
+        sets: Mapping[str, FloatArray],
+        names: Sequence[str],
+        seeds: Sequence[Seed],
+    ) -> BatchSensitivities:
+        """Simulate and differentiate by unknowns of these names and seeds."""
+        given = (driveline, self.scenarios, stack_sets(sets), self.time, self.wanted)
+        try:
+            found = native_batch_sensitivities(*given, ((self.outputs, 0), (len(names), seeds)))
+        except ValueError as error:
+            raise InputError(str(error), "correct the model, its inputs or the names") from error
+        ends, (values, derivatives, last_lock, grazing) = found
+        shape = (self.shape[0], len(names), *self.shape[1:])
+        return BatchSensitivities(
+            _build_batch(values.reshape(self.shape), ends),
+            tuple(names),
+            derivatives.reshape(shape),
+            last_lock.reshape(shape[:2]),
+            dict(grazing),
+        )
+
+
+def stack_sets(sets: Mapping[str, FloatArray], runs: int = 0) -> tuple[list[str], FloatArray]:
+    """Return the paths and the values (runs, paths) of sets; `runs` counts where there are none."""
+    table = np.stack(list(sets.values()), axis=1) if sets else np.empty((runs, 0))
+    return list(sets), np.ascontiguousarray(table)
+
+
+def require_unknowns(inputs: Iterable[Mapping[str, Signal]], by: Sequence[str]) -> None:
+    """Raise InputError where `by` names nothing, or the delay of an input that jumps."""
+    if not by:
+        raise InputError("nothing to differentiate by", "name a parameter, or use a plain batch")
+    for one in inputs:
+        require_delays(one, by)
 
 
 def _build_batch(
@@ -224,14 +245,14 @@ def _build_batch(
     return Batch(values, events, last_lock, dict(failed))
 
 
-def _count_runs(sets: Mapping[str, FloatArray], scenarios: Sequence[Scenario]) -> int:
+def _count_runs(sets: Mapping[str, FloatArray], scenarios: int) -> int:
     """Number of runs that sets and scenarios agree on."""
     counts = {len(values) for values in sets.values()}
-    runs = counts.pop() if sets else len(scenarios)
-    if counts or (len(scenarios) != 1 and len(scenarios) != runs) or not runs:
+    runs = counts.pop() if sets else scenarios
+    if counts or scenarios not in (1, runs) or not runs:
         lengths = sorted({len(values) for values in sets.values()})
         raise InputError(
-            f"{len(scenarios)} scenarios and parameters of {lengths} values make no batch",
+            f"{scenarios} scenarios and parameters of {lengths} values make no batch",
             "give every parameter as many values, and one scenario or as many",
         )
     return runs
@@ -242,12 +263,13 @@ def parse_output(name: str) -> NativeOutput:
     kind, _, element = name.partition(".")
     if element and kind in ("torque", "slip"):
         return "friction_torque" if kind == "torque" else "slip", (element,)
-    if name not in OUTPUTS:
-        known = ", ".join([*OUTPUTS, "torque.<element>", "slip.<element>"])
+    if name not in MOTION:
+        known = ", ".join([*MOTION, "torque.<element>", "slip.<element>"])
         raise InputError(f"output {name!r} is unknown", f"choose from {known}")
-    return OUTPUTS[name]
+    return MOTION[name]
 
 
-def _to_core_scenario(scenario: Scenario) -> _Plain:
-    inputs = collect_inputs(scenario.engine_torque, scenario.pressures)
-    return to_delayed_core_samples(inputs), to_core_start(scenario.start)
+def _to_core_scenarios(scenarios: Sequence[Scenario]) -> list[CoreScenario]:
+    return [
+        ((to_delayed_core_samples(one.inputs), []), to_core_start(one.start)) for one in scenarios
+    ]

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._native import sensitivities as native_sensitivities
-from drivetwin._native import simulate as native_simulate
+from drivetwin._native import simulate_network as native_simulate
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import InputError
+from drivetwin.simulation.dual_clutch_paths import list_seeds
 from drivetwin.simulation.serialize import (
     as_array,
     as_json,
@@ -36,6 +37,23 @@ the magnitude of the times, so Unix time stamps would give wrong results."""
 
 ENGINE_TORQUE = "engine torque"
 """Name of that input of a dual clutch; the pressures have those of their elements."""
+
+_SHAFT = "output shaft"
+
+MOTION: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "engine_speed": ("speed", ("engine",)),
+    "output_speed": ("speed", ("output",)),
+    "wheel_speed": ("speed", ("wheel",)),
+    "twist": ("twist", (_SHAFT,)),
+    "shaft_torque": ("shaft_torque", (_SHAFT,)),
+}
+"""Outputs of the motion of a dual clutch by name, as the core takes them."""
+
+CoreSamples = tuple[str, FloatArray, FloatArray, float]
+"""Name of an input, times [s], values and delay [s]."""
+
+CoreStart = tuple[list[tuple[str, float]], list[tuple[str, float]], list[str]]
+"""Speeds [rad/s] by node, twists [rad] by shaft, names of elements without slip."""
 
 ORDERS = range(1, 15)
 """Fixed orders of integration; a step of the core holds no more than 15 Taylor coefficients."""
@@ -341,8 +359,8 @@ def simulate(
     try:
         columns, events, status, energy = native_simulate(
             as_json(model),
-            to_core_samples(collect_inputs(engine_torque, pressures)),
-            to_core_start(start),
+            _list_outputs(model),
+            ((to_core_samples(collect_inputs(engine_torque, pressures)), []), to_core_start(start)),
             run_time(time),
             options,
         )
@@ -374,14 +392,13 @@ def simulate_sensitivities(
     """
     inputs, parameters = collect_inputs(engine_torque, pressures), as_names(parameters)
     require_delays(inputs, parameters)
-    options = (Accuracy().tolerance, parameters)
     try:
         columns, events, status, derivatives, event_derivatives = native_sensitivities(
             as_json(model),
-            to_delayed_core_samples(inputs),
-            to_core_start(start),
+            _list_outputs(model),
+            ((to_delayed_core_samples(inputs), []), to_core_start(start)),
             run_time(time),
-            options,
+            list_seeds(model, parameters, {}),
         )
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the names") from error
@@ -428,14 +445,14 @@ def collect_inputs(engine_torque: Signal, pressures: Mapping[str, Signal]) -> di
     return {ENGINE_TORQUE: engine_torque, **pressures}
 
 
-def to_core_samples(inputs: Mapping[str, Signal]) -> list[tuple[str, FloatArray, FloatArray]]:
-    """Inputs as the core takes them: name, times [s] at which the values act, values."""
-    return [(name, as_array(one.arrival), as_array(one.values)) for name, one in inputs.items()]
+def to_core_samples(inputs: Mapping[str, Signal]) -> list[CoreSamples]:
+    """Inputs as the core takes them: name, times [s] at which the values act, values, no delay."""
+    return [
+        (name, as_array(one.arrival), as_array(one.values), 0.0) for name, one in inputs.items()
+    ]
 
 
-def to_delayed_core_samples(
-    inputs: Mapping[str, Signal],
-) -> list[tuple[str, FloatArray, FloatArray, float]]:
+def to_delayed_core_samples(inputs: Mapping[str, Signal]) -> list[CoreSamples]:
     """Inputs whose delays the core differentiates by: name, sample times [s], values, delay [s]."""
     return [
         (name, as_array(one.time), as_array(one.values), one.delay) for name, one in inputs.items()
@@ -457,11 +474,19 @@ def require_delays(inputs: Mapping[str, Signal], by: Sequence[str]) -> None:
             )
 
 
-def to_core_start(start: State) -> tuple[float, float, float, float, list[str]]:
+def to_core_start(start: State) -> CoreStart:
     """A start as the core takes it. Raises InputError for what are no numbers or names."""
     names = ("engine_speed", "output_speed", "wheel_speed", "twist")
-    engine, out, wheel, twist = (require_number(n, getattr(start, n), finite=False) for n in names)
-    return engine, out, wheel, twist, as_names(start.locked)
+    *speeds, twist = (require_number(n, getattr(start, n), finite=False) for n in names)
+    by_node = list(zip(("engine", "output", "wheel"), speeds, strict=True))
+    return by_node, [(_SHAFT, twist)], as_names(start.locked)
+
+
+def _list_outputs(model: DualClutch) -> list[tuple[str, tuple[str, ...]]]:
+    """List the outputs of a trajectory as the core takes them."""
+    names = [element.name for element in model.elements]
+    friction = [(kind, (name,)) for name in names for kind in ("friction_torque", "slip")]
+    return [*MOTION.values(), *friction]
 
 
 def _build_trajectory(

@@ -17,6 +17,7 @@ from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
+    CoreStart,
     EnergyAudit,
     Event,
     FloatArray,
@@ -92,6 +93,10 @@ class Start:
                 require_number(f"{word} of {name!r} in a start", value)
         as_names(self.locked)
 
+    def to_core(self) -> CoreStart:
+        """Return the start as the core takes it."""
+        return list(self.speeds.items()), list(self.twists.items()), as_names(self.locked)
+
 
 @dataclass(frozen=True, eq=False)
 class NetworkRun:
@@ -129,8 +134,7 @@ def simulate(
         columns, events, status, energy = native_simulate_network(
             as_json(elements),
             [one for request in recorded for one in request.native],
-            (to_core_samples(sampled), to_core_sines(inputs)),
-            (list(start.speeds.items()), list(start.twists.items()), as_names(start.locked)),
+            ((to_core_samples(sampled), to_core_sines(inputs)), start.to_core()),
             run_time(time),
             (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit),
         )

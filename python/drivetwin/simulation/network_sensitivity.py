@@ -9,9 +9,9 @@ delay of a sampled input.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -199,17 +199,73 @@ def differentiate(
     """
     elements, outputs = list(elements), list(outputs)
     resolve_outputs(elements, inputs, outputs)
+    seeded = _Description(json.loads(as_json(elements)), dict(inputs), start)
+    for path, derivative in collect_weights(unknowns).items():
+        seeded = seeded.place_variable(path, derivative)
+    given = (seeded.elements, seeded.inputs, seeded.start, time, outputs)
+    found = NetworkTask(*given, accuracy or Accuracy()).differentiate(len(unknowns))
+    return replace(found, unknowns=tuple(unknowns))
+
+
+def collect_weights(unknowns: Unknowns) -> dict[str, FloatArray]:
+    """Return the derivatives (k,) by the k unknowns of the numbers that they act on, by path."""
     named = unknowns if isinstance(unknowns, Mapping) else {one: {one: 1.0} for one in unknowns}
     slopes: dict[str, FloatArray] = {}
     for place, weights in enumerate(named.values()):
         for path, weight in weights.items():
             slopes.setdefault(path, np.zeros(len(named)))[place] += weight
-    seeded = _Description(json.loads(as_json(elements)), dict(inputs), start)
-    for path, derivative in slopes.items():
-        seeded = seeded.place_variable(path, derivative)
-    given = (seeded.elements, seeded.inputs, seeded.start, time, outputs)
-    found = NetworkTask(*given, accuracy or Accuracy()).differentiate(len(named))
-    return replace(found, unknowns=tuple(named))
+    return slopes
+
+
+class HasInputs(Protocol):
+    """Scenario of a network."""
+
+    @property
+    def inputs(self) -> Mapping[str, Signal | Sine]:
+        """Inputs by name."""
+
+    @property
+    def start(self) -> Start:
+        """Start of the run."""
+
+
+def require_numbers(
+    elements: Sequence[Element], scenarios: Sequence[HasInputs], paths: Iterable[str]
+) -> None:
+    """Raise InputError for a path that leads to no number that can change from run to run."""
+    for path in paths:
+        if path.startswith("delay."):
+            raise InputError(f"{path!r} cannot change from run to run", "give scenarios for it")
+        _find_number(elements, scenarios, path)
+
+
+def require_derivatives(
+    elements: Sequence[Element],
+    scenarios: Sequence[HasInputs],
+    paths: Iterable[str],
+    sets: Mapping[str, FloatArray],
+) -> None:
+    """Raise InputError for a path that leads to no number, or to one where its law has a corner.
+
+    `sets` are the values (runs,) of numbers that change from run to run, by path.
+    """
+    for path in paths:
+        key, value = _find_number(elements, scenarios, path)
+        if np.any(sets.get(path, np.array(value)) == 0.0):
+            _require_smooth(path, key, 0.0)
+
+
+def _find_number(
+    elements: Sequence[Element], scenarios: Sequence[HasInputs], path: str
+) -> tuple[object, float]:
+    """Return the key and the value of a number. Raises InputError where a scenario has none."""
+    start_or_delay = path.startswith(("start.", "delay."))
+    found: tuple[object, float] = ("", 0.0)
+    for one in scenarios if start_or_delay else scenarios[:1]:
+        described = [] if start_or_delay else json.loads(as_json(list(elements)))
+        place, key = _Description(described, dict(one.inputs), one.start).find_number(path)
+        found = key, float(place[key])
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,40 +276,58 @@ class _Description:
     inputs: dict[str, Signal | Sine]
     start: Start
 
-    def place_variable(self, path: str, slopes: FloatArray) -> _Description:
-        """Return the description with a variable of `slopes` (p,) at a path.
+    @property
+    def samples(self) -> dict[str, Signal]:
+        """Inputs that are sampled."""
+        return {name: one for name, one in self.inputs.items() if isinstance(one, Signal)}
+
+    def find_number(self, path: str) -> tuple[Any, Any]:
+        """Return the group or list with the number at a path, and its key there.
 
         Raises InputError for a path that leads to no number.
         """
         head, _, name = path.partition(".")
         if head == "start":
-            begin = {**self.start.speeds, **self.start.twists}
+            begin = {**self.start.twists, **self.start.speeds}
             _require_known(path, "speed or twist", name, begin)
-            speeds, twists = (
-                {key: _vary(value, slopes) if key == name else value for key, value in one.items()}
-                for one in (self.start.speeds, self.start.twists)
-            )
-            return replace(self, start=Start(speeds, twists, self.start.locked))
+            return begin, name
         if head == "delay":
-            sampled = {key: one for key, one in self.inputs.items() if isinstance(one, Signal)}
-            _require_known(path, "delay", name, sampled)
-            delayed = replace(sampled[name], delay=_vary(sampled[name].delay, slopes))
-            return replace(self, inputs={**self.inputs, name: delayed})
+            delays = {key: one.delay for key, one in self.samples.items()}
+            _require_known(path, "delay", name, delays)
+            return delays, name
         by_name = {str(one["name"]): one for one in self.elements}
         _require_known(path, "element", head, by_name)
         place, key = _find_place(by_name[head], name.split(".") if name else [], path)
-        value = place[key]
-        if not is_number(value):
+        if not is_number(place[key]):
             raise InputError(f"unknown {path!r} is no number", _HOW)
-        if value == 0.0 and key not in _SMOOTH_AT_ZERO:
-            what = f"nothing has a derivative by {path!r} at 0: its law has a corner there"
-            raise InputError(what, "give it a small positive value")
-        place[key] = _vary(value, slopes)
+        return place, key
+
+    def place_variable(self, path: str, slopes: FloatArray) -> _Description:
+        """Return the description with a variable of `slopes` (p,) at a path.
+
+        Raises InputError for a path that leads to no number, or to one where its law has a corner.
+        """
+        place, key = self.find_number(path)
+        variable = Variable(float(place[key]), slopes)
+        head, _, name = path.partition(".")
+        if head == "start":
+            speeds, twists = dict(self.start.speeds), dict(self.start.twists)
+            (speeds if name in speeds else twists)[name] = variable
+            return replace(self, start=Start(speeds, twists, self.start.locked))
+        if head == "delay":
+            delayed = {name: replace(self.samples[name], delay=variable)}
+            return replace(self, inputs={**self.inputs, **delayed})
+        _require_smooth(path, key, place[key])
+        place[key] = variable
         return self
 
 
-def _vary(value: float, slopes: FloatArray) -> Variable:
-    return Variable(float(value), slopes)
+def _require_smooth(path: str, key: object, value: float) -> None:
+    """Raise InputError where the law of an element has a corner at the value of a number."""
+    free = path.startswith(("start.", "delay.")) or key in _SMOOTH_AT_ZERO
+    if value == 0.0 and not free:
+        what = f"nothing has a derivative by {path!r} at 0: its law has a corner there"
+        raise InputError(what, "give it a small positive value")
 
 
 def _require_known(path: str, what: str, name: str, known: Mapping[str, object]) -> None:

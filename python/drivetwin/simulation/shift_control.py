@@ -9,15 +9,31 @@ docs/howto/calibrate.md.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from drivetwin._native import simulate_controlled as native_simulate_controlled
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import InputError, Where
-from drivetwin.simulation.batch import parse_output
-from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, State, run_time, to_core_start
+from drivetwin.simulation.batch import parse_output, stack_sets
+from drivetwin.simulation.dual_clutch import (
+    ENGINE_TORQUE,
+    CoreSamples,
+    CoreStart,
+    DualClutch,
+    FloatArray,
+    Signal,
+    State,
+    run_time,
+    to_core_start,
+    to_delayed_core_samples,
+)
+from drivetwin.simulation.dual_clutch_paths import place_sets
+from drivetwin.simulation.network import Element, Output, Start
+from drivetwin.simulation.network_batch import NetworkScenario, resolve_native
+from drivetwin.simulation.network_output import NativeOutput
+from drivetwin.simulation.network_sensitivity import require_numbers
 from drivetwin.simulation.serialize import as_array, as_json, as_names
 
 INPUTS = (
@@ -135,6 +151,22 @@ class ControlledPlant:
     parameters: Mapping[str, FloatArray]
 
 
+@dataclass(frozen=True, eq=False)
+class ControlledNetwork:
+    """Made units of a network: actuators, and values (units,) of numbers by path.
+
+    `start` is the state at the first sample. The controller commands the input `engine_torque` and
+    the pressures of its clutches; `inputs` are the others, without jumps.
+    """
+
+    elements: Sequence[Element]
+    start: Start
+    units: Sequence[ControlledUnit]
+    parameters: Mapping[str, FloatArray]
+    inputs: Mapping[str, Signal] = field(default_factory=dict)
+    engine_torque: str = ENGINE_TORQUE
+
+
 def simulate_controlled(
     plant: ControlledPlant,
     controllers: Sequence[ShiftController],
@@ -149,39 +181,134 @@ def simulate_controlled(
     Outputs are named as in `simulate_batch`. The controllers share elements, task and request.
     `threads` 0 takes all cores. Raises InputError for an inconsistent description.
     """
-    outputs = as_names(outputs)
-    units, rows = len(plant.units), len(outputs)
-    table = [as_array(values) for values in plant.parameters.values()]
-    _check(plant, controllers, threads)
-    more = len(INPUTS) if with_inputs else 0
-    values = np.empty((units, len(controllers), rows + more, len(time)))
-    sets = np.stack(table, axis=1) if table else np.empty((units, 0))
-    try:
-        _, last_lock, failed = native_simulate_controlled(
-            as_json(plant.model),
-            to_core_start(plant.start),
-            (list(plant.parameters), np.ascontiguousarray(sets)),
-            run_time(time),
-            (as_json(list(controllers)), as_json(list(plant.units))),
-            (
-                ([parse_output(name) for name in outputs], with_inputs, threads),
-                values.reshape(-1),
-            ),
-        )
-    except ValueError as error:
-        raise InputError(str(error), "correct the model, its inputs or the names") from error
-    shape = values.shape[:2]
-    return ControlledBatch(
-        values[:, :, :rows], values[:, :, rows:], last_lock.reshape(shape), dict(failed)
+    native = [parse_output(name) for name in as_names(outputs)]
+    sets = {name: as_array(values) for name, values in plant.parameters.items()}
+    _check(sets, len(plant.units), controllers, threads)
+    asked = _Asked(
+        as_json(plant.model),
+        to_core_start(plant.start),
+        plant.units,
+        place_sets(plant.model, sets),
     )
+    return asked.simulate(controllers, time, native, with_inputs=with_inputs, threads=threads)
 
 
-def _check(plant: ControlledPlant, controllers: Sequence[ShiftController], threads: int) -> None:
-    lengths = {len(values) for values in plant.parameters.values()} | {len(plant.units)}
+def simulate_network_controlled(
+    plant: ControlledNetwork,
+    controllers: Sequence[ShiftController],
+    time: FloatArray,
+    outputs: Sequence[Output],
+    *,
+    with_inputs: bool = False,
+    threads: int = 0,
+) -> ControlledBatch:
+    """Simulate all controllers on all units of a network.
+
+    Parameters
+    ----------
+    plant
+        Network, its actuators and its parameter sets.
+    controllers
+        Controllers of the same clutches, task and request.
+    time
+        Grid (n,) [s], increasing.
+    outputs
+        Recorded quantities.
+    with_inputs
+        True if `INPUTS` are recorded too.
+    threads
+        Number of threads; 0 takes all cores.
+
+    Returns
+    -------
+    ControlledBatch
+        Values (units, controllers, outputs, n), SI.
+
+    Raises
+    ------
+    InputError
+        For a path that leads to no number or an inconsistent description.
+    """
+    sets = {name: as_array(values) for name, values in plant.parameters.items()}
+    _check(sets, len(plant.units), controllers, threads)
+    commanded = (controllers[0].offgoing, controllers[0].oncoming)
+    pressures = [
+        one["pressure"]
+        for one in plant.elements
+        if one.get("name") in commanded and "pressure" in one
+    ]
+    held = Signal(np.array([0.0, 1.0]), np.zeros(2))
+    inputs = {**dict.fromkeys([plant.engine_torque, *pressures], held), **plant.inputs}
+    scenario = NetworkScenario(inputs, plant.start)
+    for name, one in plant.inputs.items():
+        if np.any(np.diff(one.time) == 0.0):
+            what = f"input {name!r} jumps, which no controlled run passes"
+            raise InputError(what, "give the jump a width, such as that of a sample")
+    native = resolve_native(plant.elements, [scenario], outputs)
+    require_numbers(plant.elements, [scenario], sets)
+    asked = _Asked(
+        as_json(list(plant.elements)),
+        plant.start.to_core(),
+        plant.units,
+        sets,
+        to_delayed_core_samples(plant.inputs),
+        plant.engine_torque,
+    )
+    return asked.simulate(controllers, time, native, with_inputs=with_inputs, threads=threads)
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """Controlled runs as the core takes them: driveline as JSON, sets (units,) by path."""
+
+    driveline: str
+    start: CoreStart
+    units: Sequence[ControlledUnit]
+    sets: Mapping[str, FloatArray]
+    samples: Sequence[CoreSamples] = ()
+    engine_torque: str = ENGINE_TORQUE
+
+    def simulate(
+        self,
+        controllers: Sequence[ShiftController],
+        time: FloatArray,
+        outputs: Sequence[NativeOutput],
+        *,
+        with_inputs: bool,
+        threads: int,
+    ) -> ControlledBatch:
+        units, rows = len(self.units), len(outputs)
+        more = len(INPUTS) if with_inputs else 0
+        values = np.empty((units, len(controllers), rows + more, len(time)))
+        given = (as_json(list(controllers)), as_json(list(self.units)), self.engine_torque)
+        try:
+            _, last_lock, failed = native_simulate_controlled(
+                self.driveline,
+                ((self.samples, []), self.start),
+                stack_sets(self.sets, units),
+                run_time(time),
+                given,
+                ((outputs, with_inputs, threads), values.reshape(-1)),
+            )
+        except ValueError as error:
+            raise InputError(str(error), "correct the model, its inputs or the names") from error
+        shape = values.shape[:2]
+        return ControlledBatch(
+            values[:, :, :rows], values[:, :, rows:], last_lock.reshape(shape), dict(failed)
+        )
+
+
+def _check(
+    sets: Mapping[str, FloatArray],
+    units: int,
+    controllers: Sequence[ShiftController],
+    threads: int,
+) -> None:
+    lengths = {len(values) for values in sets.values()} | {units}
     common = {(one.offgoing, one.oncoming, one.task, one.request) for one in controllers}
     if len(lengths) != 1 or 0 in lengths or len(common) != 1 or threads < 0:
         raise InputError(
-            f"{len(plant.units)} units, parameters of {sorted(lengths)} values, {len(common)} "
+            f"{units} units, parameters of {sorted(lengths)} values, {len(common)} "
             f"kinds of controllers and {threads} threads make no batch",
             "give a unit for every value, controllers of the same elements, task and request, and "
             "threads from 1 or 0 for all cores",

@@ -3,78 +3,77 @@
 
 #![expect(non_snake_case, reason = "the symbols of the equations")]
 
-use super::declare::described;
-use super::described::Described;
 use super::elements::{Clutch, Element, Gear, GearLoss, Inertia, RoadLoad, SpringDamper, Torque};
 use super::mechanism::LossLaw;
 use super::{Driveline, FrictionLaw, Name};
 use crate::number::Number;
+use serde::Deserialize;
 use smol_str::SmolStrBuilder;
 use std::marker::PhantomData;
 
-described! {
-    /// Shift element: `slip = ω_in / i_c - i_out ω_out` (eq. 15).
-    pub struct ShiftElement<T> {
-        /// Name, such as B2.
-        pub name: Name = Name(),
-        /// Ratio between input gear and clutch.
-        pub i_c: T = Number(),
-        /// Ratio between clutch and output.
-        pub i_out: T = Number(),
-        /// N·D·A·r.
-        pub gain: T = Number("m³"),
-        /// Pressure at which the fill ends.
-        #[serde(rename = "P0")]
-        pub p0: T = Number("Pa"),
-        /// Friction coefficient over the magnitude of the slip.
-        pub friction: FrictionLaw<T> = Group(),
-        /// Static over kinetic capacity.
-        pub peak: T = Number(),
-        /// Inertia that turns with the slip.
-        pub drum_inertia: T = Number("kg·m²"),
-    }
+/// Shift element: `slip = ω_in / i_c - i_out ω_out` (eq. 15).
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShiftElement<T> {
+    /// Name, such as B2.
+    pub name: Name,
+    /// Ratio between input gear and clutch.
+    pub i_c: T,
+    /// Ratio between clutch and output.
+    pub i_out: T,
+    /// N·D·A·r, m³.
+    pub gain: T,
+    /// Pressure at which the fill ends, Pa.
+    #[serde(rename = "P0")]
+    pub p0: T,
+    /// Friction coefficient over the magnitude of the slip.
+    pub friction: FrictionLaw<T>,
+    /// Static over kinetic capacity.
+    pub peak: T,
+    /// Inertia that turns with the slip, kg·m².
+    pub drum_inertia: T,
 }
 
-described! {
-    /// Load at the wheel, see [`RoadLoad`].
-    pub struct Load<T> {
-        /// Torque independent of the direction of motion.
-        pub constant: T = Number("N·m"),
-        /// Rolling resistance.
-        pub rolling: T = Number("N·m"),
-        /// Aerodynamic coefficient.
-        pub aero: T = Number("N·m·s²/rad²"),
-    }
+/// Load at the wheel, see [`RoadLoad`].
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Load<T> {
+    /// Torque independent of the direction of motion, N·m.
+    pub constant: T,
+    /// Rolling resistance, N·m.
+    pub rolling: T,
+    /// Aerodynamic coefficient, N·m·s²/rad².
+    pub aero: T,
 }
 
-described! {
-    /// Parameters of eqs. 2-9; symbols as in THEORY section 3. The elements of the network check their range.
-    pub struct DualClutch<T> {
-        /// Inertia before the input gear.
-        pub J1: T = Number("kg·m²"),
-        /// Inertia between input gear and clutches, at the engine.
-        pub J2e: T = Number("kg·m²"),
-        /// Lumped efficiency.
-        pub eta: T = Number(),
-        /// Loss law by name.
-        pub loss_law: LossLaw = Text().one_of(LossLaw::NAMES),
-        /// Input gear.
-        pub i_in: T = Number(),
-        /// Output side before the shaft (Jo').
-        pub J_out: T = Number("kg·m²"),
-        /// Final drive.
-        pub i_f: T = Number(),
-        /// Vehicle at the wheel.
-        pub J_v: T = Number("kg·m²"),
-        /// Output shaft stiffness.
-        pub k_o: T = Number("N·m/rad"),
-        /// Output shaft damping.
-        pub c_o: T = Number("N·m·s/rad"),
-        /// Load torque at the wheel.
-        pub load: Load<T> = Group(),
-        /// Shift elements.
-        pub elements: Vec<ShiftElement<T>> = Group(),
-    }
+/// Parameters of eqs. 2-9; symbols as in THEORY section 3. The elements of the network check their range.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DualClutch<T> {
+    /// Inertia before the input gear, kg·m².
+    pub J1: T,
+    /// Inertia between input gear and clutches, at the engine, kg·m².
+    pub J2e: T,
+    /// Lumped efficiency.
+    pub eta: T,
+    /// Loss law by name.
+    pub loss_law: LossLaw,
+    /// Input gear.
+    pub i_in: T,
+    /// Output side before the shaft (Jo'), kg·m².
+    pub J_out: T,
+    /// Final drive.
+    pub i_f: T,
+    /// Vehicle at the wheel, kg·m².
+    pub J_v: T,
+    /// Output shaft stiffness, N·m/rad.
+    pub k_o: T,
+    /// Output shaft damping, N·m·s/rad.
+    pub c_o: T,
+    /// Load torque at the wheel.
+    pub load: Load<T>,
+    /// Shift elements.
+    pub elements: Vec<ShiftElement<T>>,
 }
 
 /// Node of the engine.
@@ -171,39 +170,4 @@ fn inertia<T: Number>(name: Name, node: &Name, inertia: T) -> Element<T> {
 
 fn gear<T: Number>(name: Name, a: &Name, b: &Name, ratio: T) -> Gear<T> {
     Gear { name, a: a.clone(), b: b.clone(), ratio, loss: None, losses: None }
-}
-
-impl<T: Number> DualClutch<T> {
-    /// A number of the model by its name: a field (`eta`), `load.constant`, or a field of a shift
-    /// element by the element's name (`B2.P0`, `B2.mu_c`, `B2.mu.3` for a point of a table).
-    pub fn parameter_mut(&mut self, name: &str) -> Option<&mut T> {
-        match name.split_once('.') {
-            None => self.number_mut(&[name]),
-            Some(("load", field)) => self.load.number_mut(&[field]),
-            Some((element, field)) => {
-                self.elements.iter_mut().find(|e| e.name == element)?.parameter_mut(field)
-            }
-        }
-    }
-}
-
-impl DualClutch<f64> {
-    /// Convert the driveline to another number type.
-    pub fn promote<T: Number>(&self) -> DualClutch<T> {
-        self.map(&|&value| T::of(value))
-    }
-}
-
-impl<T: Number> ShiftElement<T> {
-    fn parameter_mut(&mut self, name: &str) -> Option<&mut T> {
-        match name.split_once('.') {
-            Some(("mu", point)) => self.friction.number_mut(&["mu", point]),
-            Some(_) => None,
-            None if name == "P0" => Some(&mut self.p0),
-            None if matches!(name, "mu_c" | "mu_s" | "v_s" | "mu_v") => {
-                self.friction.number_mut(&[name])
-            }
-            None => self.number_mut(&[name]),
-        }
-    }
 }

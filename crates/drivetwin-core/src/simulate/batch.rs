@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
 //! Many runs over the same samples: parameter sets on one scenario, or scenarios on one driveline.
 
-use super::dual_clutch::DualClutchStart;
 use super::lockstep_recorder::{GridPoints, Recorder};
 use super::run::{Plan, SimulateError};
 use super::sensitivity::SensitivityError;
-use super::start::State;
+use super::sets::{ParameterSets, Sets};
+use super::start::{Start, State};
 use super::threads::share_out;
-use crate::model::dual_clutch::DualClutch;
-use crate::network::Network;
-use crate::number::{Number, Real, with_consensus};
+use crate::model::Driveline;
+use crate::number::{Real, with_consensus};
 use crate::solver::{
     Event, EventKind, Inputs, LANES, Lanes, NO_POINT, SolverCache, Status, lane_mask, run_lockstep,
 };
@@ -30,7 +29,7 @@ pub enum Keep<'m> {
 /// Outcome of one run of a batch.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// It ran; its status.
+    /// Finished; holds the run status.
     Ran(Status),
     /// It could not be started.
     Refused(SimulateError),
@@ -47,9 +46,8 @@ pub struct Batch {
     pub last_lock: Vec<f64>,
 }
 
-/// Simulate a dual-clutch driveline under `sets` of the named parameters (runs × parameters), in one
-/// scenario or in one for every run: `scenarios` are plans and starts, run i takes that of its number or
-/// the only one. Names are those of [`DualClutch::parameter_mut`] and, after `start.`, of the start.
+/// Simulate a driveline under parameter sets, in one scenario or in one for every run: `scenarios` are plans
+/// and starts, run i takes that of its number or the only one.
 ///
 /// The kept numbers of each run ([`Keep::size`]) overwrite `values`, which the caller allocates. Failed
 /// runs give NaN.
@@ -57,100 +55,22 @@ pub struct Batch {
 /// # Panics
 ///
 /// If `values` is not as long as what is kept of all runs.
-pub fn dual_clutch_batch(
-    model: &DualClutch<f64>,
-    scenarios: &[(Plan<f64>, DualClutchStart<f64>)],
-    parameters: &[&str],
-    sets: &[f64],
+pub fn batch(
+    driveline: &Driveline<f64>,
+    scenarios: &[(Plan<f64>, Start<f64>)],
+    parameters: ParameterSets<'_>,
     keep: Keep<'_>,
     threads: usize,
     values: &mut [f64],
 ) -> Result<Batch, SensitivityError> {
-    if let Some((_, start)) = scenarios.first() {
-        check_names(model, start, parameters, sets)?;
-    }
     let starts = scenarios.iter().map(|(_, start)| start).collect();
     let plans: Vec<&Plan<f64>> = scenarios.iter().map(|(plan, _)| plan).collect();
-    let sets = Sets { model, starts, parameters, sets };
+    let sets = Sets::new(driveline, starts, parameters)?;
     let count = if scenarios.is_empty() { 0 } else { sets.count() };
     let size = plans.first().map_or(0, |plan| keep.size(plan.targets.len(), plan.grid.len()));
     let work = Work { sets, plans, keep, threads };
     assert_eq!(values.len(), count * size, "places for what is kept");
     Ok(work.result(count, size, values))
-}
-
-/// Refuse names that are no parameters.
-pub(super) fn check_names(
-    model: &DualClutch<f64>,
-    start: &DualClutchStart<f64>,
-    parameters: &[&str],
-    sets: &[f64],
-) -> Result<(), SensitivityError> {
-    let (mut model, mut start) = (model.clone(), start.clone());
-    let unknown = |name: &&&str| place(&mut model, &mut start, name).is_none();
-    match parameters.iter().find(unknown) {
-        Some(&name) if !sets.is_empty() => Err(SensitivityError::Unknown { name: name.to_owned() }),
-        _ => Ok(()),
-    }
-}
-
-fn place<'m, T: Number>(
-    model: &'m mut DualClutch<T>,
-    start: &'m mut DualClutchStart<T>,
-    name: &str,
-) -> Option<&'m mut T> {
-    match name.split_once('.') {
-        Some(("start", field)) => start.field_mut(field),
-        _ => model.parameter_mut(name),
-    }
-}
-
-/// Definition of the runs of a batch: parameter sets of a driveline, in one scenario or in one each.
-pub(super) struct Sets<'s> {
-    pub model: &'s DualClutch<f64>,
-    pub starts: Vec<&'s DualClutchStart<f64>>,
-    pub parameters: &'s [&'s str],
-    /// Runs × parameters.
-    pub sets: &'s [f64],
-}
-
-impl Sets<'_> {
-    /// Number of runs.
-    pub fn count(&self) -> usize {
-        self.sets.len().checked_div(self.parameters.len()).unwrap_or(self.starts.len())
-    }
-
-    /// Start of a run.
-    fn start(&self, run: usize) -> &DualClutchStart<f64> {
-        self.starts[run % self.starts.len()]
-    }
-
-    /// Model and start of runs side by side, at most as many as a number has; the first stands in for those
-    /// that it has more. The names must be parameters.
-    pub fn place_runs<T: Number>(&self, runs: &[usize]) -> (DualClutch<T>, DualClutchStart<T>) {
-        let of = |place: usize| runs.get(place).map_or(runs[0], |&run| run);
-        let mut model = self.model.promote();
-        let mut start = DualClutchStart::from_lanes(|place| self.start(of(place)));
-        let width = self.parameters.len();
-        for (i, name) in self.parameters.iter().enumerate() {
-            let value = T::from_lanes(|place| self.sets[of(place) * width + i]);
-            // Unknown names have been refused.
-            if let Some(place) = place(&mut model, &mut start, name) {
-                *place = value;
-            }
-        }
-        (model, start)
-    }
-
-    pub fn compile_runs<T: Number>(
-        &self,
-        runs: &[usize],
-    ) -> Result<(Network<T>, State<T>), SimulateError> {
-        let (model, start) = self.place_runs(runs);
-        let network = Network::compile(&model.driveline())?;
-        let state = start.state(&network)?;
-        Ok((network, state))
-    }
 }
 
 /// Time of the last lock [s].
@@ -216,17 +136,18 @@ impl Work<'_> {
     }
 
     fn run_single(&self, job: &mut Job<'_>) {
-        let plan = self.plan(job.run);
-        let prepared = self.sets.compile_runs(&[job.run]);
-        let (network, state) = match prepared.and_then(|p| plan.check(&p.0).map(|()| p)) {
-            Ok(prepared) => prepared,
+        let prepared = self.sets.place_runs(&[job.run]).compile();
+        let run = prepared.and_then(|(network, state)| {
+            Ok(self.plan(job.run).adapt(&network, &state)?.run(&network, &state))
+        });
+        let run = match run {
+            Ok(run) => run,
             Err(error) => {
                 job.values.fill(f64::NAN);
                 job.outcome = Some(Outcome::Refused(error));
                 return;
             }
         };
-        let run = plan.run(&network, &state);
         if run.status == Status::Completed {
             self.keep.reduce(&run.columns.concat(), run.time.len(), job.values);
         } else {
@@ -238,19 +159,21 @@ impl Work<'_> {
     /// Do those of a group that go together with its first.
     fn run_group(&self, group: &mut [&mut Job<'_>]) {
         let runs: Vec<usize> = group.iter().map(|job| job.run).collect();
-        let (plan, locked) = (self.plan(runs[0]), &self.sets.start(runs[0]).locked);
+        let (plan, start) = (self.plan(runs[0]), self.sets.start(runs[0]));
         // Fewer are done as fast alone.
-        let enough = runs.len() > LANES / 2 && plan.settings.exponential_steps;
+        let enough = runs.len() > LANES / 2 && plan.lockstep;
         let Some(points) = plan.points.as_deref().filter(|_| enough) else { return };
         let alike = |&run: &usize| {
             let (knots, others) = (plan.inputs.knots(), self.plan(run).inputs.knots());
             (std::ptr::eq(knots, others) || knots == others)
-                && self.sets.start(run).locked == *locked
+                && self.plan(run).lockstep
+                && self.sets.start(run).is_alike(start)
         };
         let alike = lane_mask(runs.iter().map(alike));
-        let (prepared, parting) = with_consensus(alike, || self.sets.compile_runs::<Lanes>(&runs));
+        let case = self.sets.place_runs::<Lanes>(&runs);
+        let (prepared, parting) = with_consensus(alike, || case.compile());
         let Ok((network, State { x, locked, .. })) = prepared else { return };
-        if plan.check(&network).is_err() {
+        if plan.find_targets(&network).as_ref() != Ok(&plan.targets) {
             return;
         }
         let inputs: Vec<&Inputs<f64>> = runs.iter().map(|&run| &*self.plan(run).inputs).collect();

@@ -1,34 +1,20 @@
 // SPDX-License-Identifier: MIT
 //! Exact derivatives of what a batch keeps, run by run over all cores.
 
-use super::batch::{Batch, Keep, Outcome, Sets, check_names, last_lock};
-use super::dual_clutch::DualClutchStart;
+use super::batch::{Batch, Keep, Outcome, last_lock};
 use super::output::Output;
 use super::run::{Plan, RunOptions, SimulateError};
-use super::sensitivity::{
-    LANES, Sampled, SensitivityError, apply_delays, check_corners, seed_variables,
-};
+use super::sensitivity::{LANES, Scenario, Seeded, SensitivityError, Unknowns};
+use super::sets::{Case, ParameterSets, Sets};
 use super::threads::share_out;
 use super::trajectory::Trajectory;
-use crate::model::dual_clutch::DualClutch;
+use crate::model::Driveline;
 use crate::network::Network;
 use crate::number::Dual;
 use crate::solver::{Settings, Status};
 
-/// A number with its derivatives by the parameters of one pass.
+/// A number with its derivatives by the unknowns of one pass.
 type Derived = Dual<LANES>;
-
-/// Inputs and start of a run.
-pub type Stated<'a> = (Vec<Sampled<'a>>, DualClutchStart<f64>);
-
-/// Parameter sets of a batch.
-#[derive(Clone, Copy, Debug)]
-pub struct ParameterSets<'a> {
-    /// Names of the parameters.
-    pub names: &'a [&'a str],
-    /// Values, sets × parameters.
-    pub values: &'a [f64],
-}
 
 /// Outputs that are recorded of every run, and the numbers that are kept of them.
 #[derive(Clone, Copy, Debug)]
@@ -46,48 +32,40 @@ pub struct Recording<'a> {
 pub struct BatchDerivatives {
     /// Kept numbers, runs × kept.
     pub values: Vec<f64>,
-    /// Derivatives of the kept numbers, runs × parameters × kept.
+    /// Derivatives of the kept numbers, runs × unknowns × kept.
     pub kept: Vec<f64>,
-    /// Derivatives of the time of the last lock, runs × parameters.
+    /// Derivatives of the time of the last lock, runs × unknowns.
     pub last_lock: Vec<f64>,
     /// Runs of which an event only grazed its guard, its time [s] and element: no derivatives there.
     pub grazing: Vec<(usize, f64, String)>,
 }
 
-/// As [`super::dual_clutch_batch`], with the derivatives `by` the named parameters, which may also be
-/// delays; see [`super::dual_clutch_sensitivities`].
-pub fn dual_clutch_batch_sensitivities(
-    model: &DualClutch<f64>,
-    scenarios: &[Stated<'_>],
+/// Simulate as [`super::batch`], and differentiate by the unknowns.
+pub fn batch_sensitivities(
+    driveline: &Driveline<f64>,
+    scenarios: &[Scenario<'_>],
     parameters: ParameterSets<'_>,
     recording: Recording<'_>,
-    by: &[&str],
+    unknowns: Unknowns<'_>,
     threads: usize,
 ) -> Result<(Batch, BatchDerivatives), SensitivityError> {
-    let ParameterSets { names: parameters, values: sets } = parameters;
     let Recording { grid, outputs, keep } = recording;
-    if let Some((_, start)) = scenarios.first() {
-        check_names(model, start, parameters, sets)?;
-    }
-    let groups: Vec<&[&str]> = by.chunks(LANES).collect();
+    let starts = scenarios.iter().map(|scenario| &scenario.start).collect();
+    let sets = Sets::new(driveline, starts, parameters)?;
     let mut plans = Vec::with_capacity(scenarios.len());
-    for (signals, start) in scenarios {
-        let plan = |names: &&[&str]| plan(model, signals, start, grid, outputs, names);
-        plans.push(groups.iter().map(plan).collect::<Result<Vec<_>, _>>()?);
+    for Scenario { signals, start } in scenarios {
+        let case = Case { driveline: driveline.clone(), start: start.clone() };
+        let plan = |pass| recording.plan(unknowns.seed(pass, 0, &case, signals)?);
+        plans.push((0..unknowns.passes()).map(plan).collect::<Result<Vec<_>, _>>()?);
     }
-    let starts = scenarios.iter().map(|(_, start)| start).collect();
-    let sets = Sets { model, starts, parameters, sets };
-    (0..sets.count()).try_for_each(|i| check_corners(by, &sets.place_runs(&[i]).0))?;
+    (0..sets.count()).try_for_each(|i| unknowns.check_corners(&mut sets.place_runs(&[i])))?;
     let run = |i: usize| -> Result<Vec<Kept>, SimulateError> {
-        let (signals, _) = &scenarios[i % scenarios.len()];
-        let (model, start) = sets.place_runs(&[i]);
-        let passes = groups.iter().zip(&plans[i % plans.len()]).map(|(names, plan)| {
-            let (model, start, _) =
-                seed_variables(&model, signals, &start, names).expect("names that were checked");
-            let network = Network::compile(&model.driveline())?;
-            plan.check(&network)?;
-            let state = start.state(&network)?;
-            Ok(Kept::of(plan.run(&network, &state), keep))
+        let Scenario { signals, .. } = &scenarios[i % scenarios.len()];
+        let case = sets.place_runs(&[i]);
+        let passes = plans[i % plans.len()].iter().enumerate().map(|(pass, plan)| {
+            let seeded = unknowns.seed(pass, i, &case, signals).expect("paths that were checked");
+            let (network, state) = seeded.case.compile()?;
+            Ok(Kept::of(plan.adapt(&network, &state)?.run(&network, &state), keep))
         });
         passes.collect()
     };
@@ -96,28 +74,17 @@ pub fn dual_clutch_batch_sensitivities(
     share_out(threads, passes.iter_mut().enumerate(), |(i, pass)| *pass = Some(run(i)));
     let interrupted = || Err(SimulateError::Interrupted);
     let passes = passes.into_iter().map(|pass| pass.unwrap_or_else(interrupted)).collect();
-    Ok(collect_runs(passes, keep.size(outputs.len(), grid.len()), by.len()))
+    Ok(collect_runs(passes, keep.size(outputs.len(), grid.len()), unknowns.count))
 }
 
-/// The scenario made ready for one group of variables.
-fn plan(
-    model: &DualClutch<f64>,
-    signals: &[Sampled<'_>],
-    start: &DualClutchStart<f64>,
-    grid: &[f64],
-    outputs: &[Output],
-    names: &[&str],
-) -> Result<Plan<Derived>, SensitivityError> {
-    let (model, _, delays) = seed_variables(model, signals, start, names)?;
-    let network = Network::compile(&model.driveline()).map_err(SimulateError::from)?;
-    let inputs = apply_delays(signals, &delays);
-    Ok(Plan::new(
-        &network,
-        &inputs,
-        grid,
-        outputs,
-        RunOptions { settings: Settings::default(), audit: false },
-    )?)
+impl Recording<'_> {
+    /// The scenario made ready for the unknowns of one pass.
+    fn plan(&self, seeded: Seeded<'_, LANES>) -> Result<Plan<Derived>, SensitivityError> {
+        let Seeded { case, signals } = seeded;
+        let network = Network::compile(&case.driveline).map_err(SimulateError::from)?;
+        let options = RunOptions { settings: Settings::default(), audit: false };
+        Ok(Plan::new(&network, &signals, self.grid, self.outputs, options)?)
+    }
 }
 
 /// Result of one pass of a run.
@@ -153,17 +120,17 @@ impl Kept {
     }
 }
 
-/// All runs in their order; `size` numbers are kept of each, derived by so many parameters.
+/// All runs in their order; `size` numbers are kept of each, derived by so many unknowns.
 fn collect_runs(
     runs: Vec<Result<Vec<Kept>, SimulateError>>,
     size: usize,
-    parameters: usize,
+    unknowns: usize,
 ) -> (Batch, BatchDerivatives) {
     let mut batch = Batch::default();
     let mut derivatives = BatchDerivatives {
         values: vec![],
-        kept: vec![f64::NAN; runs.len() * parameters * size],
-        last_lock: vec![f64::NAN; runs.len() * parameters],
+        kept: vec![f64::NAN; runs.len() * unknowns * size],
+        last_lock: vec![f64::NAN; runs.len() * unknowns],
         grazing: vec![],
     };
     for (i, passes) in runs.into_iter().enumerate() {
@@ -177,9 +144,9 @@ fn collect_runs(
                 continue;
             }
         };
-        for k in 0..parameters {
+        for k in 0..unknowns {
             let (pass, lane) = (&passes[k / LANES], k % LANES);
-            let row = i * parameters + k;
+            let row = i * unknowns + k;
             let found = &pass.derivatives[lane * size..][..size];
             derivatives.kept[row * size..][..size].copy_from_slice(found);
             derivatives.last_lock[row] = pass.last_lock.eps[lane];

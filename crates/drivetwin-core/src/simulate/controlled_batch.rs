@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
 //! Many controlled runs: parameter sets of a driveline, each with its own actuators, under several controllers.
 
-use super::batch::{Batch, Outcome, Sets, check_names, last_lock};
-use super::controlled_run::{ControlledRun, INPUTS, Tasks, run_controlled};
-use super::dual_clutch::DualClutchStart;
+use super::batch::{Batch, Outcome, last_lock};
+use super::controlled_run::{ControlledRun, INPUTS, Places, Tasks, run_controlled};
 use super::output::Output;
 use super::run::{Plan, RunOptions, SimulateError};
-use super::sensitivity::SensitivityError;
+use super::sensitivity::{Scenario, SensitivityError};
+use super::sets::{ParameterSets, Sets};
 use super::threads::share_out;
 use crate::control::{ControlledUnit, ShiftController};
-use crate::model::dual_clutch::{DualClutch, ENGINE_TORQUE};
+use crate::model::Driveline;
 use crate::network::Network;
 use crate::solver::{Settings, Signal, SolverCache, Status};
 
@@ -20,10 +20,10 @@ pub struct ControlledRuns<'c> {
     pub controllers: &'c [ShiftController],
     /// Actuators of every set.
     pub units: &'c [ControlledUnit],
-    /// Names of the parameters.
-    pub parameters: &'c [&'c str],
-    /// Sets × parameters.
-    pub sets: &'c [f64],
+    /// Name of the input that is the engine torque.
+    pub engine_torque: &'c str,
+    /// Parameter sets of the driveline.
+    pub parameters: ParameterSets<'c>,
     /// Time grid, s.
     pub grid: &'c [f64],
     /// Recorded outputs.
@@ -39,12 +39,21 @@ impl ControlledRuns<'_> {
         (self.outputs.len() + inputs) * self.grid.len()
     }
 
-    /// Plan over the grid, with inputs that count for their knots alone.
-    fn plan(&self, network: &Network<f64>) -> Result<Plan<f64>, SimulateError> {
+    fn find_places(&self, network: &Network<f64>) -> Result<Places, SimulateError> {
+        Ok(Places::find(network, &self.controllers[0], self.engine_torque)?)
+    }
+
+    /// Plan over the grid; the controlled inputs count for their knots alone.
+    fn plan(
+        &self,
+        network: &Network<f64>,
+        signals: &[(&str, Signal<'_, f64>)],
+    ) -> Result<Plan<f64>, SimulateError> {
         let nothing = vec![0.0; self.grid.len()];
-        let first = &self.controllers[0];
-        let signals = [ENGINE_TORQUE, &first.offgoing, &first.oncoming]
-            .map(|name| (name, Signal::samples(self.grid, &nothing)));
+        let inputs = self.find_places(network)?.inputs;
+        let names = inputs.map(|input| network.mechanism.inputs[input].as_str());
+        let controlled = names.map(|name| (name, Signal::samples(self.grid, &nothing)));
+        let signals = [&controlled, signals].concat();
         let options = RunOptions { settings: Settings::default(), audit: false };
         Plan::new(network, &signals, self.grid, self.outputs, options)
     }
@@ -59,32 +68,29 @@ struct Job<'v> {
     ends: Vec<(Outcome, u32, f64)>,
 }
 
-/// Simulate a dual-clutch driveline under controllers. The numbers kept of each run ([`ControlledRuns::size`])
-/// overwrite `values`, sets × controllers. Failed runs give NaN.
+/// Simulate a driveline under controllers. The scenario has the start, and the inputs that are not controlled,
+/// as samples without jumps. The numbers kept of each run ([`ControlledRuns::size`]) overwrite `values`, sets ×
+/// controllers. Failed runs give NaN.
 ///
 /// # Panics
 ///
 /// If `values` is not as long as what is kept of all runs, or there is no controller.
 pub fn controlled_batch(
-    model: &DualClutch<f64>,
-    start: &DualClutchStart<f64>,
+    driveline: &Driveline<f64>,
+    scenario: &Scenario<'_>,
     runs: ControlledRuns<'_>,
     threads: usize,
     values: &mut [f64],
 ) -> Result<Batch, SensitivityError> {
-    check_names(model, start, runs.parameters, runs.sets)?;
-    let network = Network::compile(&model.driveline()).map_err(SimulateError::from)?;
-    let plan = runs.plan(&network)?;
-    let first = &runs.controllers[0];
-    let tasks = Tasks::new(&network, &plan.inputs, first).ok_or_else(|| {
-        SensitivityError::Unknown { name: format!("{} or {}", first.offgoing, first.oncoming) }
-    })?;
+    let sets = Sets::new(driveline, vec![&scenario.start], runs.parameters)?;
+    let network = Network::compile(driveline).map_err(SimulateError::from)?;
+    let plan = runs.plan(&network, &scenario.signals)?;
+    let tasks = Tasks::new(&plan.inputs, runs.controllers[0].task);
     let (size, count) = (runs.size(), runs.controllers.len());
     assert_eq!(values.len(), runs.units.len() * count * size, "places for what is kept");
     let chunks = values.chunks_exact_mut(count * size).enumerate();
     let job = |(set, values)| Job { set, values, ends: Vec::with_capacity(count) };
     let mut jobs: Vec<Job<'_>> = chunks.map(job).collect();
-    let sets = Sets { model, starts: vec![start], parameters: runs.parameters, sets: runs.sets };
     share_out(threads, jobs.iter_mut(), |job| run_set(&sets, &plan, &tasks, &runs, job));
     let mut result = Batch::default();
     for mut job in jobs {
@@ -107,19 +113,22 @@ fn run_set(
     job: &mut Job<'_>,
 ) {
     job.values.fill(f64::NAN);
-    let prepared = sets.compile_runs(&[job.set]);
-    let (network, state) = match prepared.and_then(|p| plan.check(&p.0).map(|()| p)) {
+    let refuse = |job: &mut Job<'_>, error| {
+        job.ends.resize(runs.controllers.len(), (Outcome::Refused(error), 0, f64::NAN));
+    };
+    let (network, state) = match sets.place_runs(&[job.set]).compile() {
         Ok(prepared) => prepared,
-        Err(error) => {
-            let refused = (Outcome::Refused(error), 0, f64::NAN);
-            job.ends.resize(runs.controllers.len(), refused);
-            return;
-        }
+        Err(error) => return refuse(job, error),
+    };
+    let found = plan.adapt(&network, &state).and_then(|p| Ok((p, runs.find_places(&network)?)));
+    let (plan, places) = match found {
+        Ok(found) => found,
+        Err(error) => return refuse(job, error),
     };
     let mut cache = SolverCache::new(&network);
     let unit = &runs.units[job.set];
     for (given, values) in runs.controllers.iter().zip(job.values.chunks_exact_mut(runs.size())) {
-        let run = run_controlled(plan, tasks, &mut cache, &state, given, unit);
+        let run = run_controlled(&plan, tasks, places, &mut cache, &state, given, unit);
         let ControlledRun { columns, inputs, events, status } = run;
         if status == Status::Completed {
             let kept = if runs.with_inputs { &inputs[..] } else { &[] };

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-//! One run of the dual-clutch driveline whose inputs a controller determines task by task.
+//! One run of a driveline whose inputs a controller determines task by task.
 
 use super::run::Plan;
-use super::start::State;
+use super::start::{StartError, State, find};
 use super::trajectory::Recorder;
 use crate::control::{Commands, ControlledUnit, Drive, ShiftController, Slips};
-use crate::model::dual_clutch::ENGINE_TORQUE;
+use crate::model::mechanism::Normal;
 use crate::network::Network;
 use crate::network::nonlinear_torque::form;
 use crate::solver::{Event, Inputs, Integrator, SolverCache, Status};
@@ -15,12 +15,8 @@ use std::sync::Arc;
 /// until the sample.
 pub(super) const INPUTS: usize = 6;
 
-/// Tasks of a controller over the knots of a plan, and the quantities of a network that it handles.
-pub(super) struct Tasks {
-    /// First knot of each task, and the last of all.
-    first: Vec<usize>,
-    places: Places,
-}
+/// Knots at which the tasks of a controller begin, and the last of all.
+pub(super) struct Tasks(Vec<usize>);
 
 /// Result of a controlled run.
 pub(super) struct ControlledRun {
@@ -33,22 +29,17 @@ pub(super) struct ControlledRun {
 
 /// Places of the controlled quantities in a network.
 #[derive(Clone, Copy)]
-struct Places {
+pub(super) struct Places {
     /// Friction elements: off-going, on-coming.
     frictions: [usize; 2],
     /// Inputs: engine torque, off-going, on-coming.
-    inputs: [usize; 3],
+    pub inputs: [usize; 3],
 }
 
 impl Tasks {
-    /// Tasks of a controller from the first knot on; a task begins at the knot nearest to its time. None where the
-    /// network lacks an element of the controller.
-    pub fn new(
-        network: &Network<f64>,
-        inputs: &Inputs<f64>,
-        given: &ShiftController,
-    ) -> Option<Self> {
-        let (knots, duration) = (inputs.knots(), given.task);
+    /// Tasks of this duration [s] from the first knot on; a task begins at the knot nearest to its time.
+    pub fn new(inputs: &Inputs<f64>, duration: f64) -> Self {
+        let knots = inputs.knots();
         let last = knots.len() - 1;
         let mut first = vec![0];
         for (i, knot) in knots.iter().enumerate().skip(1) {
@@ -57,17 +48,29 @@ impl Tasks {
                 first.push(i);
             }
         }
-        Some(Self { first, places: Places::find(network, given)? })
+        Self(first)
     }
 }
 
 impl Places {
-    fn find(network: &Network<f64>, given: &ShiftController) -> Option<Self> {
-        let friction = |name: &str| network.frictions.iter().position(|f| f.element == *name);
-        let input = |name: &str| network.mechanism.inputs.iter().position(|i| i == name);
-        Some(Self {
-            frictions: [friction(&given.offgoing)?, friction(&given.oncoming)?],
-            inputs: [input(ENGINE_TORQUE)?, input(&given.offgoing)?, input(&given.oncoming)?],
+    /// Find the elements of a controller, their pressures and the engine torque, an input of this name.
+    pub fn find(
+        network: &Network<f64>,
+        given: &ShiftController,
+        engine_torque: &str,
+    ) -> Result<Self, StartError> {
+        let pressed =
+            network.frictions.iter().enumerate().filter_map(|(j, row)| match row.normal {
+                Normal::Pressure { input, .. } => Some((j, input, &row.element)),
+                Normal::Constant(_) => None,
+            });
+        let pressed: Vec<_> = pressed.collect();
+        let clutch = |name| find("clutch", name, pressed.iter().map(|one| one.2));
+        let (off, on) = (clutch(&given.offgoing)?, clutch(&given.oncoming)?);
+        let torque = find("input", engine_torque, network.mechanism.inputs.iter())?;
+        Ok(Self {
+            frictions: [pressed[off].0, pressed[on].0],
+            inputs: [torque, pressed[off].1, pressed[on].1],
         })
     }
 
@@ -81,6 +84,8 @@ impl Places {
 struct InputTrace<'p> {
     plan: &'p Plan<f64>,
     places: Places,
+    /// Number of inputs of the network.
+    width: usize,
     /// Of the task, knots × inputs.
     values: Vec<f64>,
     grid: Vec<Vec<f64>>,
@@ -100,8 +105,8 @@ impl InputTrace<'_> {
 
     fn note(&mut self, inputs: Commands, commands: Commands, knot: usize) {
         let [torque, off, on] = self.places.inputs;
-        let (at, width) = (self.values.len(), self.places.inputs.len());
-        self.values.resize(at + width, 0.0);
+        let at = self.values.len();
+        self.values.extend((0..self.width).map(|input| self.plan.inputs.knot_value(knot, input)));
         self.values[at + torque] = inputs.engine_torque;
         self.values[at + off] = inputs.offgoing;
         self.values[at + on] = inputs.oncoming;
@@ -114,18 +119,20 @@ impl InputTrace<'_> {
     }
 }
 
-/// Run a plan with the inputs of a controller; those of the plan count for their knots alone.
+/// Run a plan with the inputs of a controller at their places.
 pub(super) fn run_controlled<'n>(
     plan: &Plan<f64>,
     tasks: &Tasks,
+    places: Places,
     known: &mut SolverCache<'n, f64>,
     start: &State<f64>,
     given: &ShiftController,
     unit: &ControlledUnit,
 ) -> ControlledRun {
-    let (network, places) = (known.network, tasks.places);
+    let network = known.network;
+    let width = network.mechanism.inputs.len();
     let grid = (0..INPUTS).map(|_| Vec::with_capacity(plan.grid.len())).collect::<Vec<_>>();
-    let mut trace = InputTrace { plan, places, values: Vec::new(), grid, next: 0 };
+    let mut trace = InputTrace { plan, places, width, values: Vec::new(), grid, next: 0 };
     let (begin, step) = (plan.inputs.knot(0), plan.inputs.knot(1) - plan.inputs.knot(0));
     let mut drive = Drive::new(given, unit, begin, step);
     let mut recorder = Recorder::new(network, &plan.targets, &plan.grid);
@@ -133,7 +140,7 @@ pub(super) fn run_controlled<'n>(
     let mut integrate = || -> Result<(), Status> {
         let x = plan.begin(network, start);
         let slips = trace.places.slips(network, &x);
-        let (first, last) = (tasks.first[0], tasks.first[1]);
+        let (first, last) = (tasks.0[0], tasks.0[1]);
         let mut inputs = Inputs::part_of(&plan.inputs, first, last);
         let commands = drive.command(slips);
         trace.pass_task(&mut drive, commands, first, last);
@@ -163,7 +170,7 @@ fn pass_tasks(
     drive: &mut Drive<'_>,
 ) -> Result<(), Status> {
     recorder.run_to_end(run)?;
-    for span in tasks.first.windows(2).skip(1) {
+    for span in tasks.0.windows(2).skip(1) {
         let commands = drive.command(trace.places.slips(run.state.network, &run.state.x));
         trace.pass_task(drive, commands, span[0], span[1]);
         run.continue_with(|inputs| {

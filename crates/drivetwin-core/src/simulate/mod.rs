@@ -5,7 +5,6 @@ mod batch;
 mod batch_sensitivity;
 mod controlled_batch;
 mod controlled_run;
-mod dual_clutch;
 mod element_power;
 mod energy_balance;
 mod linear;
@@ -14,22 +13,21 @@ mod output;
 mod output_buffer;
 mod run;
 mod sensitivity;
+mod sets;
 mod start;
 mod threads;
 mod trajectory;
 
-pub use batch::{Batch, Keep, Outcome, dual_clutch_batch};
-pub use batch_sensitivity::{
-    BatchDerivatives, ParameterSets, Recording, Stated, dual_clutch_batch_sensitivities,
-};
+pub use batch::{Batch, Keep, Outcome, batch};
+pub use batch_sensitivity::{BatchDerivatives, Recording, batch_sensitivities};
 pub use controlled_batch::{ControlledRuns, controlled_batch};
-pub use dual_clutch::{
-    DualClutchRun, DualClutchStart, dual_clutch_outputs, run_dual_clutch, simulate_dual_clutch,
-};
 pub use energy_balance::EnergyAudit;
 pub use linear::{Linear, Slipping, linearise};
 pub use output::Output;
 pub use run::{Plan, RunOptions, SimulateError, run, run_network};
-pub use sensitivity::{LANES, Sampled, Sensitivities, SensitivityError, dual_clutch_sensitivities};
+pub use sensitivity::{
+    Differentiation, LANES, Scenario, Seed, Sensitivities, SensitivityError, Unknowns,
+};
+pub use sets::ParameterSets;
 pub use start::{Start, StartError, State};
 pub use trajectory::Trajectory;

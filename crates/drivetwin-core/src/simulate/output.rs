@@ -41,7 +41,7 @@ pub enum Output {
 
 /// An output by the index of its node or element; that of an element is its place in
 /// [`Network::elements`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Target {
     /// Node.
     Speed(usize),

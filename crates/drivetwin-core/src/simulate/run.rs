@@ -9,9 +9,10 @@ use crate::model::Name;
 use crate::network::{CompileError, Mode, ModeKey, Network};
 use crate::number::{Number, Real};
 use crate::solver::{
-    InputError, Inputs, Integrator, MAX_SPECTRAL_STEP_SLIPPING, Settings, Signal, SolverCache,
-    Status, supports_fixed_step,
+    InputError, Inputs, Integrator, MAX_LOCKSTEP_STATES, MAX_SPECTRAL_STEP_SLIPPING, Settings,
+    Signal, SolverCache, Status, supports_fixed_step,
 };
+use std::borrow::Cow;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -65,6 +66,8 @@ pub struct Plan<T> {
     pub(super) targets: Vec<Target>,
     pub(super) settings: Settings,
     audit: bool,
+    /// True if several runs can go side by side.
+    pub(super) lockstep: bool,
 }
 
 impl<T: Real> Plan<T> {
@@ -91,15 +94,40 @@ impl<T: Real> Plan<T> {
         let inputs = if fine && slips { divided(network, inputs) } else { inputs };
         let points = inputs.points(grid);
         let settings = Settings { exponential_steps: sprint && points.is_some(), ..settings };
+        let few = network.states() <= MAX_LOCKSTEP_STATES;
+        let lockstep = few && fine && settings.exponential_steps && inputs.is_sampled();
         let (grid, outputs) = (grid.to_vec(), outputs.to_vec());
         let inputs = Arc::new(inputs);
-        Ok(Self { inputs, grid, points, outputs, targets, settings, audit })
+        Ok(Self { inputs, grid, points, outputs, targets, settings, audit, lockstep })
     }
 
-    /// Refuse a network that lacks an element of an output: a road load without rolling resistance holds
-    /// nothing.
-    pub(super) fn check<N: Number>(&self, network: &Network<N>) -> Result<(), SimulateError> {
-        Ok(self.outputs.iter().try_for_each(|output| output.find(network).map(drop))?)
+    /// Find the outputs in a network with other values. These decide which elements hold: a road load without
+    /// rolling resistance holds nothing.
+    pub(super) fn find_targets<N: Number>(
+        &self,
+        network: &Network<N>,
+    ) -> Result<Vec<Target>, SimulateError> {
+        let found = self.outputs.iter().map(|output| output.find(network));
+        Ok(found.collect::<Result<_, _>>()?)
+    }
+
+    /// Refuse locked elements that the prescribed speeds contradict.
+    fn check_locks(&self, network: &Network<T>, start: &State<T>) -> Result<(), StartError> {
+        let first = |&(_, input): &(_, usize)| self.inputs.start_value(input);
+        start.check_locks(network, &network.prescribed.iter().map(first).collect::<Vec<_>>())
+    }
+
+    /// Prepare the plan for a network with other values and its start.
+    pub(super) fn adapt(
+        &self,
+        network: &Network<T>,
+        start: &State<T>,
+    ) -> Result<Cow<'_, Self>, SimulateError> {
+        self.check_locks(network, start)?;
+        let targets = self.find_targets(network)?;
+        let same = targets == self.targets;
+        let other = || Self { targets, ..self.clone() };
+        Ok(if same { Cow::Borrowed(self) } else { Cow::Owned(other()) })
     }
 
     fn integrator<'r>(
@@ -188,8 +216,7 @@ pub fn run<T: Real>(
 ) -> Result<Trajectory<T>, SimulateError> {
     let plan = Plan::new(network, signals, grid, outputs, options)?;
     let start = start.state(network)?;
-    let first = |&(_, input): &(_, usize)| plan.inputs.start_value(input);
-    start.check_locks(network, &network.prescribed.iter().map(first).collect::<Vec<_>>())?;
+    plan.check_locks(network, &start)?;
     Ok(plan.run(network, &start))
 }
 

@@ -113,6 +113,45 @@ impl<T: Number> Start<T> {
         let (speeds, twists) = (by_name(&self.speeds), by_name(&self.twists));
         state_of(network, &speeds, &twists, &self.locked)
     }
+
+    /// Find the speed of a node or the twist of a shaft by its name.
+    pub fn number_mut(&mut self, name: &str) -> Option<&mut T> {
+        let mut numbers = self.speeds.iter_mut().chain(&mut self.twists);
+        numbers.find(|(stated, _)| stated == name).map(|(_, number)| number)
+    }
+}
+
+impl Start<f64> {
+    /// Return true if the speed of a node or the twist of a shaft of this name is stated.
+    pub(super) fn states(&self, name: &str) -> bool {
+        self.speeds.iter().chain(&self.twists).any(|(stated, _)| stated == name)
+    }
+
+    /// Return true if both state the same names in one order.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        let same = |a: &[(String, f64)], b: &[(String, f64)]| {
+            a.iter().map(|(name, _)| name).eq(b.iter().map(|(name, _)| name))
+        };
+        std::ptr::eq(self, other)
+            || same(&self.speeds, &other.speeds)
+                && same(&self.twists, &other.twists)
+                && self.locked == other.locked
+    }
+
+    /// Join the starts of runs by their numbers. Names are those of run 0.
+    pub(super) fn from_lanes<'s, T: Number>(of: impl Fn(usize) -> &'s Self) -> Start<T> {
+        let first = of(0);
+        let join = |list: fn(&Self) -> &[(String, f64)]| {
+            let named = list(first).iter().enumerate();
+            let number = |place: usize| {
+                let value = |run| list(of(run)).get(place).map_or(f64::NAN, |stated| stated.1);
+                T::from_lanes(value)
+            };
+            named.map(|(place, (name, _))| (name.clone(), number(place))).collect()
+        };
+        let (speeds, twists) = (join(|start| &start.speeds), join(|start| &start.twists));
+        Start { speeds, twists, locked: first.locked.clone() }
+    }
 }
 
 impl<T: Number> State<T> {
@@ -120,6 +159,9 @@ impl<T: Number> State<T> {
     /// and is not zero.
     pub fn check_locks(&self, network: &Network<T>, prescribed: &[T]) -> Result<(), StartError> {
         let count = prescribed.len();
+        if count == 0 {
+            return Ok(());
+        }
         let speeds = network.prescribed.iter().map(|(speed, _)| speed);
         let slips = self.locked.iter().map(|&j| &network.frictions[j].slip);
         let rows: Vec<&SpeedForm<T>> = speeds.chain(slips).collect();

@@ -38,6 +38,29 @@ impl<'a, T: Real> Signal<'a, T> {
     pub fn samples(times: &'a [f64], values: &'a [f64]) -> Self {
         Self::Samples { times, values, delay: T::zero_() }
     }
+
+    /// Delay of samples, s.
+    pub fn delay_mut(&mut self) -> Option<&mut T> {
+        match self {
+            Self::Samples { delay, .. } => Some(delay),
+            Self::Sine { .. } => None,
+        }
+    }
+}
+
+impl<'a> Signal<'a, f64> {
+    /// Convert the signal to another number type.
+    pub fn promote<T: Real>(&self) -> Signal<'a, T> {
+        match *self {
+            Self::Samples { times, values, delay } => {
+                Signal::Samples { times, values, delay: T::of(delay) }
+            }
+            Self::Sine { offset, amplitude, frequency, phase } => {
+                let (offset, amplitude) = (T::of(offset), T::of(amplitude));
+                Signal::Sine { offset, amplitude, frequency, phase }
+            }
+        }
+    }
 }
 
 /// Inputs on a common set of knots; a knot that stands twice is a jump.

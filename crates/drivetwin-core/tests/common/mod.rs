@@ -3,7 +3,9 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
-use drivetwin_core::model::dual_clutch::{DualClutch, Load, ShiftElement};
+use drivetwin_core::model::dual_clutch::{
+    DualClutch, ENGINE, Load, OUTPUT, SHAFT, ShiftElement, WHEEL,
+};
 use drivetwin_core::model::elements::{
     Clutch, Element, Gear, Inertia, RoadLoad, SpringDamper, Torque,
 };
@@ -11,7 +13,7 @@ use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::{Driveline, FrictionLaw, Stribeck};
 use drivetwin_core::network::Network;
 use drivetwin_core::number::Real;
-use drivetwin_core::simulate::{DualClutchStart, Output, RunOptions, Start, Trajectory, run};
+use drivetwin_core::simulate::{Output, RunOptions, Start, Trajectory, run};
 use drivetwin_core::solver::{Settings, Signal as Input};
 use std::marker::PhantomData;
 
@@ -143,14 +145,24 @@ pub fn paper_driveline<T: Real>(law: LossLaw) -> DualClutch<T> {
     }
 }
 
+/// Speeds of engine, output and wheel, twist and torque of the output shaft.
+pub fn motion_outputs() -> [Output; 5] {
+    [
+        Output::Speed(ENGINE.into()),
+        Output::Speed(OUTPUT.into()),
+        Output::Speed(WHEEL.into()),
+        Output::Twist(SHAFT.into()),
+        Output::ShaftTorque(SHAFT.into()),
+    ]
+}
+
 /// Start in steady 2nd gear at 178 rad/s.
-pub fn second_gear<T: Real>() -> DualClutchStart<T> {
-    let (engine, ratio) = (178.0, 1.91);
-    DualClutchStart {
-        engine_speed: T::of(engine),
-        output_speed: T::of(engine / ratio),
-        wheel_speed: T::of(engine / ratio / 5.38),
-        twist: T::of(2461.0 / 1.76e5),
+pub fn second_gear<T: Real>() -> Start<T> {
+    let (engine, output) = (178.0, 178.0 / 1.91);
+    let speeds = [(ENGINE, engine), (OUTPUT, output), (WHEEL, output / 5.38)];
+    Start {
+        speeds: speeds.map(|(node, speed)| (node.into(), T::of(speed))).into(),
+        twists: vec![(SHAFT.into(), T::of(2461.0 / 1.76e5))],
         locked: vec!["B2".into()],
     }
 }

@@ -16,11 +16,14 @@ use crate::solver::sine::Wave;
 use crate::solver::tolerances::TORQUE_ATOL;
 use std::sync::Arc;
 
+/// Most states of runs side by side, those of drivelines of two clutches.
+pub const MAX_LOCKSTEP_STATES: usize = 4;
+
 /// Most states of a network over `T` that is marched. With derivatives the gain with more does not pay for the
-/// code, and several runs side by side are drivelines of two clutches.
+/// code.
 const fn max_states<T: KernelFloat>() -> usize {
     if T::RUNS > 1 {
-        4
+        MAX_LOCKSTEP_STATES
     } else if T::DERIVATIVES {
         8
     } else {
