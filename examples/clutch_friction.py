@@ -32,8 +32,8 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Signal,
     State,
-    simulate_sensitivities,
 )
+from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 
 FloatArray = NDArray[np.float64]
 

@@ -9,11 +9,10 @@ from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality, time_runs
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
-    Sensitivities,
     Trajectory,
     simulate,
-    simulate_sensitivities,
 )
+from drivetwin.simulation.dual_clutch_sensitivity import Sensitivities, simulate_sensitivities
 from tests.support.upshift.equations import Equations
 from tests.support.upshift.scenario import build_model, build_scenario, build_signals, build_state
 from tests.support.upshift.scipy_solution import Method, solve

@@ -32,8 +32,8 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Stribeck,
     simulate,
-    simulate_sensitivities,
 )
+from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 
 FRICTION = Stribeck(mu_c=0.12, mu_s=0.145, v_s=6.0, mu_v=1e-4)
 MODEL = DualClutch(

@@ -24,8 +24,8 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
     compute_series_inertia,
     simulate,
-    simulate_sensitivities,
 )
+from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 from tests.export.cases import SHARED, given, paper_model
 
 CASES = ["dual_clutch_upshift", "dual_clutch_drum_inertia", "dual_clutch_weak_then_catch"]

@@ -24,9 +24,9 @@ from drivetwin.simulation.batch import (
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     Signal,
-    simulate_sensitivities,
     to_core_start,
 )
+from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 from drivetwin.simulation.network import Sine, Start, simulate
 from drivetwin.simulation.serialize import as_json
 from tests.simulation.test_batch import MODEL, TIME, scenario, sets

@@ -18,9 +18,9 @@ from drivetwin.simulation.dual_clutch import (
     RoadLoad,
     Signal,
     State,
-    simulate_sensitivities,
 )
 from drivetwin.simulation.dual_clutch import simulate as simulate_dual_clutch
+from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 from drivetwin.simulation.linearize import linearise
 from drivetwin.simulation.network import Sine, Start, simulate
 from tests.export.cases import paper_model

@@ -100,8 +100,8 @@ def simulate_batch(
 ) -> Batch:
     """Simulate on `time` (n,) [s] once per set of `parameters`, or once per scenario.
 
-    `parameters` maps names as in `dual_clutch.simulate_sensitivities` (but for delays) to their
-    values (runs,); with several scenarios there must be one for every run. Outputs are the names of
+    `parameters` maps names as in `simulate_sensitivities` (but for delays) to their values (runs,);
+    with several scenarios there must be one for every run. Outputs are the names of
     `dual_clutch.MOTION`, and `torque.<element>` or `slip.<element>`. Instead of what to keep, one
     measured column (n,) per output may be given: kept is then the sum of the squared distances to
     it, over its samples that are not NaN. `threads` 0 takes all cores.
@@ -125,9 +125,9 @@ def simulate_batch_sensitivities(
 ) -> BatchSensitivities:
     """The runs of `simulate_batch` with exact derivatives of what is kept.
 
-    `by` names what to differentiate by, at least one, as in `dual_clutch.simulate_sensitivities`
-    (delays included); with measured columns to keep these are the gradients of the misfits. Takes
-    all cores.
+    `by` names what to differentiate by, at least one, as in `simulate_sensitivities` (delays
+    included); with measured columns to keep these are the gradients of the misfits. Takes all
+    cores.
     Raises InputError as `simulate_batch`.
     """
     by = as_names(by)

@@ -7,18 +7,16 @@ The physics is computed by the Rust core; these classes only hold data.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._native import sensitivities as native_sensitivities
 from drivetwin._native import simulate_network as native_simulate
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch_paths import list_seeds
 from drivetwin.simulation.serialize import (
     as_array,
     as_json,
@@ -323,20 +321,6 @@ class Trajectory:
     crank_speed: FloatArray | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivities:
-    """A run with its derivatives.
-
-    `derivatives[parameter]` holds the derivative of every trajectory column per unit of the
-    parameter, in arrays that are not contiguous; `event_times[parameter]` (n_events,) those of the
-    times of `run.events` [s].
-    """
-
-    run: Trajectory
-    derivatives: Mapping[str, Trajectory]
-    event_times: Mapping[str, FloatArray]
-
-
 @check_arguments
 def simulate(
     model: DualClutch,
@@ -359,7 +343,7 @@ def simulate(
     try:
         columns, events, status, energy = native_simulate(
             as_json(model),
-            _list_outputs(model),
+            list_outputs(model),
             ((to_core_samples(collect_inputs(engine_torque, pressures)), []), to_core_start(start)),
             run_time(time),
             options,
@@ -367,69 +351,7 @@ def simulate(
     except ValueError as error:
         raise InputError(str(error), "correct the model, its inputs or the time grid") from error
     audited = EnergyAudit(*energy) if energy is not None else None
-    return _build_trajectory(model, time, columns, (events, status, audited))
-
-
-@check_arguments
-def simulate_sensitivities(
-    model: DualClutch,
-    engine_torque: Signal,
-    pressures: Mapping[str, Signal],
-    start: State,
-    time: FloatArray,
-    parameters: Sequence[str],
-) -> Sensitivities:
-    """Run the model and differentiate the run by `parameters`, exactly, through all events.
-
-    Names are fields of the model (`eta`, `J1`, `k_o`, `load.constant`), of a shift element
-    (`B3.P0`, `B3.mu_c`, `B3.mu.4` for a point of a table), of the start (`start.twist`), and delays
-    of inputs without jumps (`delay.engine torque`, `delay.B3`). Event times are differentiated
-    implicitly; where an event grazes no derivative exists. A start that agrees with its locks is
-    differentiated through `dissipative` gears as if power flowed forward in the impulse that keeps
-    it so; the other way it would be another number.
-    Raises InputError for an unknown name, the delay of an input that jumps, or an inconsistent
-    description.
-    """
-    inputs, parameters = collect_inputs(engine_torque, pressures), as_names(parameters)
-    require_delays(inputs, parameters)
-    try:
-        columns, events, status, derivatives, event_derivatives = native_sensitivities(
-            as_json(model),
-            _list_outputs(model),
-            ((to_delayed_core_samples(inputs), []), to_core_start(start)),
-            run_time(time),
-            list_seeds(model, parameters, {}),
-        )
-    except ValueError as error:
-        raise InputError(str(error), "correct the model, its inputs or the names") from error
-    run = _build_trajectory(model, time, columns, (events, status, None))
-    by_name = dict(zip(parameters, event_derivatives, strict=True))
-    return Sensitivities(run, _Derivatives(model, run, derivatives, tuple(parameters)), by_name)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Derivatives(Mapping[str, Trajectory]):
-    """Trajectories of derivatives by parameter, made of the core's arrays when asked for."""
-
-    model: DualClutch
-    run: Trajectory
-    passes: Sequence[Sequence[FloatArray]]
-    """Of every pass of the core its columns (n, parameters of the pass)."""
-    parameters: tuple[str, ...]
-
-    def __getitem__(self, name: str) -> Trajectory:
-        if name not in self.parameters:
-            raise KeyError(name)
-        # All passes but the last are for as many parameters.
-        number, place = divmod(self.parameters.index(name), self.passes[0][0].shape[1])
-        columns = [column[:, place] for column in self.passes[number]]
-        return _build_trajectory(self.model, self.run.time, columns, ([], self.run.status, None))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys(self.parameters))
-
-    def __len__(self) -> int:
-        return len(set(self.parameters))
+    return collect_trajectory(model, time, columns, (events, status, audited))
 
 
 def collect_inputs(engine_torque: Signal, pressures: Mapping[str, Signal]) -> dict[str, Signal]:
@@ -482,19 +404,20 @@ def to_core_start(start: State) -> CoreStart:
     return by_node, [(_SHAFT, twist)], as_names(start.locked)
 
 
-def _list_outputs(model: DualClutch) -> list[tuple[str, tuple[str, ...]]]:
+def list_outputs(model: DualClutch) -> list[tuple[str, tuple[str, ...]]]:
     """List the outputs of a trajectory as the core takes them."""
     names = [element.name for element in model.elements]
     friction = [(kind, (name,)) for name in names for kind in ("friction_torque", "slip")]
     return [*MOTION.values(), *friction]
 
 
-def _build_trajectory(
+def collect_trajectory(
     model: DualClutch,
     time: FloatArray,
     columns: Iterable[FloatArray],
     outcome: tuple[list[tuple[float, str, str, float]], str, EnergyAudit | None],
 ) -> Trajectory:
+    """Collect the columns (n,) of `MOTION` and the outcome of a run of the core."""
     events, status, audit = outcome
     engine, output, wheel, twist, shaft, *friction = columns
     names = [element.name for element in model.elements]
