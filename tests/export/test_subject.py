@@ -28,7 +28,7 @@ def test_the_first_shift_with_a_friction_curve_is_taken() -> None:
     assert [element.name for element in subject.model.elements] == ["B2", "B3"]
     assert subject.start.locked == ("B2",)
     same = build_subject(twin(), ("2", "3"))
-    assert same == subject
+    assert vars(same) == vars(subject)
 
 
 def test_unknown_or_impossible_shifts_are_refused() -> None:
@@ -48,7 +48,8 @@ def test_modelica_holds_the_parts_and_c_names_them_as_left_out() -> None:
     subject = build_subject(parted)
     assert "ElastoBacklash" in format_modelica(subject)
     assert "without backlash in the output shaft" in generate_twin_source(subject)
-    assert replace(subject.reduce(), note="") == replace(build_subject(plain), note="")
+    reduced = vars(replace(subject.reduce(), note=""))
+    assert reduced == vars(replace(build_subject(plain), note=""))
 
 
 def test_the_error_of_the_reduced_form_is_that_of_its_run() -> None:

@@ -19,7 +19,7 @@ DEFAULT_ENGINE_SPEED = 150.0
 """Default engine speed [rad/s] at the start, for a twin without recorded speeds."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Subject:
     """A model with a name and a start; `elements` of the model are off-going, on-coming."""
 

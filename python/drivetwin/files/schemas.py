@@ -7,8 +7,6 @@ from enum import StrEnum
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from drivetwin.files.element_json_schema import build_network_schema
-
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
@@ -52,6 +50,8 @@ def build_json_schema(kind: FileKind | str) -> dict[str, Any]:
     kind = FileKind(kind)
     head = {"$schema": _DIALECT, "title": f"drivetwin {kind}"}
     if kind is FileKind.ELEMENTS:
+        from drivetwin.files.element_json_schema import build_network_schema  # it loads NumPy
+
         return {**head, **build_network_schema()}
     module, name = _MODELS[kind]
     model: type[BaseModel] = getattr(import_module(f"drivetwin.{module}"), name)
