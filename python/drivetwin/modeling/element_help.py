@@ -20,6 +20,8 @@ _TYPES = {
     FieldKind.ROWS: "rows of floats",
 }
 _WIDTH = 88
+_HARD_SPACE = "\xa0"
+"""Space at which no line is broken."""
 _Class = TypeVar("_Class", bound=type)
 
 
@@ -36,7 +38,7 @@ def document_methods(methods: _Class) -> _Class:
 def _describe_method(element: ElementType, names: tuple[str, ...]) -> Iterator[str]:
     yield element.help
     if element.law:
-        yield f"\n{fill(element.law, _WIDTH)}"
+        yield f"\n{_wrap(element.law)}"
     yield "\nParameters\n----------\nname : str\n    Unique name."
     for name in names[1:]:
         field = element.fields.get(FIELD_OF.get(name, name))
@@ -62,4 +64,18 @@ def _annotate(field: Field) -> Iterator[str]:
 
 
 def _indent(text: str) -> str:
-    return fill(" ".join(text.split()), _WIDTH, initial_indent="    ", subsequent_indent="    ")
+    return _wrap(" ".join(text.split()), indent="    ")
+
+
+def _wrap(text: str, indent: str = "") -> str:
+    """Wrap a text at spaces outside of literals, which have to stand on one line."""
+    parts = text.split("`")
+    parts[1::2] = [one.replace(" ", _HARD_SPACE) for one in parts[1::2]]
+    wrapped = fill(
+        "`".join(parts),
+        _WIDTH,
+        initial_indent=indent,
+        subsequent_indent=indent,
+        break_long_words=False,
+    )
+    return wrapped.replace(_HARD_SPACE, " ")
