@@ -133,13 +133,6 @@ _SPECS = (
         "shaft_reference", "reference torque", "T_r", "N*m",
         "largest output torque of the log, to which tyre slip and progression refer", 0.0, 1e7,
     ),
-    ParameterSpec(
-        "eta_step", "efficiency step", "Δη", "1",
-        "efficiency of a gear less that of the gear before it", -0.5, 0.5,
-    ),
-    ParameterSpec(
-        "input_drag", "input drag", "T_d", "N*m", "drag torque at the gearbox input", -1e6, 1e6,
-    ),
 )  # fmt: skip
 
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}

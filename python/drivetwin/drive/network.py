@@ -16,6 +16,7 @@ from drivetwin.gearbox import Drive, Gearbox, build_network_elements, solve_gear
 from drivetwin.gearbox.spec import ElementKind
 from drivetwin.simulation.driveline import (
     CRANK,
+    LOAD,
     SHAFT,
     WHEEL,
     build_shaft,
@@ -25,7 +26,6 @@ from drivetwin.simulation.driveline import (
 from drivetwin.simulation.network import Element, Output, Start, build_element
 
 ENGINE, CONVERTER = "map", "converter"
-ROAD = "load"
 LOCK_UP, BRAKE = "lock-up", "service brake"
 """Friction elements beside those of the gearbox; the inputs of their names are the pressure [Pa]
 and the brake torque [N m]."""
@@ -114,7 +114,7 @@ def build_standstill(gearbox: Gearbox, gear: str, powertrain: Powertrain) -> Sta
     idle, statics = powertrain.engine.idle, solve_gear(gearbox, gear)
     members: Mapping[str, float | None] = statics.speeds
     speeds = dict.fromkeys(members, 0.0)
-    locked = (*gearbox.get_gear(gear).elements, ROAD, BRAKE)
+    locked = (*gearbox.get_gear(gear).elements, LOAD, BRAKE)
     pull = float(powertrain.converter.compute_turbine_torque(idle, 0.0)) * statics.ratio
     twists = {SHAFT: pull / gearbox.require_drive().k_o}
     return Start(speeds | {CRANK: idle, WHEEL: 0.0}, twists, locked)
@@ -138,7 +138,7 @@ def list_outputs(gearbox: Gearbox) -> Sequence[Output]:
         *(("slip", name) for name in elements),
         *(("friction_torque", name) for name in (*elements, BRAKE)),
         *(("torque", f"{CONVERTER}.{port}") for port in ("pump", "turbine")),
-        *(("torque", f"{name}.node") for name in (ENGINE, ROAD)),
+        *(("torque", f"{name}.node") for name in (ENGINE, LOAD)),
     ]
 
 

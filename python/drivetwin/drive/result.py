@@ -13,13 +13,12 @@ from drivetwin.drive.network import (
     CONVERTER,
     ENGINE,
     PEDAL,
-    ROAD,
     list_friction_elements,
 )
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schedule import Schedule
 from drivetwin.gearbox import Gearbox
-from drivetwin.simulation.driveline import CRANK, SHAFT, WHEEL
+from drivetwin.simulation.driveline import CRANK, LOAD, SHAFT, WHEEL
 from drivetwin.simulation.dual_clutch import EnergyAudit, Event, FloatArray
 from drivetwin.simulation.network import NetworkRun, Output
 
@@ -140,7 +139,7 @@ def build_drive_run(
         shaft_torque=shaft_torque,
         pedal=schedule.evaluate(PEDAL, time),
         brake_torque=columns["friction_torque", BRAKE],
-        road_torque=columns["torque", f"{ROAD}.node"],
+        road_torque=columns["torque", f"{LOAD}.node"],
         pump_torque=-columns["torque", f"{CONVERTER}.pump"],
         speed_ratio=turbine / crank,
         torque_ratio=powertrain.converter.compute_torque_ratio(crank, turbine),

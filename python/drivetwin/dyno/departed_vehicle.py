@@ -24,7 +24,13 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
     Trajectory,
 )
-from drivetwin.simulation.vehicle_parts import InputShaft, ShaftTable, TyreSlip, VehicleParts
+from drivetwin.simulation.vehicle_parts import (
+    InputShaft,
+    ShaftTable,
+    TyreSlip,
+    VehicleParts,
+    compute_gap,
+)
 from drivetwin.vehicle.effects import EffectId
 
 _MODE_DAMPING = 0.06
@@ -102,7 +108,7 @@ def compute_vehicle(
         front=InputShaft.from_mode(0.5 * model.J1, mode, _MODE_DAMPING) if mode else None,
         input_drag=size(EffectId.INPUT_DRAG) * nominal.largest_engine_torque,
         efficiency={name: 1.0 + k * step for k, name in enumerate(gears) if k and step},
-        gap=2.0 * size(EffectId.BACKLASH) * full / model.k_o,
+        gap=compute_gap(size(EffectId.BACKLASH), full, model.k_o),
         shaft_table=ShaftTable.from_factor(model.k_o, full, progression) if progression else None,
         brake_drag=size(EffectId.BRAKE_DRAG) * abs(nominal.load),
         tyre=TyreSlip.from_slip(full * model.i_f, slip, model.J_v) if slip else None,

@@ -39,7 +39,8 @@ class Subject:
         """Return the dual clutch alone, as C and FMU hold it; the note names what is left out."""
         if self.parts is NO_PARTS:
             return self
-        note = f"{self.note}; without {self.part_names}" if self.note else self.part_names
+        notes = [self.note] if self.note else []
+        note = "; ".join([*notes, f"without {self.part_names}"])
         return replace(self, parts=NO_PARTS, part_names="", note=note)
 
     def compute_reduction_error(self, time: FloatArray, inputs: FloatArray) -> float:

@@ -22,7 +22,8 @@ CRANK, ENGINE, INPUT, OUTPUT, AXLE, WHEEL, VEHICLE = (
     *("crankshaft", "engine", "input gear", "output", "axle", "wheel", "vehicle"),
 )
 """Nodes. ENGINE is the gearbox side of an input shaft or converter, CRANK its engine side."""
-SHAFT, INPUT_SHAFT, CONVERTER, WALK = "output shaft", "input shaft", "converter", "load walk"
+SHAFT, INPUT_SHAFT, CONVERTER = "output shaft", "input shaft", "converter"
+LOAD, WALK = "load", "load walk"
 _LEAST_SPEED = 0.5
 """Speed of the vehicle at the wheel [rad/s] below which a tyre is a damper."""
 
@@ -151,7 +152,7 @@ def build_vehicle(side: OutputSide, parts: VehicleParts = NO_PARTS) -> list[Elem
             build_element("tyre", "tyre", a=WHEEL, b=VEHICLE, **fields),
             build_element("inertia", "vehicle", node=VEHICLE, inertia=inertia),
         ]
-    elements.append(build_element("road_load", "load", node=body, **vars(side.load)))
+    elements.append(build_element("road_load", LOAD, node=body, **vars(side.load)))
     if parts.walk is not None:
         elements.append(build_element("torque", WALK, node=body, input=WALK))
     return elements

@@ -15,7 +15,7 @@ from drivetwin.simulation.vehicle_parts import (
 )
 
 MODE_FREQUENCY, MODE_SHARE, MODE_DAMPING = "mode_frequency", "mode_share", "mode_damping"
-BACKLASH, TYRE_SLIP, ETA_STEP, INPUT_DRAG = "backlash", "tyre_slip", "eta_step", "input_drag"
+BACKLASH, TYRE_SLIP = "backlash", "tyre_slip"
 PROGRESSION, REFERENCE = "shaft_progression", "shaft_reference"
 """Parameter ids, see `drivetwin.parameters`."""
 PARTS: Mapping[str, tuple[str, ...]] = {
@@ -23,8 +23,6 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     "backlash in the output shaft": (BACKLASH,),
     "slip of the tyres": (TYRE_SLIP, REFERENCE),
     "a progressive output shaft": (PROGRESSION, REFERENCE),
-    "an efficiency by gear": (ETA_STEP,),
-    "drag at the gearbox input": (INPUT_DRAG,),
 }
 """Parameters of each part by its name, that of the size first."""
 PART_IDS = tuple(dict.fromkeys(name for ids in PARTS.values() for name in ids))
@@ -37,7 +35,7 @@ def select_parts(values: Mapping[str, float]) -> dict[str, float]:
     return {name: values[name] for name in PART_IDS if any(name in ids for ids in complete)}
 
 
-def build_parts(values: Mapping[str, float], model: DualClutch, steps: int = 0) -> VehicleParts:
+def build_parts(values: Mapping[str, float], model: DualClutch) -> VehicleParts:
     """Build the parts that parameters describe.
 
     Parameters
@@ -45,9 +43,7 @@ def build_parts(values: Mapping[str, float], model: DualClutch, steps: int = 0) 
     values
         Parameters by id; ids of no part, and of parts that are incomplete, are ignored.
     model
-        Dual clutch of a shift, its off-going element first, then the on-coming one.
-    steps
-        Number of the gear that is left, counted from the gear to which the efficiency refers.
+        Dual clutch of a shift.
 
     Returns
     -------
@@ -65,15 +61,8 @@ def build_parts(values: Mapping[str, float], model: DualClutch, steps: int = 0) 
         tyre = TyreSlip.from_slip(values[REFERENCE] * model.i_f, values[TYRE_SLIP], model.J_v)
     if PROGRESSION in values:
         table = ShaftTable.from_factor(model.k_o, values[REFERENCE], values[PROGRESSION])
-    efficiency: dict[str, float] = {}
-    if ETA_STEP in values:
-        names = (one.name for one in model.elements[:2])
-        step = values[ETA_STEP] / model.eta
-        efficiency = {name: 1.0 + k * step for k, name in enumerate(names, steps) if k}
     return VehicleParts(
         front=front,
-        input_drag=values.get(INPUT_DRAG, 0.0),
-        efficiency=efficiency,
         gap=values.get(BACKLASH, 0.0),
         shaft_table=table,
         tyre=tyre,

@@ -12,10 +12,16 @@ from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import Signal
 
 RIM_SHARE = 0.02
-"""Share of the vehicle's inertia before the tyre: rims, tyres and side shafts [-]."""
+"""Share of the vehicle's inertia before the tyre: rims, tyres and side shafts; an engineering
+estimate [-]."""
 _TABLE_END, _TABLE_STEP = 2.5, 1.0 / 32.0
 """Range and step of the table of a progressive shaft, over its reference torque: errors below 1e-3
 of the factor."""
+
+
+def compute_gap(size: float, torque: float, stiffness: float) -> float:
+    """Compute the play [rad] of which half times `stiffness` [N m/rad] is `size` of `torque`."""
+    return 2.0 * size * torque / stiffness
 
 
 @dataclass(frozen=True)

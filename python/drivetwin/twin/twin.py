@@ -193,10 +193,7 @@ class Twin(DisplayMixin):
 
     def build_parts(self, model: DualClutch) -> VehicleParts:
         """Build the parts beside the `model` of a shift."""
-        ratio = abs(model.get_overall_ratio(model.elements[0].name))
-        # η is that of the lowest gear of the log, and gears of the twin are those of the log.
-        steps = sum(abs(one.ratio) > ratio * (1.0 + 1e-9) for one in self.gears.values())
-        return build_parts(self.part_values, model, steps)
+        return build_parts(self.part_values, model)
 
     def drop_part(self) -> Twin:
         """Return the twin with the dual clutch alone as its plant."""

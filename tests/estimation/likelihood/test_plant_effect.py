@@ -48,8 +48,6 @@ SIZES = {
     EffectId.BACKLASH: 0.03,
     EffectId.TYRE_SLIP: 2e-3,
     EffectId.PROGRESSIVE_SHAFT: -0.05,
-    EffectId.EFFICIENCY_BY_GEAR: 0.015,
-    EffectId.INPUT_DRAG: 0.01,
 }
 """Usual sizes."""
 

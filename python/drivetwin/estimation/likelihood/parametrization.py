@@ -90,8 +90,7 @@ class ShiftModel:
     `log` is the number of the log among several, 0 where it is the only one. `departure` is how
     the load of this shift departs from that of its log: a factor by unknown; empty where it does
     not. `plant_effect` is an effect that the plant has beside the dual clutch. `partners` are the
-    elements whose law an element without a law of its own follows, by its name. `eta_steps` is the
-    number of the gear that is left, counted from the lowest one of all shifts.
+    elements whose law an element without a law of its own follows, by its name.
     """
 
     driveline: KnownDriveline
@@ -104,7 +103,6 @@ class ShiftModel:
     departure: Mapping[str, float] = field(default_factory=dict)
     plant_effect: PlantEffect | None = None
     partners: Mapping[str, str] = field(default_factory=dict)
-    eta_steps: int = 0
 
     @property
     def elements(self) -> tuple[ShiftElementKinematics, ShiftElementKinematics]:
@@ -186,7 +184,7 @@ class ShiftModel:
 
     def build_parts(self, point: ParameterVector, model: DualClutch) -> VehicleParts:
         """Build the parts beside `model` at `point`."""
-        return build_parts(self.compute_part_values(point, model), model, self.eta_steps)
+        return build_parts(self.compute_part_values(point, model), model)
 
     def _build_load(self, point: ParameterVector) -> RoadLoad:
         aero = self.get_value(point, AERO)

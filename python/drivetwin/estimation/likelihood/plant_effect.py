@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Effects that a fit has in its plant beside the dual clutch, and their unknowns.
 
-The size of a part that cannot be negative is sought by its logarithm, the others by their value
-over the prior standard deviation of the effect.
+A size that cannot be negative is sought by its logarithm, another by its value.
 """
 
 from __future__ import annotations
@@ -13,8 +12,6 @@ from dataclasses import dataclass
 from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.simulation.part_parameters import (
     BACKLASH,
-    ETA_STEP,
-    INPUT_DRAG,
     MODE_DAMPING,
     MODE_FREQUENCY,
     MODE_SHARE,
@@ -23,6 +20,7 @@ from drivetwin.simulation.part_parameters import (
     TYRE_SLIP,
 )
 from drivetwin.simulation.variable import exp
+from drivetwin.simulation.vehicle_parts import compute_gap
 from drivetwin.vehicle.effects import EffectId
 
 SIZE, AMOUNT, SHARE, DAMPING = "ln_size", "amount", "share", "ln_damping"
@@ -33,24 +31,22 @@ UNKNOWNS: Mapping[EffectId, tuple[str, ...]] = {
     EffectId.BACKLASH: (SIZE,),
     EffectId.TYRE_SLIP: (SIZE,),
     EffectId.PROGRESSIVE_SHAFT: (AMOUNT,),
-    EffectId.EFFICIENCY_BY_GEAR: (AMOUNT,),
-    EffectId.INPUT_DRAG: (AMOUNT,),
 }
 """Unknowns of each effect that a plant may have, that of the size first. Sizes are in the unit of
-`EffectId`; that of a mode is the frequency [Hz] at which the engine's share of J1 swings."""
+`EffectId`; that of a mode is the frequency [Hz] at which the engine's share of J1 swings. Drag and
+an efficiency by gear are not among them: they change the engine torque that drives the run of the
+correction, so that their columns are as exact as a plant."""
 
 
 @dataclass(frozen=True)
 class PlantEffect:
     """Effect that a plant has beside the dual clutch.
 
-    `output_torque` and `engine_torque` are the largest magnitudes measured [N m], FS and T0 of
-    `EffectId`.
+    `output_torque` is the largest magnitude measured [N m], FS of `EffectId`.
     """
 
     effect: EffectId
     output_torque: float
-    engine_torque: float
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -77,12 +73,8 @@ class PlantEffect:
                 names = (MODE_FREQUENCY, MODE_SHARE, MODE_DAMPING)
                 return dict(zip(names, (size, share, exp(ln_damping)), strict=True))
             case EffectId.BACKLASH:
-                return {BACKLASH: 2.0 * size * full / model.k_o}
+                return {BACKLASH: compute_gap(size, full, model.k_o)}
             case EffectId.TYRE_SLIP:
                 return {TYRE_SLIP: size, REFERENCE: full}
-            case EffectId.PROGRESSIVE_SHAFT:
-                return {PROGRESSION: size, REFERENCE: full}
-            case EffectId.EFFICIENCY_BY_GEAR:
-                return {ETA_STEP: size}
             case _:
-                return {INPUT_DRAG: size * self.engine_torque}
+                return {PROGRESSION: size, REFERENCE: full}

@@ -119,7 +119,6 @@ def build_problem(
     departures = (
         _build_load_factors(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
     )
-    gears = _list_gears(drivelines)
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, split_spans(signals), strict=True)):
         label = f"start{k}"
@@ -137,7 +136,6 @@ def build_problem(
             s.log,
             departure,
             partners=partners,
-            eta_steps=gears.index(d.offgoing.gear),
         )
         parts.append(ShiftTerm.from_sensor_noise(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
@@ -156,12 +154,6 @@ def build_problem(
     sums = list_sum_priors(inertias, drivelines[0].J1, guess["eta"])
     prior = add_sum_priors(prior, point, fixed, sums)
     return LikelihoodObjective(tuple(parts), prior, lower, upper), point
-
-
-def _list_gears(drivelines: Sequence[KnownDriveline]) -> list[str]:
-    """List the gears of all shifts by falling ratio."""
-    ratios = {e.gear: abs(e.ratio) for d in drivelines for e in (d.offgoing, d.oncoming)}
-    return sorted(ratios, key=lambda gear: -ratios[gear])
 
 
 def _expand_logs(names: Sequence[str], logs: Sequence[int]) -> list[str]:

@@ -59,8 +59,6 @@ _EXPERIMENT = {
     "tyre_slip": "Record the speed of a wheel that is not driven.",
     "shaft_progression": "Record shifts at two torque levels.",
     "shaft_reference": "Record shifts at two torque levels.",
-    "eta_step": "Step the pedal in both gears.",
-    "input_drag": "Record the engine torque at zero load.",
 }
 
 

@@ -121,18 +121,14 @@ class Output:
 
     def _compute_means(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
         """Compute means (n,) over the `window` [s] before each stamp."""
-        step = np.diff(time)
-        if column.ndim > 1:
-            step = step[:, None]
+        step = np.diff(time).reshape(-1, *[1] * (column.ndim - 1))
         sums = np.cumsum(0.5 * (column[1:] + column[:-1]) * step, axis=0)
         total = np.concatenate([np.zeros_like(column[:1]), sums])
         begin = time[self.place] - window
-        if column.ndim == 1:
-            before = np.interp(begin, time, total)
-        else:
-            after = np.clip(np.searchsorted(time, begin), 1, time.size - 1)
-            share = np.clip((begin - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
-            before = total[after - 1] + share[:, None] * (total[after] - total[after - 1])
+        after = np.clip(np.searchsorted(time, begin), 1, time.size - 1)
+        share = np.clip((begin - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
+        share = share.reshape(-1, *[1] * (column.ndim - 1))
+        before = total[after - 1] + share * (total[after] - total[after - 1])
         return np.asarray((total[self.place] - before) / window)
 
 

@@ -23,11 +23,7 @@ from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.expansion import (
-    SHOWN,
-    EffectExpansion,
-    expand_effects,
-)
+from drivetwin.estimation.likelihood.effects.expansion import SHOWN, expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import SIZES, GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import (
@@ -114,7 +110,7 @@ def select_plant(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     if expansion is None:
         return fit
     evidence = expansion.evidence
-    refits = list(_iterate_refits(fit, expansion, priors))
+    refits = list(_iterate_refits(fit, evidence, priors))
     best = max(refits, key=get_nats, default=None)
     if best is None or best.plant is None:
         return fit
@@ -135,25 +131,24 @@ def get_nats(fit: LikelihoodFit) -> float:
 
 
 def _iterate_refits(
-    fit: LikelihoodFit, expansion: EffectExpansion, priors: EffectPriors
+    fit: LikelihoodFit, evidence: Mapping[Group, GroupEvidence], priors: EffectPriors
 ) -> Iterator[LikelihoodFit]:
     """Yield the refits that end at a minimum, one for each effect.
 
     An effect is tried where its columns have enough evidence, or where none of its columns could
-    show it. One that acts through inputs alone is not: these drive the run of the correction, so
-    that its columns are as exact as the plant.
+    show it.
     """
     driveline = fit.problem.parts[0].structure.driveline
     plans: list[tuple[EffectId, tuple[PriorValue, ...], list[float]]] = []
     for effect in UNKNOWNS:
         stated = priors.get_prior(effect, driveline)
-        if not (stated.std > 0.0 or stated.value) or _acts_on_inputs(effect, expansion):
+        if not (stated.std > 0.0 or stated.value):
             continue
         if not EFFECTS[effect].has_columns:
             own = build_plant_priors(effect, priors, driveline)
             plans.append((effect, own, _list_starts(own[0])))
             continue
-        amount = _find_amount(effect, expansion.evidence)
+        amount = _find_amount(effect, evidence)
         if amount:
             own = build_plant_priors(effect, priors, driveline, amount)
             size = amount * stated.std
@@ -168,13 +163,6 @@ def _iterate_refits(
             with stages.enter(name, number=max(number - 1, 0)):
                 refits.append(_refit(fit, effect, own, start))
         yield from sorted((one for one in refits if one), key=get_nats)[-1:]
-
-
-def _acts_on_inputs(effect: EffectId, expansion: EffectExpansion) -> bool:
-    """Return whether the columns of an effect act through inputs alone."""
-    columns = expansion.sums.columns
-    own = [k for k, group in enumerate(columns.groups) if group.effect is effect]
-    return bool(own) and bool(np.all(columns.acts_on_inputs[own] > 0.0))
 
 
 def _find_amount(effect: EffectId, evidence: Mapping[Group, GroupEvidence]) -> float:
@@ -225,8 +213,7 @@ def extend_problem(
     """Add an effect to the plant; its unknowns come last, at the means of their `priors`."""
     outputs = [out for part in problem.parts for out in part.record.outputs]
     full = max(float(np.max(np.abs(o.values))) for o in outputs if o.name == OUTPUT_TORQUE)
-    torques = [part.record.engine_torque.values for part in problem.parts]
-    own = PlantEffect(effect, full, max(float(np.max(np.abs(one))) for one in torques))
+    own = PlantEffect(effect, full)
     values = np.append(point.values, [one.value for one in priors])
     extended = ParameterVector((*point.names, *own.unknowns), values)
     return problem.extend(own, priors), extended

@@ -14,10 +14,9 @@ from drivetwin.estimation.likelihood.effects.extended_response import (
     solve_extended,
 )
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint, compute_middle
+from drivetwin.simulation.vehicle_parts import RIM_SHARE
 from drivetwin.vehicle.effects import EffectId
 
-WHEEL_SHARE = 0.02
-"""Share of the vehicle's inertia that turns in front of the tyres."""
 MIN_SPEED = 1.0
 """Least wheel speed [rad/s] at which a slip is defined."""
 START_STEPS = 5
@@ -30,7 +29,7 @@ def build(at: OperatingPoint, std: float) -> list[Disturbance]:
     Fifth state: difference s of the speeds of wheel and vehicle, s·C/ω_w the torque between them,
     in the rigid run i_f·T_o - J_w·ω_w'.
     """
-    wheel, vehicle = WHEEL_SHARE * at.model.J_v, (1.0 - WHEEL_SHARE) * at.model.J_v
+    wheel, vehicle = RIM_SHARE * at.model.J_v, (1.0 - RIM_SHARE) * at.model.J_v
     speed = np.maximum(compute_middle(at.run.wheel_speed), MIN_SPEED)
     stiffness = at.model.i_f * at.largest_shaft_torque / std / speed
     reduced = replace(at.model, J_v=wheel)
