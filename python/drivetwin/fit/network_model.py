@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+"""Network to be identified: elements, start, compared quantities, unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from drivetwin.fit.unknown import Unknown
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import Element, Output, Sine, Start
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkModel:
+    """Network to be identified.
+
+    `inputs` are those that no recording gives; `start` states the nodes whose speeds determine all
+    others, with first guesses; `outputs` are the compared quantities by name.
+    """
+
+    name: str
+    elements: Sequence[Element]
+    inputs: Mapping[str, Signal | Sine]
+    start: Start
+    outputs: Mapping[str, Output]
+    unknowns: Mapping[str, Unknown]
