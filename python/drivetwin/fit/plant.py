@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from drivetwin._util.arrays import FloatArray
@@ -33,7 +33,7 @@ class Plant:
     sought: Sequence[SoughtNumber]
     own: Sequence[str] = ()
     label: str = ""
-    accuracy: Accuracy = Accuracy()
+    accuracy: Accuracy = field(default_factory=Accuracy)
 
     def get_start_name(self, name: str) -> str:
         """Return the unknown of the start of a node or shaft."""

@@ -17,7 +17,12 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
+from drivetwin.estimation.optimize.gauss_newton import (
+    GaussNewtonSettings,
+    OptimizeResult,
+    minimise,
+    predict_decrease,
+)
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.term import NetworkTerm
 from drivetwin.fit.unknown import SoughtNumber
@@ -40,6 +45,8 @@ class FitSearchSettings:
     """Starts that are refined while no minimum explains the recordings [count]."""
     accept_chi2: float = 1.05
     """Q per sample, beyond its own scatter, up to which a minimum explains the recordings [-]."""
+    far_ratio: float = 4.0
+    """Q over that of the best start from which a search is given up after its first steps [-]."""
     same_cost: float = 2.0
     """Difference of Q up to which two starts have led to the same minimum [-]."""
     max_input_rounds: int = 4
@@ -49,11 +56,14 @@ class FitSearchSettings:
 
 
 FIT_SEARCH = FitSearchSettings()
+BENT = GaussNewtonSettings(bend_ratio=0.75)
+"""Search whose steps bend along curved valleys, as those of inertias on both sides of a shaft."""
 
 
 @dataclass(frozen=True, eq=False)
 class RefinedStart:
-    """Minimum that a start led to: Q by the weighting of the best one, and the iterations."""
+    """Minimum that a start led to: Q there as its expansion by the weighting of the best start
+    predicts it, and the iterations."""
 
     point: ParameterVector
     cost: float
@@ -96,59 +106,81 @@ def search(
     IdentificationError
         Where no draw can be simulated, or no start leads to a minimum.
     """
-    with scale_progress(0.0, 0.2):
+    with scale_progress(0.0, 0.1):
         candidates = _screen(problem, start, sought, np.random.default_rng(seed))
-    best: OptimizeResult[Problem] | None = None
-    ends: list[OptimizeResult[Problem]] = []
+    best = _Attempts(problem)
     for number, candidate in enumerate(candidates[: FIT_SEARCH.max_starts]):
-        share = (0.2 + 0.1 * number, 0.3 + 0.1 * number)
-        with scale_progress(*share):
-            found = _refine(problem, candidate)
-        if found is None:
-            continue
-        ends.append(found)
-        if best is None or _deviance(found) < _deviance(best):
-            best = found
-        if len(ends) >= FIT_SEARCH.min_starts and _explains(best):
+        with scale_progress(0.1 + 0.08 * number, 0.18 + 0.08 * number):
+            best.refine(candidate)
+        if len(best.starts) >= FIT_SEARCH.min_starts and best.explains:
             break
-    if best is None:
+    if best.weighted is None:
         raise IdentificationError(
             "the simulation could not be brought onto the recordings from any start",
             "check first guesses, bounds and units against the recordings, and the start speeds",
         )
-    starts = tuple(
-        RefinedStart(one.point, best.problem.cost(one.point), one.iterations) for one in ends
-    )
-    return FoundMinimum(_expect_inputs(best), starts)
+    with scale_progress(0.74, 1.0):
+        return FoundMinimum(_expect_inputs(best.polish()), tuple(best.starts))
 
 
-def _deviance(found: OptimizeResult[Problem]) -> float:
-    return found.normal.cost + found.problem.log_determinant
+class _Attempts:
+    """Starts refined by the sensors' noise, compared by the weighting at the best of them."""
 
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.weighted: Problem | None = None
+        self.starts: list[RefinedStart] = []
 
-def _explains(found: OptimizeResult[Problem]) -> bool:
-    """Return whether a minimum explains the recordings: Q per sample is about 1."""
-    size = found.problem.size
-    return found.normal.cost / size < FIT_SEARCH.accept_chi2 + 3.0 * np.sqrt(2.0 / size)
+    @property
+    def best(self) -> RefinedStart:
+        """Start with the lowest Q."""
+        return min(self.starts, key=lambda one: one.cost)
 
+    @property
+    def explains(self) -> bool:
+        """True if a minimum explains the recordings: Q per sample is about 1."""
+        size = self.problem.size
+        return self.best.cost / size < FIT_SEARCH.accept_chi2 + 3.0 * np.sqrt(2.0 / size)
 
-def _refine(problem: Problem, start: ParameterVector) -> OptimizeResult[Problem] | None:
-    """Minimise from a start, first by the sensors' noise alone."""
-    rough = minimise(problem, start, rough=True)
-    if rough is None:
-        return None
-    weighted = problem.update_weighting(rough.point)
-    found = minimise(weighted, rough.point)
-    if found is None:
-        return rough
-    return minimise(weighted.update_weighting(found.point), found.point) or found
+    def refine(self, start: ParameterVector) -> None:
+        """Refine a start; one that fails is left out."""
+        limit = FIT_SEARCH.far_ratio * self.rough if self.starts else np.inf
+        found = minimise(self.problem, start, rough=True, limit=limit, settings=BENT)
+        if found is None:
+            return
+        if self.weighted is None or found.normal.cost < self.rough:
+            self.rough = found.normal.cost
+            self.weighted = self.problem.update_weighting(found.point)
+            self.starts = [self._weigh(one.point, one.iterations) for one in self.starts]
+        self.starts.append(self._weigh(found.point, found.iterations))
+
+    def _weigh(self, point: ParameterVector, iterations: int) -> RefinedStart:
+        """Compute the minimum of Q that its expansion at a point predicts."""
+        assert self.weighted is not None
+        normal = self.weighted.normal(point)
+        if normal is None:
+            return RefinedStart(point, np.inf, iterations)
+        below = predict_decrease(self.weighted, point, normal.information, normal.gradient)
+        return RefinedStart(point, normal.cost - below, iterations)
+
+    def polish(self) -> OptimizeResult[Problem]:
+        """Minimise from the best start, with the weighting formed anew at the minimum."""
+        assert self.weighted is not None
+        found = minimise(self.weighted, self.best.point, settings=BENT)
+        if found is None:
+            raise IdentificationError(
+                "the simulation fails beside its best start",
+                "state priors that keep the unknowns where the driveline can be simulated",
+            )
+        again = self.weighted.update_weighting(found.point)
+        return minimise(again, found.point, settings=BENT) or found
 
 
 def _expect_inputs(found: OptimizeResult[Problem]) -> OptimizeResult[Problem]:
     """Minimise over the inputs as well: drive the runs by those that the residuals show."""
     for _ in range(FIT_SEARCH.max_input_rounds):
         problem = found.problem.update_inputs(found.point)
-        again = minimise(problem, found.point)
+        again = minimise(problem, found.point, settings=BENT)
         if again is None or again.normal.cost >= found.normal.cost:
             break
         decrease = found.normal.cost - again.normal.cost

@@ -129,7 +129,7 @@ class NetworkTerm:
             return None
         rows = {name: found.rows[output] for name, output in self.plant.outputs.items()}
         seen = [SeenOutput(rows[out.name], out.centre, out.sigma) for out in record.outputs]
-        power = self._compute_power(point, response)
+        power = self._compute_power(response)
         try:
             noise = InputNoise(seen, power, _compute_quiet_noise(seen))
             weighting = add_input_noise(record.sigma, response, noise)
@@ -148,9 +148,7 @@ class NetworkTerm:
         except InputError:
             return None
 
-    def _compute_power(
-        self, point: ParameterVector, response: LinearResponse
-    ) -> dict[str, FloatArray]:
+    def _compute_power(self, response: LinearResponse) -> dict[str, FloatArray]:
         """Compute the variance (N-1,) of an input's noise over each step, by name."""
         found = {}
         for name in response.drive:

@@ -148,6 +148,23 @@ class LikelihoodObjective(Generic[T]):
         """Compute the values (p,) after a `step` (p,)."""
         return np.asarray(point.values + step)
 
+    def compute_curvature(
+        self, point: ParameterVector, normal: NormalEquations, step: FloatArray, share: float
+    ) -> FloatArray | None:
+        """Compute Jᵀ Σ⁻¹ y'' (p,) of the simulated samples y along a `step` (p,), from those after
+        a `share` of it; None if a simulation fails."""
+        charge(RUN)
+        near = point.replace_values(point.values + share * step)
+        total = np.zeros(step.size)
+        parts = zip(self.parts, normal.residuals, normal.slopes, normal.regressors, strict=True)
+        for part, residual, slopes, regressors in parts:
+            there = part.evaluate(near)
+            if there is None:
+                return None
+            bend = (residual - there) / share - slopes @ step
+            total += regressors.T @ (2.0 / share * bend)
+        return total
+
     def normal(self, point: ParameterVector) -> NormalEquations | None:
         """Compute the expansion of Q at `point`; None if a simulation fails."""
         size = len(point.names)

@@ -67,8 +67,10 @@ _ANY_EXPERIMENT = "Record a manoeuvre that it changes more, or state its prior."
 
 
 def get_experiment(parameter_id: str, declared: ParameterSpec | None = None) -> str:
-    """Return the experiment that would narrow the interval of a parameter; of one `declared` outside
-    of the parameter table any that excites it."""
+    """Return the experiment that would narrow the interval of a parameter.
+
+    Of one `declared` outside of the parameter table it is any that excites it.
+    """
     return _ANY_EXPERIMENT if declared else _EXPERIMENT[get_parameter_spec(parameter_id).stem]
 
 
