@@ -21,6 +21,7 @@ from drivetwin.fit.starts import guess_start
 from drivetwin.fit.term import NetworkTerm
 from drivetwin.fit.unknown import SoughtNumber, resolve_unknown
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
+from drivetwin.simulation.input_value import make_input
 
 _DELAY_REACH = 5.0
 """Standard deviations of its prior by which a delay may be off."""
@@ -84,7 +85,7 @@ def build_problem(
     found = _Coordinates([], [], {}, [])
     for one in sought:
         found.add(one.name, one.start, one.spread, one.limits)
-    plain = Plant(model.elements, model.inputs, model.start, model.outputs, sought)
+    plain = Plant(model.elements, {}, model.start, model.outputs, sought)
     parts = []
     for number, recording in enumerate(recordings, start=1):
         record = build_network_record(recording, list(model.outputs), _find_reach(sought))
@@ -92,7 +93,13 @@ def build_problem(
         named = {path.partition(".")[2] for one in sought for path in one.factors}
         own = [name for name in guess.priors if name not in named]
         label = f"log{number}" if len(recordings) > 1 else ""
-        plant = replace(plain, start=guess.start, own=own, label=label)
+        span = (float(record.time[0]), float(record.time[-1]))
+        inputs = {
+            name: make_input(name, value, span)
+            for name, value in model.inputs.items()
+            if name not in recording.inputs
+        }
+        plant = replace(plain, inputs=inputs, start=guess.start, own=own, label=label)
         for name in own:
             prior = guess.priors[name]
             limits = (-np.inf, np.inf)

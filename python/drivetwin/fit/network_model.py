@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from drivetwin.fit.unknown import Unknown
-from drivetwin.simulation.dual_clutch import Signal
-from drivetwin.simulation.network import Element, Output, Sine, Start
+from drivetwin.simulation.input_value import InputValue
+from drivetwin.simulation.network import Element, Output, Start
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class NetworkModel:
 
     name: str
     elements: Sequence[Element]
-    inputs: Mapping[str, Signal | Sine]
+    inputs: Mapping[str, InputValue]
     start: Start
     outputs: Mapping[str, Output]
     unknowns: Mapping[str, Unknown]
