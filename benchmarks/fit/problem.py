@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -125,10 +126,15 @@ class Problem:
             return None
         return np.array([run[one] for one in self.records])
 
-    def is_log(self, name: str) -> bool:
-        """Return whether an unknown is sought by its logarithm: all its fields are positive."""
+    @cached_property
+    def logarithmic(self) -> frozenset[str]:
+        """Unknowns that are sought by their logarithm: all their fields are positive."""
         elements = {str(part.name): part.element for part in self.build().parts}
-        return all(_is_positive(elements, path) for path in self.unknowns[name].paths)
+        return frozenset(
+            name
+            for name, one in self.unknowns.items()
+            if all(_is_positive(elements, path) for path in one.paths)
+        )
 
 
 def record(problem: Problem, rng: np.random.Generator) -> Realisation:
@@ -171,14 +177,14 @@ def draw_means(problem: Problem, rng: np.random.Generator) -> dict[str, float]:
     means = {}
     for name, one in problem.unknowns.items():
         off = one.spread * float(rng.standard_normal())
-        means[name] = one.truth * (np.exp(off) if problem.is_log(name) else 1.0 + off)
+        means[name] = one.truth * (np.exp(off) if name in problem.logarithmic else 1.0 + off)
     return {name: float(value) for name, value in means.items()}
 
 
 def compute_prior_std(problem: Problem, name: str, mean: float) -> float:
     """Return the standard deviation of a prior about `mean`, in the unit of the unknown."""
     one = problem.unknowns[name]
-    return one.spread * abs(mean if problem.is_log(name) else one.truth)
+    return one.spread * abs(mean if name in problem.logarithmic else one.truth)
 
 
 def set_start(

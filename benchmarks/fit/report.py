@@ -68,8 +68,8 @@ def format_summary(found: Mapping[str, Summary]) -> str:
     lines += ["", f"Right minima: {right} of {count} ({_format_share(right, count)})."]
     if squares:
         lines.append(
-            f"RMSE/bound over all unknowns: {np.sqrt(np.mean(squares)):.3f} in the root mean square, "
-            f"{np.sqrt(max(squares)):.2f} at most."
+            f"RMSE/bound over all unknowns: {np.sqrt(np.mean(squares)):.3f} in the root mean "
+            f"square, {np.sqrt(max(squares)):.2f} at most."
         )
     lines.append(f"Pooled coverage: {_format_share(inside, asked)} of {asked} intervals.")
     return "\n".join(lines)

@@ -172,14 +172,14 @@ def _get_twists(problem: Problem, means: Values) -> dict[str, float]:
 def compute_error(problem: Problem, name: str, value: float) -> float:
     """Return the error of an estimate in the scale of the search."""
     truth = problem.unknowns[name].truth
-    if problem.is_log(name):
+    if name in problem.logarithmic:
         return float(np.log(value / truth)) if value / truth > 0.0 else -np.inf
     return value / truth - 1.0
 
 
 def scale_std(problem: Problem, name: str, value: float, std: float) -> float:
     """Return a standard deviation in the scale of the search."""
-    return std / abs(value if problem.is_log(name) else problem.unknowns[name].truth)
+    return std / abs(value if name in problem.logarithmic else problem.unknowns[name].truth)
 
 
 def _price(problem: Problem, means: Values, values: Values) -> float:
