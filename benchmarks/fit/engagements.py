@@ -101,15 +101,15 @@ def build_launch() -> Problem:
         },
         inputs={
             "Te": Source(
-                interpolate(time, (0.2, 0.0), (0.7, 150.0), (2.0, 160.0), (2.2, 120.0)), 1.5
+                interpolate(time, (0.2, 0.0), (0.7, 150.0), (2.0, 160.0), (2.2, 120.0)), 0.5
             ),
             "K1": Source(
                 interpolate(
                     time, (0.1, 0.3e5), (0.3, 0.9e5), (0.9, 2.2e5), (1.8, 2.4e5), (2.1, 6e5)
                 ),
-                1e3,
+                0.3e3,
             ),
-            "K2": Source(interpolate(time, (0.0, 0.5e5)), 1e3),
+            "K2": Source(interpolate(time, (0.0, 0.5e5)), 0.3e3),
         },
         time=time,
         start=lambda _: {"engine": 95.0, "axle": 0.0, "wheel": 0.0, "half shafts": 0.0},
