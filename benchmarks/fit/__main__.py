@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""Accuracy and cost of `Model.fit` on six drivelines.
+
+    python -m benchmarks.fit [--problem NAME] [--count N] [--seed SEED] [--workers N]
+                             [--bounds] [--peers] [--coupled] [--paper]
+
+Each realisation has noise on outputs and measured inputs, and priors of 30 % whose means are drawn
+about the truth; the search starts at these means. A minimum is right if its cost is at most 10
+above that of the fit that starts at the truth. The bound is that of Cramér and Rao with priors and
+unknown start values. `--peers` compares other programs on three realisations of each problem,
+`--coupled` fits the published CoupledClutches of the Modelica Standard Library, `--paper` compares
+with the likelihood fit of `identify`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from benchmarks.code_version import read_commit
+from benchmarks.fit.bound import compute_bound, format_bound
+from benchmarks.fit.problems import PROBLEMS, build_problem
+
+COUNT, SEED = 200, 9000
+"""Realisations of each problem, and the seed of the first one."""
+
+
+def main() -> int:
+    """Run what is asked for; each section appears when it is done."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--problem", nargs="+", choices=PROBLEMS, default=list(PROBLEMS))
+    parser.add_argument("--count", type=int, default=COUNT, help="realisations of each problem")
+    parser.add_argument("--seed", type=int, default=SEED, help="seed of the first realisation")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    parser.add_argument(
+        "--estimate-noise", action="store_true", help="do not state the noise of the outputs"
+    )
+    parser.add_argument("--bounds", action="store_true", help="bounds alone, without fits")
+    parser.add_argument("--peers", action="store_true", help="compare other programs")
+    parser.add_argument("--coupled", action="store_true", help="CoupledClutches alone")
+    parser.add_argument("--paper", action="store_true", help="shift of the paper alone")
+    given = parser.parse_args()
+    _print(f"Code of commit {read_commit()}.\n")
+    if given.bounds:
+        for name in given.problem:
+            problem = build_problem(name)
+            _print(format_bound(problem, compute_bound(problem)))
+    elif given.peers:
+        from benchmarks.fit.peers import compare
+
+        for name in given.problem:
+            _print(compare(name, given.seed))
+    elif given.coupled:
+        from benchmarks.fit.coupled_clutches import run
+
+        _print(run(given.seed))
+    elif given.paper:
+        from benchmarks.fit.paper_shift import run as run_paper
+
+        _print(run_paper(given.seed))
+    else:
+        _run_study(given)
+    return 0
+
+
+def _run_study(given: argparse.Namespace) -> None:
+    from benchmarks.fit.report import format_problem, format_summary
+    from benchmarks.fit.study import run_study, summarise
+
+    found = {}
+    for name in given.problem:
+        problem = build_problem(name)
+        bound = compute_bound(problem)
+        seeds = range(given.seed, given.seed + given.count)
+        tries = run_study(name, seeds, given.workers, sigmas_known=not given.estimate_noise)
+        found[name] = summarise(tries, bound.std)
+        _print(format_problem(problem, bound, found[name]))
+    _print(format_summary(found))
+
+
+def _print(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

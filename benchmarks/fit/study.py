@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: MIT
+"""Monte Carlo of a problem: minima, errors over bounds, coverage and CPU time of `Model.fit`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from benchmarks.fit.problem import (
+    Problem,
+    Realisation,
+    Values,
+    compute_prior_std,
+    record,
+)
+from benchmarks.fit.problems import build_problem
+from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import DrivetwinError
+from drivetwin.fit.recording import Measured, Recording
+from drivetwin.fit.unknown import Unknown
+
+CLOSE = 10.0
+"""Cost above that of the minimum at the truth up to which a minimum counts as the right one."""
+HALF = 1.96
+"""Half width of a 95 % interval, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Estimates of one fit: value and total standard deviation by unknown; cost and verdicts."""
+
+    values: Mapping[str, float]
+    std: Mapping[str, float]
+    cost: float
+    starts: tuple[float, ...] = ()
+    verdicts: Mapping[str, str] | None = None
+
+
+@dataclass(frozen=True)
+class Try:
+    """Outcome of one realisation.
+
+    `errors` and `std` are in the scale of the search: the logarithm, or relative to the truth.
+    `excess` is the cost above that of the fit that starts at the truth. `reached` counts the
+    starts within CLOSE of the best one.
+    """
+
+    seed: int
+    errors: Mapping[str, float]
+    std: Mapping[str, float]
+    excess: float
+    reached: tuple[int, int]
+    seconds: float
+    failure: str = ""
+
+    @property
+    def is_right(self) -> bool:
+        """True if the fit ended in the right minimum or in a better one."""
+        return not self.failure and self.excess <= CLOSE
+
+
+def run_study(
+    name: str, seeds: Sequence[int], workers: int = 1, *, sigmas_known: bool = True
+) -> list[Try]:
+    """Fit the realisations of `seeds` of a problem; the result is independent of `workers`.
+
+    Parameters
+    ----------
+    name
+        Name of the problem.
+    seeds
+        One per realisation.
+    workers
+        Number of processes.
+    sigmas_known
+        Whether the fit is given the noise of the outputs; otherwise it estimates it.
+
+    Returns
+    -------
+    list of Try
+        Outcomes in the order of the seeds.
+    """
+    task = partial(fit_once, name, sigmas_known=sigmas_known)
+    if workers == 1:
+        return [task(seed) for seed in seeds]
+    with ProcessPoolExecutor(workers) as pool:
+        return list(pool.map(task, seeds))
+
+
+def fit_once(name: str, seed: int, *, sigmas_known: bool = True) -> Try:
+    """Draw the realisation of a seed, fit it, and fit it once more from the truth."""
+    problem = build_problem(name)
+    drawn = draw(problem, seed)
+    began = time.process_time()
+    try:
+        found = fit(problem, drawn, drawn.means, sigmas_known=sigmas_known)
+    except DrivetwinError as error:
+        seconds = time.process_time() - began
+        return Try(seed, {}, {}, np.inf, (0, 0), seconds, str(error).partition("\n")[0])
+    seconds = time.process_time() - began
+    best = fit(problem, drawn, problem.truth, sigmas_known=sigmas_known)
+    reference = best.cost + _price(problem, drawn.means, best.values)
+    reference -= _price(problem, problem.truth, best.values)
+    reached = sum(cost <= min(found.starts) + CLOSE for cost in found.starts)
+    return Try(
+        seed,
+        {key: compute_error(problem, key, value) for key, value in found.values.items()},
+        {key: scale_std(problem, key, found.values[key], std) for key, std in found.std.items()},
+        found.cost - reference,
+        (reached, len(found.starts)),
+        seconds,
+    )
+
+
+def draw(problem: Problem, seed: int) -> Realisation:
+    """Draw the realisation of a seed; other problems have other draws of the same seed."""
+    return record(problem, np.random.default_rng([seed, *problem.name.encode()]))
+
+
+def fit(problem: Problem, drawn: Realisation, means: Values, *, sigmas_known: bool = True) -> Found:
+    """Fit a realisation by `Model.fit` with priors about `means`, where the search starts.
+
+    Parameters
+    ----------
+    problem
+        Problem with its unknowns.
+    drawn
+        Recording with noise.
+    means
+        Prior means by unknown.
+    sigmas_known
+        Whether the noise of the outputs is stated.
+
+    Returns
+    -------
+    Found
+        Estimates and cost.
+    """
+    start = drawn.start if means is drawn.means else {**drawn.start, **_get_twists(problem, means)}
+    model = problem.build(means, drawn.inputs, start)
+    outputs = {
+        name: Measured(problem.time, values, problem.outputs[name].sigma if sigmas_known else None)
+        for name, values in drawn.outputs.items()
+    }
+    known = {node: drawn.start[node] for node in sorted(problem.known)}
+    unknowns = {
+        name: Unknown(means[name], compute_prior_std(problem, name, means[name]), paths=one.paths)
+        for name, one in problem.unknowns.items()
+    }
+    wanted = {name: one.output for name, one in problem.outputs.items()}
+    found = model.fit([Recording(drawn.inputs, outputs, known)], unknowns, wanted, seed=0)
+    return Found(
+        {name: float(found.estimates[name].value) for name in problem.unknowns},
+        {name: float(found.estimates[name].std) for name in problem.unknowns},
+        float(found.cost),
+        tuple(float(one.cost) for one in found.starts),
+        {name: str(found.estimates[name].verdict) for name in problem.unknowns},
+    )
+
+
+def _get_twists(problem: Problem, means: Values) -> dict[str, float]:
+    """Return the start values that are no measured speeds, as they belong to unknown values."""
+    nodes = [one.output[1] for one in problem.outputs.values() if one.output[0] == "speed"]
+    return {name: value for name, value in problem.start(means).items() if name not in nodes}
+
+
+def compute_error(problem: Problem, name: str, value: float) -> float:
+    """Return the error of an estimate in the scale of the search."""
+    truth = problem.unknowns[name].truth
+    if name in problem.logarithmic:
+        return float(np.log(value / truth)) if value / truth > 0.0 else -np.inf
+    return value / truth - 1.0
+
+
+def scale_std(problem: Problem, name: str, value: float, std: float) -> float:
+    """Return a standard deviation in the scale of the search."""
+    return std / abs(value if name in problem.logarithmic else problem.unknowns[name].truth)
+
+
+def _price(problem: Problem, means: Values, values: Values) -> float:
+    """Return the cost of the priors about `means` at `values`."""
+    return sum(
+        ((compute_error(problem, name, value) - compute_error(problem, name, means[name])) / std)
+        ** 2
+        for name, value in values.items()
+        for std in [problem.unknowns[name].spread]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """Summary of a problem; ratios are RMSE over bound by unknown, over the right minima."""
+
+    count: int
+    right: int
+    ratios: Mapping[str, float]
+    coverage: Mapping[str, float]
+    covered: tuple[int, int]
+    seconds: FloatArray
+    failures: Sequence[str]
+
+    @property
+    def mean_ratio(self) -> float:
+        """Root of the mean of (RMSE/bound)² over the unknowns."""
+        return float(np.sqrt(np.mean(np.square(list(self.ratios.values())))))
+
+
+def summarise(tries: Sequence[Try], bounds: Mapping[str, float]) -> Summary:
+    """Summarise the outcomes of a problem.
+
+    Parameters
+    ----------
+    tries
+        Outcomes.
+    bounds
+        Cramér-Rao bound by unknown, in the scale of the search.
+
+    Returns
+    -------
+    Summary
+        Coverage counts the fits that did not fail, in a wrong minimum as well.
+    """
+    ended = [one for one in tries if not one.failure]
+    right = [one for one in ended if one.is_right]
+    ratios = {
+        name: float(np.sqrt(np.mean([one.errors[name] ** 2 for one in right]))) / bound
+        for name, bound in bounds.items()
+        if right
+    }
+    inside = {
+        name: [abs(one.errors[name]) < HALF * one.std[name] for one in ended] for name in bounds
+    }
+    pooled = [held for by_unknown in inside.values() for held in by_unknown]
+    return Summary(
+        len(tries),
+        len(right),
+        ratios,
+        {name: float(np.mean(held)) for name, held in inside.items() if held},
+        (sum(pooled), len(pooled)),
+        np.array([one.seconds for one in tries]),
+        [f"seed {one.seed}: {one.failure}" for one in tries if one.failure],
+    )
