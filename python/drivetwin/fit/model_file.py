@@ -88,7 +88,7 @@ class StartTable(StrictModel):
 
 
 class UnknownTable(StrictModel):
-    """`[unknowns."PATH"]`: first guess, prior and bounds; `paths` where several numbers share it."""
+    """`[unknowns."PATH"]`: first guess, prior, bounds; `paths` where several numbers share it."""
 
     value: float
     std: Positive | None = None

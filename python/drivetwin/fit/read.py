@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.findings import Finding
 from drivetwin.fit.model_file import ModelChannels
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Measured, Recording
-from drivetwin.findings import Finding
 from drivetwin.logs.read import read_channels
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import list_inputs

@@ -18,7 +18,8 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from drivetwin.estimation.optimize.objective import NormalEquations
-from drivetwin.estimation.result.estimate import Z95, Estimate
+from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
+from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.verdict import (
     apply_errors,
     assess,
@@ -26,6 +27,7 @@ from drivetwin.estimation.result.verdict import (
     compute_correlation,
 )
 from drivetwin.findings import Finding
+from drivetwin.fit.gate import find_doubts, find_failures, judge_status
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.search import FoundMinimum, Problem, RefinedStart
 from drivetwin.fit.unknown import SoughtNumber
@@ -43,7 +45,9 @@ class ModelFit:
     """Result of a fit.
 
     `estimates` by name of the unknown; `intervals` are their 95 % intervals, those of a positive
-    number by its logarithm. `starts` are the minima that the refined starts led to.
+    number by its logarithm. `starts` are the minima that the refined starts led to, `agreeing` the
+    number of those in the best one. `agreement` compares the simulation with each recording, by
+    output.
     """
 
     model: NetworkModel
@@ -54,7 +58,9 @@ class ModelFit:
     intervals: Mapping[str, tuple[float, float]]
     starts: tuple[RefinedStart, ...]
     agreeing: int
+    agreement: tuple[Mapping[str, SignalFit], ...]
     findings: tuple[Finding, ...]
+    status: ModelStatus
 
     @property
     def problem(self) -> Problem:
@@ -82,6 +88,15 @@ class ModelFit:
         return {one.name: one.to_value(self.minimum.point[one.name]) for one in self.sought}
 
     @property
+    def std(self) -> dict[str, float]:
+        """Standard deviations of the values by name of the unknown, SI, whatever their verdicts."""
+        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return {
+            one.name: float(std) * (value if one.is_positive else 1.0)
+            for one, std, value in zip(self.sought, spread, self.values.values(), strict=False)
+        }
+
+    @property
     def correlation(self) -> FloatArray:
         """Correlation matrix of the unknowns in their order."""
         count = len(self.sought)
@@ -102,26 +117,33 @@ class ModelFit:
 
 
 def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMinimum) -> ModelFit:
-    """Judge the unknowns at a minimum."""
+    """Judge the unknowns and the model at a minimum."""
     minimum = found.result
-    covariance = compute_covariance(minimum.problem, minimum.normal, _compute_chi2(minimum))
+    problem, chi2 = minimum.problem, _compute_chi2(minimum)
+    covariance = compute_covariance(problem, minimum.normal, chi2)
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     estimates, intervals = {}, {}
     for one, coordinate, std in zip(sought, minimum.point.values, spread, strict=False):
         estimates[one.name] = _judge(one, float(coordinate), float(std))
         ends = coordinate + Z95 * std * np.array([-1.0, 1.0])
         intervals[one.name] = (one.to_value(float(ends[0])), one.to_value(float(ends[1])))
-    findings = _collect_findings(minimum, sought)
+    agreement = tuple(part.compare(minimum.point) for part in problem.parts)
+    failures = tuple(find_failures(problem.parts, minimum.normal.residuals, agreement, chi2))
+    doubts = find_doubts(problem.parts, agreement)
+    findings = (*failures, *doubts, *_collect_findings(minimum, sought))
+    estimates = apply_errors(estimates, findings)
     return ModelFit(
         model,
         sought,
         minimum,
         covariance,
-        apply_errors(estimates, findings),
+        estimates,
         intervals,
         found.starts,
         found.agreeing,
+        agreement,
         findings,
+        judge_status(failures, findings, estimates),
     )
 
 
@@ -154,7 +176,7 @@ def _collect_findings(
     return (
         *check_residuals(state, labels),
         *check_weighting(state, labels),
-        *report_null_directions(minimum.normal.data, sizes, shown),
+        *report_null_directions(minimum.normal.data, sizes, shown, "their priors"),
     )
 
 

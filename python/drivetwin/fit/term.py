@@ -21,6 +21,8 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import (
 )
 from drivetwin.estimation.likelihood.objective import OBJECTIVE
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.result.agreement import compute_fit
+from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.fit.plant import Plant
 from drivetwin.fit.recording import NetworkRecord
 from drivetwin.simulation.dual_clutch import Signal
@@ -71,6 +73,18 @@ class NetworkTerm:
         except InputError:
             return None
         return self._compute_residual(run)
+
+    def compare(self, point: ParameterVector) -> dict[str, SignalFit]:
+        """Compare the simulation at `point` with the recording, by output."""
+        run = self.simulate(point)
+        return {
+            out.name: compute_fit(
+                out.values,
+                out.sample(self.record.time, run.columns[self.plant.outputs[out.name]]),
+                float(np.mean(out.values)),
+            )
+            for out in self.record.outputs
+        }
 
     def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by

@@ -376,7 +376,8 @@ def read_channels(
     FileFormatError, UnitError, TimeError, DamagedChannelError, PlausibilityError
         As `read_log`.
     """
-    channels, findings = {}, []
+    channels: dict[str, Channel] = {}
+    findings: list[Finding] = []
     with open_recording(path, options) as recording:
         _require_columns(recording, specs, str(path))
         for count, (name, spec) in enumerate(specs.items()):
@@ -391,9 +392,7 @@ def read_channels(
 def _require_columns(recording: Recording, specs: Mapping[str, ChannelSpec], file: str) -> None:
     """Raise MissingChannelError where a spec fits no column."""
     known = [column.name for column in recording.columns]
-    missing = [
-        one.source for one in specs.values() if not any(map(one.matches, recording.columns))
-    ]
+    missing = [one.source for one in specs.values() if not any(map(one.matches, recording.columns))]
     if missing:
         hints = "".join(suggest_spelling(name, known) for name in missing)
         raise MissingChannelError(

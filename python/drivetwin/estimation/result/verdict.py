@@ -151,7 +151,7 @@ def assess_with_prior(
     name, value, std = told
     spec = declared or get_parameter_spec(name)
     if design.std == 0.0:
-        return replace(from_prior(name, PriorValue(value), Code.FIXED_BY_CARD), spec=declared)
+        return from_prior(name, PriorValue(value), Code.FIXED_BY_CARD)
     if std >= VERDICT.prior_share * design.std:
         prior = PriorValue(value, std)
         return replace(from_prior(name, prior, Code.CARD_DOMINATES, std_systematic), spec=declared)
@@ -159,7 +159,8 @@ def assess_with_prior(
     if one.value is not None or not spec.lower <= value <= spec.upper:
         return one
     half = Z95 * float(np.hypot(std, std_systematic or 0.0))
-    wide = explain(Code.INTERVAL_WIDE_WITH_PRIOR, half=Number(half, spec.unit))
+    code = Code.INTERVAL_WIDE if declared else Code.INTERVAL_WIDE_WITH_PRIOR
+    wide = explain(code, half=Number(half, spec.unit))
     reason = join_reasons(note, wide, get_advice(name, std, std_systematic, declared))
     return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, reason, declared)
 
