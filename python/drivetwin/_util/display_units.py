@@ -57,7 +57,7 @@ _BY_SI = {
 
 def get_display_unit(si_unit: str) -> Display:
     """Display unit of an SI unit from the parameter table; the unit itself where none is set."""
-    return _BY_SI.get(si_unit, Display(si_unit))
+    return _BY_SI.get(si_unit) or Display(spell_unit(si_unit))
 
 
 def spell_unit(si_unit: str) -> str:

@@ -48,6 +48,14 @@ def synth(
         ),
     ] = Path("synth.csv"),
     scenario: ScenarioOption = ScenarioName.PAPER_STEPS,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL",
+            help="Model file of 'drivetwin fit' with a manoeuvre, in place of a scenario: a file, "
+            "or engine_start, tip_in, converter_lock_up.",
+        ),
+    ] = None,
     seed: SeedOption = 0,
     noise: NoiseOption = 1.0,
     torque_reduction: Annotated[
@@ -73,8 +81,12 @@ def synth(
 ) -> None:
     """Make a shift log with known truth on the virtual dynamometer.
 
-    Also write the truth NAME.truth.json and the vehicle card NAME.card.toml.
+    Also write the truth NAME.truth.json and the vehicle card NAME.card.toml. With a model the log
+    is one of its driveline, and the model file NAME.model.toml has first guesses.
     """
+    if model is not None:
+        _write_model_log(output, model, seed, noise, as_json=as_json)
+        return
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.effects import parse_effects
     from drivetwin.dyno.scenario_file import load_scenario
@@ -88,6 +100,31 @@ def synth(
         return
     for name in (log, card, truth):
         print_line(f"wrote {name}")
+
+
+def _write_model_log(output: Path, model: str, seed: int, noise: float, *, as_json: bool) -> None:
+    """Write log, model file and truth of the manoeuvre of a model, all or none."""
+    from drivetwin.errors import InputError, Where
+    from drivetwin.fit.synthesize import find_model, synthesize_log
+
+    if output.suffix.casefold() != ".csv":
+        place = Where(file=str(output))
+        raise InputError("the log of a model is a CSV file", "give a name that ends in .csv", place)
+    with show_step(f"running {model}"):
+        made = synthesize_log(*find_model(model), seed, noise)
+    texts = {
+        "log": (output, made.log),
+        "model": (output.with_suffix(".model.toml"), made.model),
+        "truth": (output.with_suffix(".truth.json"), made.truth),
+    }
+    with write_atomically(output.parent) as folder:
+        for path, text in texts.values():
+            (folder / path.name).write_text(text, encoding="utf-8", newline="\n")
+    if as_json:
+        print_json({key: path for key, (path, _) in texts.items()})
+        return
+    for path, _ in texts.values():
+        print_line(f"wrote {path}")
 
 
 def write_run(output: Path, run: DynoRun) -> tuple[Path, Path, Path]:

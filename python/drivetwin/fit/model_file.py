@@ -26,6 +26,7 @@ from drivetwin.simulation.element_schema import find_element_faults, list_inputs
 from drivetwin.simulation.network import Output, Start
 
 Positive = Annotated[float, Field(gt=0)]
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 _REMEDY = "correct the model file; 'drivetwin schema model' prints its JSON Schema"
 
 
@@ -92,7 +93,7 @@ class UnknownTable(StrictModel):
 
     value: float
     std: Positive | None = None
-    bounds: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    bounds: Pair | None = None
     paths: dict[str, float] | list[str] | None = None
 
     @model_validator(mode="after")
@@ -105,6 +106,22 @@ class UnknownTable(StrictModel):
         """Return the unknown."""
         bounds = (None, None) if self.bounds is None else (self.bounds[0], self.bounds[1])
         return Unknown(self.value, self.std, bounds, self.paths)
+
+
+class DrivenInput(StrictModel):
+    """`[run.inputs.NAME]`: points of time [s] and value in SI, linear between, and the noise of a
+    sample."""
+
+    points: Annotated[list[Pair], Field(min_length=1)]
+    sigma: Annotated[float, Field(ge=0)] = 0.0
+
+
+class RunTable(StrictModel):
+    """`[run]`: manoeuvre from which `drivetwin synth` makes a log; the elements state the truth."""
+
+    end_s: Positive
+    rate_Hz: Positive = 1000.0
+    inputs: dict[str, DrivenInput] = Field(default_factory=dict)
 
 
 class ModelTable(StrictModel):
@@ -122,6 +139,7 @@ class NetworkFile(StrictModel):
     outputs: dict[str, OutputEntry] = Field(default_factory=dict)
     start: StartTable = StartTable()
     unknowns: dict[str, UnknownTable] = Field(default_factory=dict)
+    run: RunTable | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +150,7 @@ class ModelChannels:
     outputs: Mapping[str, ChannelSpec]
     sigma: Mapping[str, float]
     known: Mapping[str, float]
+    run: RunTable | None = None
 
 
 def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
@@ -149,7 +168,8 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
     file = NetworkFile.model_validate(document)
     elements = [_to_plain(one) for one in file.elements]
     refuse_faults(find_element_faults(elements))
-    needed = dict.fromkeys(name for one in elements for name in list_inputs(one))
+    used = [name for one in elements for name in list_inputs(one)]
+    needed = dict.fromkeys([*(name for name in file.inputs if name in used), *used])
     constant = {name: entry.value for name, entry in file.inputs.items() if entry.value is not None}
     start = file.start
     model = NetworkModel(
@@ -171,6 +191,7 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         {name: one.to_spec(name) for name, one in file.outputs.items()},
         {name: one.sigma for name, one in file.outputs.items() if one.sigma is not None},
         _collect_known(start, str(path)),
+        file.run,
     )
     return model, channels
 

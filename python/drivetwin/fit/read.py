@@ -3,30 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.estimation.data.prepare_signal import prepare_signal
+from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.findings import Finding
 from drivetwin.fit.model_file import ModelChannels
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.logs.read import read_channels
 from drivetwin.simulation.dual_clutch import Signal
-from drivetwin.simulation.element_schema import list_inputs
-
-_OF_INPUTS = {
-    "torque": Quantity.TORQUE,
-    "prescribed_speed": Quantity.SPEED,
-    "engine_map": Quantity.FRACTION,
-}
-"""Quantities of the inputs of elements; those of all others are pressures."""
-_OF_OUTPUTS = {
-    **dict.fromkeys(("speed", "slip"), Quantity.SPEED),
-    **dict.fromkeys(("shaft_torque", "torque", "friction_torque"), Quantity.TORQUE),
-}
-"""Quantities of compared outputs by kind; others are numbers in SI."""
 
 
 def read_recording(
@@ -36,26 +23,20 @@ def read_recording(
 
     Raises the typed errors of the reader; see `drivetwin.logs.read.read_channels`.
     """
-    quantities = {name: _find_quantity(name, model.elements) for name in channels.inputs}
+    quantities = {name: find_input_quantity(name, model.elements) for name in channels.inputs}
     for name, output in model.outputs.items():
-        quantities[name] = _OF_OUTPUTS.get(output[0], Quantity.STATE)
+        quantities[name] = get_output_quantity(output)
     specs = {**channels.inputs, **channels.outputs}
     found, findings = read_channels(path, specs, quantities)
-    inputs = {name: Signal(*_get_samples(found[name])) for name in channels.inputs}
+    signals = {name: prepare_signal(channel) for name, channel in found.items()}
+    inputs = {name: _to_signal(signals[name]) for name in channels.inputs}
     outputs = {
-        name: Measured(*_get_samples(found[name]), channels.sigma.get(name))
+        name: Measured(one.time, one.values, channels.sigma.get(name, one.sigma))
         for name in channels.outputs
+        for one in [signals[name]]
     }
     return Recording(inputs, outputs, channels.known), findings
 
 
-def _get_samples(channel: Channel) -> tuple[Any, Any]:
-    """Return the fresh samples of a channel: times and values."""
-    return channel.time, channel.values
-
-
-def _find_quantity(name: str, elements: Sequence[Mapping[str, Any]]) -> Quantity:
-    for element in elements:
-        if name in list_inputs(element):
-            return _OF_INPUTS.get(str(element["type"]), Quantity.PRESSURE)
-    return Quantity.STATE
+def _to_signal(one: MeasuredSignal) -> Signal:
+    return Signal(one.time, one.values)

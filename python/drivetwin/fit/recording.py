@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.errors import InputError
 from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.shift_data import MeasuredSignal
@@ -39,8 +40,11 @@ class Measured:
     def get_noise(self) -> float:
         """Return the noise of a sample, at least that of an ideal sensor."""
         least = RECORD.min_noise * float(np.ptp(self.values))
-        found = estimate_white_noise(self.values) if self.sigma is None else self.sigma
-        return max(found, least, np.finfo(float).tiny)
+        found = self.sigma
+        if found is None:
+            rounding = float(estimate_rounding_step(self.values)) / np.sqrt(12.0)
+            found = max(estimate_white_noise(self.values), rounding)
+        return float(max(found, least, np.finfo(float).tiny))
 
 
 @dataclass(frozen=True, eq=False)

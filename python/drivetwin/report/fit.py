@@ -5,11 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from drivetwin._util.display_units import NM, RPM, Display, format_significant, format_uncertainty
+from drivetwin._util.display_units import (
+    RPM,
+    Display,
+    format_significant,
+    format_uncertainty,
+    get_display_unit,
+)
+from drivetwin.channels.shiftlog import Quantity
 from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.fit.holdout import HeldOut
+from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.term import NetworkTerm
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
@@ -31,10 +39,6 @@ from drivetwin.report.sections.parameters import (
 from drivetwin.report.style import MEASURED, MUTED, SIMULATED
 from drivetwin.simulation.network import NetworkRun
 
-_DISPLAYS = {
-    **dict.fromkeys(("speed", "slip"), RPM),
-    **dict.fromkeys(("shaft_torque", "torque", "friction_torque"), NM),
-}
 _HEIGHT = 190
 """Height of a panel [px]."""
 _ACTIONS = {
@@ -98,13 +102,18 @@ def _build_figure(log: str, part: NetworkTerm, run: NetworkRun) -> FigureBlock:
             Curve("measured", part.record.time[out.place], out.values, MEASURED),
             Curve("simulated", run.time, run.columns[output], SIMULATED),
         ]
-        panels.append(Panel(out.name, _DISPLAYS.get(output[0], Display("")), curves))
+        panels.append(Panel(out.name, _get_display(get_output_quantity(output)), curves))
     for name, signal in part.record.inputs.items():
         curve = Curve("input", signal.time, signal.values, MUTED)
-        panels.append(Panel(name, Display(""), [curve], weight=0.6))
+        quantity = find_input_quantity(name, part.plant.elements)
+        panels.append(Panel(name, _get_display(quantity), [curve], weight=0.6))
     view = (float(run.time[0]), float(run.time[-1]))
     figure = plot_over_time_axis(panels, view, _HEIGHT * len(panels))
     return FigureBlock(figure, f"{log}.", panels)
+
+
+def _get_display(quantity: Quantity) -> Display:
+    return RPM if quantity is Quantity.SPEED else get_display_unit(quantity.unit)
 
 
 def _build_agreement_table(agreement: Mapping[str, Mapping[str, SignalFit]]) -> TableBlock:

@@ -207,6 +207,13 @@ def differentiate(
     return replace(found, unknowns=tuple(unknowns))
 
 
+def get_number(elements: Sequence[Element], path: str) -> float:
+    """Return the number of an element at a path; raises InputError where there is none."""
+    described = _Description(json.loads(as_json(list(elements))), {}, Start({}))
+    place, key = described.find_number(path)
+    return float(place[key])
+
+
 def collect_weights(unknowns: Unknowns) -> dict[str, FloatArray]:
     """Return the derivatives (k,) by the k unknowns of the numbers that they act on, by path."""
     named = unknowns if isinstance(unknowns, Mapping) else {one: {one: 1.0} for one in unknowns}
