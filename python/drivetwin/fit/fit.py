@@ -101,9 +101,9 @@ def build_problem(
         }
         plant = replace(plain, inputs=inputs, start=guess.start, own=own, label=label)
         for name in own:
-            prior = guess.priors[name]
+            known = guess.priors[name]
             limits = (-np.inf, np.inf)
-            found.add(plant.get_start_name(name), prior.value, prior.std, limits)
+            found.add(plant.get_start_name(name), known.value, known.std, limits)
         parts.append(NetworkTerm.from_sensor_noise(plant, record))
     prior = Prior.from_independent(len(found.names), found.priors)
     lower, upper = np.array(found.limits).T

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,9 +21,10 @@ from drivetwin._util.toml import (
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.errors import InputError
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.quantities import to_output
 from drivetwin.fit.unknown import Unknown, resolve_unknown
 from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
-from drivetwin.simulation.network import Output, Start
+from drivetwin.simulation.network import Start
 
 Positive = Annotated[float, Field(gt=0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -177,7 +178,7 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         elements,
         constant,
         Start(start.speeds, start.twists, tuple(start.locked)),
-        {name: _to_output(one.quantity) for name, one in file.outputs.items()},
+        {name: to_output(one.quantity) for name, one in file.outputs.items()},
         {name: one.to_unknown() for name, one in file.unknowns.items()},
     )
     for name, unknown in model.unknowns.items():
@@ -194,10 +195,6 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         file.run,
     )
     return model, channels
-
-
-def _to_output(quantity: Sequence[str]) -> Output:
-    return (quantity[0], quantity[1])
 
 
 def _collect_known(start: StartTable, file: str) -> dict[str, float]:

@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast, get_args
 
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin.channels.shiftlog import Quantity
+from drivetwin.errors import InputError
 from drivetwin.simulation.element_schema import list_inputs
-from drivetwin.simulation.network import Output
+from drivetwin.simulation.network import Output, OutputKind
 
 _OF_INPUTS = {
     "torque": Quantity.TORQUE,
@@ -29,6 +31,19 @@ def find_input_quantity(name: str, elements: Sequence[Mapping[str, Any]]) -> Qua
         if name in list_inputs(element):
             return _OF_INPUTS.get(str(element["type"]), Quantity.PRESSURE)
     return Quantity.STATE
+
+
+def to_output(quantity: Sequence[str]) -> Output:
+    """Return a kind and a name as an output of a network.
+
+    Raises InputError for a kind that does not exist.
+    """
+    kind, name = quantity
+    kinds = get_args(OutputKind)
+    if kind not in kinds:
+        hint = suggest_spelling(kind, kinds)
+        raise InputError(f"{kind!r} is no quantity{hint}", f"known are {', '.join(kinds)}")
+    return (cast(OutputKind, kind), name)
 
 
 def get_output_quantity(output: Output) -> Quantity:

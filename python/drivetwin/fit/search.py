@@ -130,6 +130,7 @@ class _Attempts:
         self.problem = problem
         self.weighted: Problem | None = None
         self.starts: list[RefinedStart] = []
+        self.rough = np.inf
 
     @property
     def best(self) -> RefinedStart:
@@ -140,11 +141,11 @@ class _Attempts:
     def explains(self) -> bool:
         """True if a minimum explains the recordings: Q per sample is about 1."""
         size = self.problem.size
-        return self.best.cost / size < FIT_SEARCH.accept_chi2 + 3.0 * np.sqrt(2.0 / size)
+        return bool(self.best.cost / size < FIT_SEARCH.accept_chi2 + 3.0 * np.sqrt(2.0 / size))
 
     def refine(self, start: ParameterVector) -> None:
         """Refine a start; one that fails is left out."""
-        limit = FIT_SEARCH.far_ratio * self.rough if self.starts else np.inf
+        limit = FIT_SEARCH.far_ratio * self.rough
         found = minimise(self.problem, start, rough=True, limit=limit, settings=BENT)
         if found is None:
             return

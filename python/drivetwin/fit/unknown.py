@@ -158,8 +158,7 @@ def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> Field | Non
     by_name = {str(one["name"]): one for one in elements}
     if head not in by_name:
         hint = suggest_spelling(head, by_name)
-        known = ", ".join(by_name)
-        raise InputError(f"{path}: no element {head!r}{hint}", f"known are {known}")
+        raise InputError(f"{path}: no element {head!r}{hint}", f"known are {', '.join(by_name)}")
     place: Any = by_name[head]
     fields: Mapping[str, Field] = ELEMENT_FIELDS[str(place["type"])]
     found: Field | None = None

@@ -23,7 +23,12 @@ from scipy.optimize import Bounds, LinearConstraint, lsq_linear, minimize
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import notify_progress
-from drivetwin.estimation.optimize.objective import NormalEquations, Objective, ParameterVector
+from drivetwin.estimation.optimize.objective import (
+    CurvedObjective,
+    NormalEquations,
+    Objective,
+    ParameterVector,
+)
 
 RCOND = 1e-13
 """Relative singular value below which a direction carries no information [-]."""
@@ -106,6 +111,7 @@ _USUAL_ITERATIONS = 10
 """Iterations of a search from a rough start; only the progress shown depends on them."""
 
 P = TypeVar("P", bound=Objective)
+C = TypeVar("C", bound=CurvedObjective)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,13 +177,13 @@ class _Weighting(Generic[P]):
 
 
 def minimise(
-    problem: P,
+    problem: C,
     start: ParameterVector,
-    refresh: Callable[[P, ParameterVector], P] | None = None,
+    refresh: Callable[[C, ParameterVector], C] | None = None,
     rough: bool = False,
     limit: float = np.inf,
     settings: GaussNewtonSettings = GAUSS_NEWTON,
-) -> OptimizeResult[P] | None:
+) -> OptimizeResult[C] | None:
     """Minimise Q from `start`; return None if the model cannot be evaluated there.
 
     `refresh` forms Q anew at every point until the minimum is close (iterative reweighting).
@@ -292,7 +298,7 @@ def _solve_constrained(normal: NormalEquations, slope: FloatArray, miss: float) 
 
 
 def _take_damped_step(
-    problem: Objective,
+    problem: CurvedObjective,
     point: ParameterVector,
     normal: NormalEquations,
     damping: float,
@@ -326,7 +332,7 @@ def _try_step(
 
 
 def _bend_step(
-    problem: Objective,
+    problem: CurvedObjective,
     point: ParameterVector,
     normal: NormalEquations,
     step: FloatArray,

@@ -83,6 +83,10 @@ class Objective(Protocol):
     def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
         """Compute the values (p,) after a `step` (p,) along the parameter manifold."""
 
+
+class CurvedObjective(Objective, Protocol):
+    """Objective that measures how its residuals bend."""
+
     def compute_curvature(
         self, point: ParameterVector, normal: NormalEquations, step: FloatArray, share: float
     ) -> FloatArray | None:
