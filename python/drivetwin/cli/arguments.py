@@ -90,6 +90,21 @@ VehicleFile = Annotated[
         callback=require_card,
     ),
 ]
+OptionalCardFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--vehicle",
+        metavar="CARD",
+        help="Vehicle card (TOML), as 'drivetwin card new' writes it.",
+        callback=require_card,
+    ),
+]
+ModelFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--model", metavar="MODEL", help="Model file of 'drivetwin fit', in place of a card."
+    ),
+]
 OptionalVehicleFile = Annotated[
     Path | None,
     typer.Option(

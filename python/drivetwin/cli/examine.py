@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile
+from drivetwin.cli.arguments import ChannelsFile, LogFile, ModelFile, OptionalCardFile
 from drivetwin.cli.numbers import format_estimate, format_half_width
 from drivetwin.cli.output import (
     JsonFlag,
@@ -23,6 +23,7 @@ from drivetwin.cli.output import (
     show_step,
 )
 from drivetwin.cli.outputs import Output, Shape
+from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.parameters import get_parameter_spec
 
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.analysis.bootstrap import Bootstrap
     from drivetwin.estimation.analysis.friction_dependence import Departure
     from drivetwin.estimation.analysis.profile_likelihood import Profile
-    from drivetwin.estimation.identification import Identification
+    from drivetwin.estimation.result.estimate import Estimate
     from drivetwin.twin.twin import Twin
 
 SUGGESTIONS, BOOTSTRAP = "suggestions.json", "bootstrap.json"
@@ -42,7 +43,8 @@ FRICTION, DEPARTURES = "friction.json", "departures.json"
 
 def examine(
     log: LogFile,
-    vehicle: VehicleFile,
+    vehicle: OptionalCardFile = None,
+    model: ModelFile = None,
     channels: ChannelsFile = None,
     profile: Annotated[
         list[str] | None,
@@ -83,16 +85,23 @@ def examine(
     The log is first identified by the likelihood method. The command lists the experiments that
     narrow weak, not identifiable and least known parameters, with the expected intervals. Options
     add the profile likelihood, a parametric bootstrap, friction curves of free or monotone shape
-    with a twin, and departures from the friction law.
+    with a twin, and departures from the friction law. With a model file the log is fitted as by
+    'drivetwin fit', and all but the last two apply.
     """
+    from drivetwin.cli.examine_fit import examine_fit
     from drivetwin.cli.identify_run import Request, run_identification
     from drivetwin.estimation.result.method import Method
 
-    for name in profile or ():
-        get_parameter_spec(name)
     asked = Asked(tuple(profile or ()), bootstrap, seed, friction, departures)
-    outcome = run_identification(log, Request(vehicle, channels, Method.LIKELIHOOD))
-    answers = list(_iterate_answers(outcome, asked))
+    if (vehicle is None) == (model is None):
+        raise InputError("name what the log is of", "give --vehicle CARD or --model MODEL")
+    if model is not None:
+        answers = list(examine_fit(log, model, asked))
+    else:
+        for name in asked.profiles:
+            get_parameter_spec(name)
+        outcome = run_identification(log, Request(vehicle, channels, Method.LIKELIHOOD))
+        answers = list(_iterate_answers(outcome, asked))
     files = () if output is None else _write_outputs(output, answers)
     if as_json:
         print_json({one.file: json.loads(one.text) for one in answers})
@@ -150,16 +159,16 @@ def _iterate_answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
             one = compute_profile(found, name)
         yield Answer(
             f"profile.{name}.json",
-            analysis_files.format_profile(one),
-            _build_profile_table(one, found),
+            analysis_files.format_profile(one, found.estimates[name].unit),
+            build_profile_table(one, found.estimates[name].unit),
         )
     if asked.bootstrap:
         with show_step(f"bootstrap of {asked.bootstrap} fits"):
             refits = bootstrap(found, asked.bootstrap, asked.seed)
         yield Answer(
             BOOTSTRAP,
-            analysis_files.format_bootstrap(refits),
-            _build_bootstrap_table(refits, found),
+            analysis_files.format_bootstrap(refits, get_units(found.estimates)),
+            build_bootstrap_table(refits, found.estimates),
         )
     if asked.friction is not None:
         yield _identify_friction(outcome, asked.friction)
@@ -206,8 +215,13 @@ def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     return tuple(folder / name for name in names)
 
 
-def _build_profile_table(one: Profile, found: Identification) -> Table:
-    unit = found.estimates[one.parameter].unit
+def get_units(estimates: Mapping[str, Estimate]) -> dict[str, str]:
+    """Return the SI unit of each estimate by id."""
+    return {name: one.unit for name, one in estimates.items()}
+
+
+def build_profile_table(one: Profile, unit: str) -> Table:
+    """Build the table of both intervals of a profile."""
     table = make_table(
         f"Profile likelihood of {one.parameter}", "interval (noise)", "from", "to", "unit",
         right=("from", "to"),
@@ -221,14 +235,15 @@ def _build_profile_table(one: Profile, found: Identification) -> Table:
     return table
 
 
-def _build_bootstrap_table(one: Bootstrap, found: Identification) -> Table:
+def build_bootstrap_table(one: Bootstrap, estimates: Mapping[str, Estimate]) -> Table:
+    """Build the table of the spreads by covariance and by bootstrap."""
     from drivetwin.estimation.result.estimate import Z95
 
     title = f"Bootstrap: {len(one.values)} fits, {one.failed} failed"
     numbers = ("by covariance", "by bootstrap", "bias")
     table = make_table(title, "parameter", *numbers, "unit", right=numbers)
     for k, name in enumerate(one.ids):
-        estimate = found.estimates[name]
+        estimate = estimates[name]
         if one.std[k] == 0.0:
             continue
         linear = Z95 * (estimate.std_noise or float("inf"))

@@ -26,7 +26,6 @@ from drivetwin.cli.outputs import Output, Shape
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from drivetwin.estimation.analysis.profile_likelihood import Profile
     from drivetwin.findings import Finding
     from drivetwin.fit.holdout import HeldOut
     from drivetwin.fit.recording import Recording
@@ -49,10 +48,6 @@ def fit(
         list[Path] | None,
         typer.Option("--hold-out", metavar="LOG", help="Predict a recording with the fit."),
     ] = None,
-    profile: Annotated[
-        list[str] | None,
-        typer.Option(metavar="UNKNOWN", help="Compute the profile likelihood of an unknown."),
-    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the draws of the search.")] = 0,
     output: Annotated[
         Path | None,
@@ -71,7 +66,6 @@ def fit(
     from drivetwin.fit.fit import fit_network
     from drivetwin.fit.holdout import predict
     from drivetwin.fit.model_file import format_model, read_model
-    from drivetwin.fit.profile import compute_profile
 
     network, channels = read_model(model)
     answer = _Answer([one.name for one in logs])
@@ -83,8 +77,6 @@ def fit(
     with show_step("predicting"):
         names = [one.name for one in hold_out or []]
         answer.held_out = dict(zip(names, predict(found, held), strict=True))
-    with show_step("computing profiles"):
-        answer.profiles = [compute_profile(found, name) for name in profile or []]
     files = [] if output is None else _write_outputs(output, answer, format_model(
         found.fitted, channels
     ))  # fmt: skip
@@ -104,25 +96,14 @@ class _Answer:
     remarks: tuple[Finding, ...] = ()
     found: ModelFit | None = None
     held_out: Mapping[str, HeldOut] | None = None
-    profiles: Sequence[Profile] = ()
 
     def to_document(self) -> dict[str, Any]:
-        """Return the content of the result file, with the profiles."""
+        """Return the content of the result file."""
         from drivetwin.files.fit_file import build_fit_file
 
         assert self.found is not None
         file = build_fit_file(self.found, self.logs, self.held_out or {}, self.remarks)
-        document = file.model_dump(mode="json", by_alias=True)
-        if self.profiles:
-            document["profiles"] = {
-                one.parameter: {
-                    "values": one.values.tolist(),
-                    "rise": one.rise.tolist(),
-                    "interval": list(one.interval),
-                }
-                for one in self.profiles
-            }
-        return document
+        return file.model_dump(mode="json", by_alias=True)
 
 
 def _read_recordings(
@@ -167,9 +148,6 @@ def _print_answer(answer: _Answer) -> None:
         print_paragraph(remark)
     print_table(_build_agreement_table(answer, found))
     print_line(f"{found.agreeing} of {len(found.starts)} starts led to the best minimum")
-    for one in answer.profiles:
-        low, high = one.interval
-        print_line(f"profile of {one.parameter}: 95 % from {low:.6g} to {high:.6g}")
     show_findings((*answer.remarks, *found.findings))
 
 

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from drivetwin._util.plain_values import to_plain_values
@@ -13,7 +15,7 @@ from drivetwin.estimation.analysis.friction_shape import ShapedFriction
 from drivetwin.estimation.analysis.profile_likelihood import Profile
 from drivetwin.estimation.result.suggestion import ExperimentRanking
 from drivetwin.files.records import FrictionRecord, SuggestionRecord
-from drivetwin.parameters import get_parameter_spec
+from drivetwin.fit.examine import REPEATS, Improvement
 
 
 def format_suggestions(found: tuple[ExperimentRanking, ...]) -> str:
@@ -22,12 +24,18 @@ def format_suggestions(found: tuple[ExperimentRanking, ...]) -> str:
     return _format_json({"suggestions": rows})
 
 
-def format_profile(one: Profile) -> str:
+def format_improvements(found: Sequence[Improvement], units: Mapping[str, str]) -> str:
+    """`suggestions.json` of a fit: half widths of the intervals, and what would narrow them."""
+    rows = [{**asdict(one), "repeats": REPEATS, "unit": units[one.unknown]} for one in found]
+    return _format_json({"suggestions": rows})
+
+
+def format_profile(one: Profile, unit: str) -> str:
     """`profile.<parameter>.json`: rise of Q over the parameter, and both intervals."""
     return _format_json(
         {
             "parameter": one.parameter,
-            "unit": get_parameter_spec(one.parameter).unit,
+            "unit": unit,
             "estimate": one.estimate,
             "ci95_profile": one.interval,
             "ci95_linear": one.linear,
@@ -37,13 +45,13 @@ def format_profile(one: Profile) -> str:
     )
 
 
-def format_bootstrap(one: Bootstrap) -> str:
+def format_bootstrap(one: Bootstrap, units: Mapping[str, str]) -> str:
     """`bootstrap.json`: every refit by parameter, and its spread."""
     low, high = one.interval
     std, bias = one.std, one.bias
     parameters = {
         name: {
-            "unit": get_parameter_spec(name).unit,
+            "unit": units[name],
             "estimate": one.estimate[k],
             "std": std[k],
             "bias": bias[k],

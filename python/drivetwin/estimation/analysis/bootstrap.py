@@ -100,7 +100,7 @@ def _draw_problem(base: LikelihoodFit, rng: np.random.Generator) -> ShiftObjecti
     """Draw the problem of a synthetic log, with new noise and new priors."""
     parts = tuple(_draw_part(part, base, rng) for part in base.problem.parts)
     problem = base.problem
-    prior = _draw_prior(problem.prior, base.point.values, rng)
+    prior = draw_prior(problem.prior, base.point.values, rng)
     return replace(problem, parts=parts, prior=prior)
 
 
@@ -147,7 +147,7 @@ def _add_noise(
     )
 
 
-def _draw_prior(prior: Prior, truth: FloatArray, rng: np.random.Generator) -> Prior:
+def draw_prior(prior: Prior, truth: FloatArray, rng: np.random.Generator) -> Prior:
     """Draw the means of the prior about the `truth` (p,)."""
     scale = np.sqrt(np.diag(prior.precision))
     known = np.flatnonzero(scale > 0.0)
