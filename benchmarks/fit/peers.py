@@ -30,7 +30,7 @@ STEP = 1e-4
 """Step of the differences, in standard deviations of the prior."""
 LOST = 1e3
 """Residual of every sample where a run does not complete."""
-MOST = 40
+MOST = 25
 """Largest number of iterations."""
 ABSENT = "not installed: pip install casadi"
 UNWRITTEN = "no smooth model of this problem"

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-WIDTH = 0.05
+WIDTH = 0.01
 """Slip over which the friction torque reverses [rad/s]."""
 SOFT = 2.0
 """Torque over which a contact closes [N·m]."""
