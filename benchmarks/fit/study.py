@@ -155,8 +155,8 @@ def fit(problem: Problem, drawn: Realisation, means: Values, *, sigmas_known: bo
     wanted = {name: one.output for name, one in problem.outputs.items()}
     found = model.fit([Recording(drawn.inputs, outputs, known)], unknowns, wanted, seed=0)
     return Found(
-        {name: float(found.estimates[name].value) for name in problem.unknowns},
-        {name: float(found.estimates[name].std) for name in problem.unknowns},
+        found.values,
+        found.std,
         float(found.cost),
         tuple(float(one.cost) for one in found.starts),
         {name: str(found.estimates[name].verdict) for name in problem.unknowns},

@@ -15,6 +15,7 @@ __all__ = [
     "element_schema",
     "gear_statics",
     "linearise",
+    "network_response",
     "network_sensitivities",
     "reduce_shift",
     "sensitivities",
@@ -92,6 +93,13 @@ def simulate_network(
     grid: _Array,
     options: _Options,
 ) -> _Run: ...
+def network_response(
+    driveline: str,
+    outputs: Sequence[_Output],
+    scenario: _Scenario,
+    grid: _Array,
+    options: tuple[float, float],
+) -> tuple[_Array, _Array, list[str], str]: ...
 def element_schema() -> str: ...
 def network_sensitivities(
     driveline: str,

@@ -135,6 +135,7 @@ class Code(StrEnum):
     DELAY_NOT_EXCITED = auto()
     FIXED_BY_CARD = auto()
     CARD_DOMINATES = auto()
+    PRIOR_DOMINATES = auto()
     PARTNER_FRICTION = auto()
     MU_GAIN_SLIP = auto()
     RATIO_REFINED = auto()

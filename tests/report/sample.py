@@ -7,6 +7,7 @@ import numpy as np
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.agreement import compute_fit
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import SignalTrace, Validation
@@ -14,7 +15,7 @@ from drivetwin.findings import Code, report
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import clip_phases, compute_fit
+from drivetwin.validation.simulate_log import clip_phases
 from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
 from drivetwin.vehicle.shift_kind import ShiftKind
 

@@ -13,6 +13,7 @@ import pytest
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import DamagedChannelError
+from drivetwin.estimation.result.agreement import compute_fit
 from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
@@ -24,7 +25,6 @@ from drivetwin.validation.simulate_log import (
     EXTRA_SIGNALS,
     attach_fit,
     attach_validation,
-    compute_fit,
     pool_fits,
     replace_run,
     simulate_shift,

@@ -13,6 +13,7 @@ mod network;
 mod network_sensitivity;
 mod output;
 mod plain;
+mod response;
 mod scenario;
 mod sensitivity;
 mod table;
@@ -36,6 +37,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(network::simulate_network, module)?)?;
     module.add_function(wrap_pyfunction!(network::element_schema, module)?)?;
     module.add_function(wrap_pyfunction!(network_sensitivity::network_sensitivities, module)?)?;
+    module.add_function(wrap_pyfunction!(response::network_response, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::reduce_shift, module)?)?;
     module.add_function(wrap_pyfunction!(whitening::whiten, module)?)?;

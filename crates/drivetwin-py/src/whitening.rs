@@ -7,10 +7,9 @@ use numpy::{
     IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Rows of the samples (n, 4), their first states (n,) and variances (n,).
+/// Rows of the samples (n, S), their first states (n,) and variances (n,).
 type Samples<'py> =
     (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, u32>, PyReadonlyArray1<'py, f64>);
 
@@ -23,14 +22,11 @@ pub fn whiten<'py>(
     columns: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (rows, first, variance) = &samples;
-    let (rows, rest) = rows.as_slice()?.as_chunks();
-    if !rest.is_empty() {
-        return Err(PyValueError::new_err("rows have four states"));
-    }
     let shape @ [_, count] = [columns.shape()[0], columns.shape()[1]];
     let whitening = Whitening {
         factor: BandedFactor { bands: factor.as_slice()?, size: factor.shape()[1] },
-        rows,
+        states: rows.shape()[1],
+        rows: rows.as_slice()?,
         first: first.as_slice()?,
         variance: variance.as_slice()?,
     };

@@ -17,6 +17,7 @@ from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
 from drivetwin.cli.export import export
+from drivetwin.cli.fit import fit
 from drivetwin.cli.fleet import fleet
 from drivetwin.cli.gearbox import gearbox
 from drivetwin.cli.identify import identify
@@ -39,6 +40,7 @@ COMMANDS: dict[str, Entry] = {
     "shifts": shifts,
     "identify": identify,
     "examine": examine,
+    "fit": fit,
     "simulate": simulate,
     "observe": observe,
     "calibrate": calibrate,

@@ -25,6 +25,8 @@ class FileKind(StrEnum):
     TWIN = "twin"
     PARAMETERS = "parameters"
     ELEMENTS = "elements"
+    MODEL = "model"
+    FIT = "fit"
 
 
 _MODELS = {
@@ -35,6 +37,8 @@ _MODELS = {
     FileKind.FLEET_RULES: ("fleet.rules", "RulesFile"),
     FileKind.RESULT: ("files.result_file", "ResultFile"),
     FileKind.TWIN: ("files.twin_file", "TwinFile"),
+    FileKind.MODEL: ("fit.model_file", "NetworkFile"),
+    FileKind.FIT: ("files.fit_file", "FitFile"),
     FileKind.PARAMETERS: ("export.parameters.json_file", "ParameterFile"),
 }
 """Module below the package, and the model there, by which the program itself checks the file; each
@@ -55,4 +59,15 @@ def build_json_schema(kind: FileKind | str) -> dict[str, Any]:
         return {**head, **build_network_schema()}
     module, name = _MODELS[kind]
     model: type[BaseModel] = getattr(import_module(f"drivetwin.{module}"), name)
-    return {**model.model_json_schema(), **head}
+    schema = {**model.model_json_schema(), **head}
+    return _insert_elements(schema) if kind is FileKind.MODEL else schema
+
+
+def _insert_elements(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a model file with that of its elements."""
+    from drivetwin.files.element_json_schema import build_network_schema  # it loads NumPy
+
+    network = build_network_schema()
+    definitions = {**schema["$defs"], **network.pop("$defs")}
+    properties = {**schema["properties"], "elements": network}
+    return {**schema, "properties": properties, "$defs": definitions}

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
 from drivetwin.channels.filling import Filling
@@ -27,6 +28,7 @@ from drivetwin.errors import (
     DamagedChannelError,
     DrivetwinError,
     InputError,
+    MissingChannelError,
     PlausibilityError,
     TimeError,
     UnitError,
@@ -164,7 +166,7 @@ def assemble_log(
         notify_progress(count / len(mapped.channels))
         try:
             raw = recording.load(_load_column(recording, spec), window)
-            checked = _make_checked_channel(role, spec, raw, source)
+            checked = _make_checked_channel(role, spec, raw, source, get_quantity(role))
         except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
             if role in strict:
                 raise
@@ -348,11 +350,64 @@ class _Conversion:
         return replace(filling, time=time, values=values)
 
 
-def _make_checked_channel(role: str, spec: ChannelSpec, raw: RawChannel, file: str) -> Checked:
+def read_channels(
+    path: Path,
+    specs: Mapping[str, ChannelSpec],
+    quantities: Mapping[str, Quantity],
+    options: ReadOptions | None = None,
+) -> tuple[dict[str, Channel], tuple[Finding, ...]]:
+    """Read columns by names of the caller, each on its own time base, SI inside.
+
+    Parameters
+    ----------
+    path
+        Log of any format.
+    specs
+        Column and conversion by name.
+    quantities
+        Quantity of each.
+    options
+        Options of the reader.
+
+    Raises
+    ------
+    MissingChannelError
+        With the names of the columns where a column is not there.
+    FileFormatError, UnitError, TimeError, DamagedChannelError, PlausibilityError
+        As `read_log`.
+    """
+    channels: dict[str, Channel] = {}
+    findings: list[Finding] = []
+    with open_recording(path, options) as recording:
+        _require_columns(recording, specs, str(path))
+        for count, (name, spec) in enumerate(specs.items()):
+            notify_progress(count / len(specs))
+            raw = recording.load(_load_column(recording, spec))
+            checked = _make_checked_channel(name, spec, raw, str(path), quantities[name])
+            channels[name] = checked.channel
+            findings += checked.findings
+    return channels, tuple(dict.fromkeys(findings))
+
+
+def _require_columns(recording: Recording, specs: Mapping[str, ChannelSpec], file: str) -> None:
+    """Raise MissingChannelError where a spec fits no column."""
+    known = [column.name for column in recording.columns]
+    missing = [one.source for one in specs.values() if not any(map(one.matches, recording.columns))]
+    if missing:
+        hints = "".join(suggest_spelling(name, known) for name in missing)
+        raise MissingChannelError(
+            f"the log has no column {', '.join(map(repr, missing))}{hints}",
+            f"name columns of the log; it has {', '.join(known)}",
+            Where(file=file),
+        )
+
+
+def _make_checked_channel(
+    role: str, spec: ChannelSpec, raw: RawChannel, file: str, quantity: Quantity
+) -> Checked:
     """Return the checked channel of a role, and its findings."""
     place = Where(channel=raw.name)
     notes = [report(Code.RECORDING, "", place, text=note) for note in raw.notes]
-    quantity = get_quantity(role)
     unit = spec.unit if spec.unit is not None else raw.unit
     where = Where(file=file, channel=spec.source)
     conversion = _Conversion(spec, resolve_channel_unit(unit, quantity, where))

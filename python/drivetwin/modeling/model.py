@@ -17,14 +17,19 @@ import numpy as np
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.export.modelica.model import Run, format_package
+from drivetwin.fit.fit import fit_network
+from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.recording import Recording
+from drivetwin.fit.result import ModelFit
+from drivetwin.fit.unknown import Unknown
 from drivetwin.modeling.draw import draw_schematic
 from drivetwin.modeling.element_methods import ElementMethods
-from drivetwin.modeling.inputs import make_input
 from drivetwin.modeling.model_parts import Place
 from drivetwin.modeling.part import Part
 from drivetwin.modeling.run import ModelRun
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
+from drivetwin.simulation.input_value import make_input
 from drivetwin.simulation.network import Output, Sine, Start, simulate
 from drivetwin.simulation.network_sensitivity import (
     NetworkSensitivities,
@@ -131,6 +136,56 @@ class Model(ElementMethods):
             speeds if record is None else list(record),
             unknowns,
             accuracy=accuracy,
+        )
+
+    def fit(
+        self,
+        recordings: Recording | Sequence[Recording],
+        unknowns: Mapping[str, Unknown],
+        outputs: Mapping[str, Output],
+        *,
+        seed: int = 0,
+    ) -> ModelFit:
+        """Identify numbers of the model from recordings.
+
+        Parameters
+        ----------
+        recordings
+            One or several; their channels take the place of the inputs of the model. Start speeds
+            and twists of the model are first guesses unless a recording states them.
+        unknowns
+            By path, such as `shaft.stiffness`, `B3.friction.mu_c`, `delay.torque`; or by any name
+            with the paths that share it.
+        outputs
+            Quantity that each measured output is, by its name in the recordings.
+        seed
+            Seed of the draws from which the search starts.
+
+        Returns
+        -------
+        ModelFit
+            Estimates with intervals and verdicts.
+
+        Raises
+        ------
+        InputError
+            With all faults of the model, the path of a wrong unknown, or the name of a channel.
+        IdentificationError
+            Where no start leads to a minimum.
+        """
+        several = [recordings] if isinstance(recordings, Recording) else list(recordings)
+        return fit_network(self.describe(unknowns, outputs), several, seed=seed)
+
+    def describe(
+        self, unknowns: Mapping[str, Unknown], outputs: Mapping[str, Output]
+    ) -> NetworkModel:
+        """Return the network with its unknowns and compared quantities as a model file has it.
+
+        Raises InputError with all faults of the model.
+        """
+        elements = [part.element for part in self.parts]
+        return NetworkModel(
+            self.name, elements, self.inputs, self._resolve_start(), outputs, unknowns
         )
 
     def list_outputs(self) -> list[Output]:

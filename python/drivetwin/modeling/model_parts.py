@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
-from drivetwin.modeling.inputs import InputValue
 from drivetwin.modeling.part import Node, Part, Port
 from drivetwin.simulation.element_schema import (
     ELEMENT_FIELDS,
@@ -18,6 +17,7 @@ from drivetwin.simulation.element_schema import (
     list_ports,
     refuse_faults,
 )
+from drivetwin.simulation.input_value import InputValue
 from drivetwin.simulation.network import Element, build_element
 
 Place = Node | Port | Part | str

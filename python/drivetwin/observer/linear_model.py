@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.estimation.likelihood.noise.linear_response import (
+from drivetwin.estimation.likelihood.noise.shift_response import (
     build_output_row,
     build_slip_row,
     compute_exponentials,

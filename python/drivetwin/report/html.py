@@ -62,7 +62,7 @@ def build_report_sections(found: Identification, log: ShiftLog) -> list[Section]
     stages = build_stage_sections(found)
     sections = [
         build_result_section(found),
-        build_findings_section(found),
+        build_findings_section(found.findings),
         build_validation_section(found.evidence.validation),
         build_shift_section(found, log),
         *(one for one in stages if not one.collapsed),

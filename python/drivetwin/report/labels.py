@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from drivetwin.channels.pressure_roles import get_command_element, get_pressure_element
 from drivetwin.channels.roles import get_quantity
+from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 
 
@@ -19,6 +20,16 @@ def get_parameter_name(parameter_id: str) -> str:
     """Name before symbol, e.g. `Efficiency η` or `Inertia at engine J′ (2)`."""
     name = get_parameter_spec(parameter_id).name
     return f"{name[0].upper()}{name[1:]} {get_parameter_label(parameter_id)}"
+
+
+def get_estimate_name(estimate: Estimate) -> str:
+    """Name of an estimate: that of its parameter, or its own where the table has none."""
+    return estimate.spec.name if estimate.spec else get_parameter_name(estimate.id)
+
+
+def get_estimate_label(estimate: Estimate) -> str:
+    """Symbol of an estimate: that of its parameter, or its own where the table has none."""
+    return estimate.spec.symbol if estimate.spec else get_parameter_label(estimate.id)
 
 
 def get_channel_label(role: str) -> str:

@@ -71,7 +71,7 @@ def _build_joint_sections(
 ) -> Iterator[Section]:
     """The sections of all logs in reading order; stages of single shifts are in their reports."""
     yield build_result_section(found)
-    yield build_findings_section(found)
+    yield build_findings_section(found.findings)
     yield build_joint_section(found, several)
     for share, log in zip(several.logs, logs, strict=True):
         own = {id(shift) for shift in share.shifts}  # a log that was not simulated has no runs

@@ -14,6 +14,7 @@ from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.agreement import compute_fit
 from drivetwin.estimation.result.estimate import FloatArray, SignalFit
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.findings import Code, Finding, report
@@ -172,20 +173,6 @@ def _simulate_shifts(twin: Twin, log: ShiftLog, found: Identification) -> Iterat
         notify_progress(count / len(found.shifts))
         model = twin.build_dual_clutch(shift, load=loads[count]) if loads else None
         yield simulate_shift(twin, log, shift, model)
-
-
-def compute_fit(measured: FloatArray, simulated: FloatArray, mean: FloatArray | float) -> SignalFit:
-    """Rmse and fit % = 100·(1 - ‖y - ŷ‖/‖y - mean‖) (THEORY section 4); arrays (n,), SI.
-
-    `mean` is that of the log, or of each sample's log (n,) where samples of several are pooled.
-    NaN where there are no samples; a constant measurement has no fit %.
-    """
-    if measured.size == 0:
-        return SignalFit(float("nan"), float("nan"))
-    miss = float(np.linalg.norm(measured - simulated))
-    spread = float(np.linalg.norm(measured - mean))
-    percent = 100.0 * (1.0 - miss / spread) if spread > 0.0 else float("nan")
-    return SignalFit(miss / float(np.sqrt(measured.size)), percent)
 
 
 def clip_phases(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[float, float]]:

@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from tests.estimation.likelihood.fixtures import bench, problem
 
 
@@ -27,7 +27,7 @@ class _Lost(Whitener):
         return found
 
 
-def _weighted_by(posed: LikelihoodObjective, place: int | None) -> LikelihoodObjective:
+def _weighted_by(posed: ShiftObjective, place: int | None) -> ShiftObjective:
     """The problem under that weighting; column 0 is the residual, then come the slopes."""
     parts = (
         replace(one, weighting=_Lost(one.weighting.variance, one.weighting.path, place))

@@ -12,7 +12,7 @@ from drivetwin.estimation.likelihood.effects.plant_refit import (
     build_plant_priors,
     extend_problem,
 )
-from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.likelihood.priors import BOUNDS, build_problem
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.variable import Variable
@@ -34,7 +34,7 @@ def test_output_inertia_is_sought_about_its_design_value() -> None:
 STEP = 1e-6
 
 
-def _posed(known: dict[str, PriorValue]) -> tuple[LikelihoodObjective, ParameterVector]:
+def _posed(known: dict[str, PriorValue]) -> tuple[ShiftObjective, ParameterVector]:
     made = bench()
     driveline = replace(made.driveline, known=known)
     loss_law = made.run.scenario.model.loss_law

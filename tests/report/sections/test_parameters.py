@@ -22,7 +22,7 @@ from tests.report.sample import identification, validation
 
 def rows_by_id(found: Identification | None = None) -> dict[str, list[Cell]]:
     found = found or identification()
-    rows = map(list, build_parameter_table(found).rows)
+    rows = map(list, build_parameter_table(found.estimates).rows)
     return dict(zip(found.estimates, rows, strict=True))
 
 
@@ -53,8 +53,8 @@ def test_parameter_that_cannot_be_told_shows_no_number() -> None:
 def test_missing_sensor_tolerances_are_said() -> None:
     found = identification()
     plain = {key: replace(one, std_systematic=None) for key, one in found.estimates.items()}
-    assert "no sensor tolerance" not in build_parameter_table(found).caption
-    assert "no sensor tolerance" in build_parameter_table(replace(found, estimates=plain)).caption
+    assert "no sensor tolerance" not in build_parameter_table(found.estimates).caption
+    assert "no sensor tolerance" in build_parameter_table(plain).caption
 
 
 def test_the_first_section_opens_with_verdict_plot_and_table() -> None:
@@ -116,7 +116,7 @@ def test_design_values_do_not_count_as_identified() -> None:
         **found.estimates,
         "J_out": replace(found.estimates["J_out"], verdict=Verdict.DESIGN),
     }
-    caption = build_parameter_table(replace(found, estimates=estimates)).caption
+    caption = build_parameter_table(estimates).caption
     assert "9 of 12 parameters are identified" in caption
     assert "1 taken from the vehicle card" in caption
 
@@ -127,7 +127,7 @@ def test_findings_are_listed_by_severity() -> None:
         report(Code.GEAR_POORLY_EXCITED, variation=1.0, gear="2"),
         report(Code.LIKELIHOOD_FAILED, why="no minimum"),
     )
-    blocks = build_findings_section(replace(identification(), findings=findings)).blocks
+    blocks = build_findings_section(findings).blocks
     told = [(one.heading, one.tone) for one in blocks if isinstance(one, NotesBlock)]
     assert told == [
         ("Errors", Tone.BAD),

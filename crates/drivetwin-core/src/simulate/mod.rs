@@ -11,6 +11,7 @@ mod linear;
 mod lockstep_recorder;
 mod output;
 mod output_buffer;
+mod response;
 mod run;
 mod sensitivity;
 mod sets;
@@ -24,6 +25,7 @@ pub use controlled_batch::{ControlledRuns, controlled_batch};
 pub use energy_balance::EnergyAudit;
 pub use linear::{Linear, Slipping, linearise};
 pub use output::Output;
+pub use response::{Response, respond};
 pub use run::{Plan, RunOptions, SimulateError, run, run_network};
 pub use sensitivity::{
     Differentiation, LANES, Scenario, Seed, Sensitivities, SensitivityError, Unknowns,

@@ -112,7 +112,11 @@ impl<T: Real> Plan<T> {
     }
 
     /// Refuse locked elements that the prescribed speeds contradict.
-    fn check_locks(&self, network: &Network<T>, start: &State<T>) -> Result<(), StartError> {
+    pub(super) fn check_locks(
+        &self,
+        network: &Network<T>,
+        start: &State<T>,
+    ) -> Result<(), StartError> {
         let first = |&(_, input): &(_, usize)| self.inputs.start_value(input);
         start.check_locks(network, &network.prescribed.iter().map(first).collect::<Vec<_>>())
     }
@@ -130,7 +134,7 @@ impl<T: Real> Plan<T> {
         Ok(if same { Cow::Borrowed(self) } else { Cow::Owned(other()) })
     }
 
-    fn integrator<'r>(
+    pub(super) fn integrator<'r>(
         &'r self,
         known: SolverCache<'r, T>,
         x: Vec<T>,
@@ -254,7 +258,7 @@ fn divided<T: Real>(network: &Network<T>, inputs: Inputs<T>) -> Inputs<T> {
 }
 
 /// The signals in the order in which the network numbers its inputs.
-fn join<T: Real>(
+pub(super) fn join<T: Real>(
     network: &Network<T>,
     signals: &[(&str, Signal<'_, T>)],
     span: (f64, f64),

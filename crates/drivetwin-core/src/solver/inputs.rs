@@ -19,6 +19,8 @@ pub struct Inputs<T> {
     lines: Vec<[f64; 2]>,
     /// Derivatives of the delays: numbers of value zero.
     shifts: Vec<T>,
+    /// Derivatives of the values by offsets: numbers of value zero; empty where none are asked for.
+    lifts: Vec<T>,
     sines: Vec<Option<Sine<T>>>,
     /// The sines without derivatives; empty where there are none.
     waves: Vec<Option<Wave>>,
@@ -116,7 +118,13 @@ impl<T: Real> Inputs<T> {
             Vec::new()
         };
         let extremes = extremes(&knots, &lines, shifts.len().max(1));
-        Self { knots, lines, shifts, sines, waves, equal, usual, extremes }
+        let lifts = Vec::new();
+        Self { knots, lines, shifts, lifts, sines, waves, equal, usual, extremes }
+    }
+
+    /// Add numbers of value zero, one per input, to the expansions.
+    pub fn lift(self, lifts: Vec<T>) -> Self {
+        Self { lifts, ..self }
     }
 
     /// Divide segments: one of length l [s] becomes `parts(l)`.
@@ -287,6 +295,9 @@ impl<T: Real> Inputs<T> {
                     series[0] = start + rate * elapsed;
                     series[1] = rate;
                 }
+            }
+            if let Some(&lift) = self.lifts.get(input) {
+                series[0] += lift;
             }
         }
     }

@@ -11,16 +11,15 @@
 use super::banded::BandedFactor;
 use super::simd::{Kernel, dispatch_simd};
 
-/// Number of states of an instant.
-pub const STATES: usize = 4;
-
 /// Samples with their view of the states.
 #[derive(Clone, Copy, Debug)]
 pub struct Whitening<'w> {
     /// Cholesky factor of P⁻¹ + Hᵀ R⁻¹ H.
     pub factor: BandedFactor<'w>,
-    /// Row of each sample over the states of its instant.
-    pub rows: &'w [[f64; STATES]],
+    /// Number of states of an instant.
+    pub states: usize,
+    /// Row of each sample over the states of its instant, samples × states.
+    pub rows: &'w [f64],
     /// First of these states.
     pub first: &'w [u32],
     /// Variance of each sample's own noise.
@@ -34,8 +33,9 @@ impl Whitening<'_> {
     ///
     /// If the lengths do not agree or a sample sees a state that is not there.
     pub fn apply(self, columns: &[f64], count: usize) -> Vec<f64> {
-        let samples = self.rows.len();
-        assert!(self.first.len() == samples && self.variance.len() == samples, "a row each");
+        let samples = self.first.len();
+        assert_eq!(self.rows.len(), samples * self.states, "a row each");
+        assert_eq!(self.variance.len(), samples, "a variance each");
         assert_eq!(columns.len(), samples * count, "an entry for each sample and column");
         let mut states = vec![0.0; self.factor.size * count];
         dispatch_simd(Gather { whitening: self, columns, states: &mut states, count });
@@ -49,7 +49,8 @@ impl Whitening<'_> {
     #[inline(always)]
     fn sample(&self, i: usize, count: usize) -> impl Iterator<Item = (f64, usize)> {
         let start = self.first[i] as usize;
-        let seen = self.rows[i].into_iter().enumerate().filter(|(_, weight)| *weight != 0.0);
+        let row = self.rows[i * self.states..][..self.states].iter().copied();
+        let seen = row.enumerate().filter(|(_, weight)| *weight != 0.0);
         seen.map(move |(state, weight)| (weight, (start + state) * count))
     }
 }

@@ -22,8 +22,8 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_pressure
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import Signal
@@ -96,7 +96,7 @@ def bootstrap(found: Identification, count: int, seed: int) -> Bootstrap:
     )
 
 
-def _draw_problem(base: LikelihoodFit, rng: np.random.Generator) -> LikelihoodObjective:
+def _draw_problem(base: LikelihoodFit, rng: np.random.Generator) -> ShiftObjective:
     """Draw the problem of a synthetic log, with new noise and new priors."""
     parts = tuple(_draw_part(part, base, rng) for part in base.problem.parts)
     problem = base.problem

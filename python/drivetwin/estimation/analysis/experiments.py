@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import RECORD, Output, ShiftRecord
-from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.data.output import Output
+from drivetwin.estimation.likelihood.data.shift_record import RECORD, ShiftRecord
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.suggestion import FIRMER, SOFTER, TORQUE_LEVEL, Experiment
 from drivetwin.simulation.dual_clutch import Signal

@@ -28,7 +28,7 @@ from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
-from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
 from drivetwin.estimation.optimize.gauss_newton import minimise, solve_step
 

@@ -25,10 +25,10 @@ from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord, build
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.parametrization import LAW, ShiftModel
 from drivetwin.estimation.likelihood.priors import split_spans
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
@@ -140,7 +140,7 @@ def _build_problem(
     base: LikelihoodFit,
     signals: Sequence[ShiftSignals],
     tables: Mapping[str, KnotTable],
-) -> tuple[LikelihoodObjective, ParameterVector]:
+) -> tuple[ShiftObjective, ParameterVector]:
     """Build the problem with knots in place of laws, and its initial point."""
     laws = {f"{name}.{key}" for name in tables for key in LAW}
     kept = [k for k, name in enumerate(base.point.names) if name not in laws]
@@ -164,7 +164,7 @@ def _build_problem(
     mean, precision = np.zeros(size), np.zeros((size, size))
     mean[: len(kept)] = base.problem.prior.mean[kept]
     precision[: len(kept), : len(kept)] = base.problem.prior.precision[np.ix_(kept, kept)]
-    return LikelihoodObjective(parts, Prior(mean, precision), lower, upper), point
+    return ShiftObjective(parts, Prior(mean, precision), lower, upper), point
 
 
 def _get_law(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.budget import REMEDY
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_variance_inflation
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
     compute_parameters,
@@ -85,6 +88,49 @@ def compute_profile(found: Identification, parameter: str) -> Profile:
             f"{parameter} is fixed by design",
             "give it a standard deviation on the vehicle card, or choose another",
         )
+    return trace_profile(held)
+
+
+class HeldParameter(Protocol):
+    """Parameter of a minimum that is to be held at other values."""
+
+    @property
+    def parameter(self) -> str:
+        """Its name."""
+
+    @property
+    def problem(self) -> LikelihoodObjective[Any]:
+        """Objective with the weighting at the minimum."""
+
+    @property
+    def point(self) -> ParameterVector:
+        """Minimum."""
+
+    @property
+    def cost(self) -> float:
+        """Q at the minimum."""
+
+    @property
+    def estimate(self) -> float:
+        """Value at the minimum."""
+
+    @property
+    def std(self) -> float:
+        """Standard deviation by the covariance."""
+
+    @property
+    def unit(self) -> float:
+        """Rise of Q that counts as one."""
+
+    def compute_value(self, point: ParameterVector) -> float:
+        """Compute the parameter at `point`."""
+
+    def compute_gradient(self, point: ParameterVector) -> FloatArray:
+        """Compute its derivative (p,) by the unknowns."""
+
+
+def trace_profile(held: HeldParameter) -> Profile:
+    """Compute the profile of a parameter by minimising over all others while it is held."""
     notify_progress(0.0)
     below = _trace_side(held, -1.0)
     notify_progress(0.5)
@@ -95,7 +141,7 @@ def compute_profile(found: Identification, parameter: str) -> Profile:
     ends = (_find_crossing(values[::-1], rise[::-1]), _find_crossing(values, rise))
     half = Z95 * held.std
     linear = (held.estimate - half, held.estimate + half)
-    return Profile(parameter, values, rise, held.estimate, ends, linear)
+    return Profile(held.parameter, values, rise, held.estimate, ends, linear)
 
 
 def get_likelihood_fit(found: Identification) -> tuple[LikelihoodFit, Sequence[ShiftSignals]]:
@@ -126,6 +172,21 @@ class _FixedParameter:
     place: int
     parameter: str
 
+    @property
+    def problem(self) -> ShiftObjective:
+        """Objective with the weighting at the minimum."""
+        return self.fit.problem
+
+    @property
+    def point(self) -> ParameterVector:
+        """Minimum."""
+        return self.fit.point
+
+    @property
+    def cost(self) -> float:
+        """Q at the minimum."""
+        return self.fit.normal.cost
+
     def compute_value(self, point: ParameterVector) -> float:
         """Compute the parameter at `point`."""
         return list(compute_parameters(self.fit.problem, point, self.signals).values())[self.place]
@@ -153,11 +214,10 @@ class _FixedParameter:
         return compute_variance_inflation(self.fit, self.compute_gradient(self.fit.point)[None, :])
 
 
-def _trace_side(held: _FixedParameter, sign: float) -> list[tuple[float, float]]:
+def _trace_side(held: HeldParameter, sign: float) -> list[tuple[float, float]]:
     """Compute (distance in standard deviations, rise of Q) from the minimum outwards."""
-    fit = held.fit
-    lowest, unit = fit.normal.cost, held.unit
-    estimate, std, point = held.estimate, held.std, fit.point
+    lowest, unit = held.cost, held.unit
+    estimate, std, point = held.estimate, held.std, held.point
     found: list[tuple[float, float]] = []
     distance = 0.0
     while distance < PROFILE.max_reach and (
@@ -174,14 +234,14 @@ def _trace_side(held: _FixedParameter, sign: float) -> list[tuple[float, float]]
 
 
 def _minimise_at(
-    held: _FixedParameter, start: ParameterVector, value: float
+    held: HeldParameter, start: ParameterVector, value: float
 ) -> tuple[ParameterVector, float] | None:
     """Minimise Q with the parameter fixed at `value`; None if the simulation fails.
 
     If the parameter is itself an unknown of the fit, the damped search goes on from the constrained
     one, which may stop early at a kink of Q.
     """
-    problem = held.fit.problem
+    problem = held.problem
     reached = minimise_constrained(
         problem,
         start,
@@ -189,9 +249,9 @@ def _minimise_at(
         held.compute_gradient,
         PROFILE.tolerance * held.std,
     )
-    if reached is None or held.parameter not in held.fit.point.names:
+    if reached is None or held.parameter not in held.point.names:
         return reached
-    place = held.fit.point.names.index(held.parameter)
+    place = held.point.names.index(held.parameter)
     prior = problem.prior.fix_parameter(place, value)
     found = minimise(replace(problem, prior=prior), reached[0])
     if found is None:

@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import Output
+from drivetwin.estimation.likelihood.data.output import Output
 from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective, Term
 from drivetwin.estimation.optimize.objective import NormalEquations
 
 
@@ -39,9 +40,7 @@ _PROBED: WeakKeyDictionary[Whitener, dict[str, tuple[float, float]]] = WeakKeyDi
 """Result of the probes by weighting and name of the output: they do not depend on the residual."""
 
 
-def split_whitened(
-    part: ShiftTerm, residual: FloatArray
-) -> Iterator[tuple[Output, slice, FloatArray]]:
+def split_whitened(part: Term, residual: FloatArray) -> Iterator[tuple[Output, slice, FloatArray]]:
     """Each output of a part, its rows among the samples (n,), and there the `residual` (n,) over
     the sensor's noise, input noise taken out. Of a right model that is white, of variance 1, or
     less at frequencies at which input noise explains a part of it.
@@ -68,7 +67,7 @@ def _block(time: FloatArray) -> int:
 
 
 def compute_long_run_excess(
-    problem: LikelihoodObjective, normal: NormalEquations, counted: float
+    problem: LikelihoodObjective[Any], normal: NormalEquations, counted: float
 ) -> FloatArray:
     """Variance (p, p) of the gradient of Q/2 that slow errors of the outputs add to that of noise.
 
@@ -86,7 +85,7 @@ def compute_long_run_excess(
     return found
 
 
-def compute_slow_power(part: ShiftTerm, out: Output, rows: slice, white: FloatArray) -> float:
+def compute_slow_power(part: Term, out: Output, rows: slice, white: FloatArray) -> float:
     """Power of a sensor's noise where the driveline is slow, over that stated; 1 where the block
     means of its residual `white` (n,) may as well be those of white noise.
 
@@ -107,7 +106,7 @@ def compute_slow_power(part: ShiftTerm, out: Output, rows: slice, white: FloatAr
     return 1.0 + (power - usual) / own
 
 
-def _by_probes(part: ShiftTerm, rows: slice, size: int) -> tuple[float, float]:
+def _by_probes(part: Term, rows: slice, size: int) -> tuple[float, float]:
     """Power of means over `size` samples that noise of inputs and sensors leaves of the output at
     `rows`, and how much of it is this sensor's."""
     count = (rows.stop - rows.start) // size

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.objective import NormalEquations
 
 
@@ -50,7 +50,7 @@ class ColumnProducts:
 
 
 def compute_column_products(
-    problem: LikelihoodObjective, normal: NormalEquations, columns: Sequence[FloatArray]
+    problem: ShiftObjective, normal: NormalEquations, columns: Sequence[FloatArray]
 ) -> ColumnProducts:
     """Form the products of `columns` (n, q) of each part at the point of the expansion `normal`."""
     size = columns[0].shape[1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import limit_evaluations
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.vehicle.effects import EffectId
 
@@ -40,7 +42,7 @@ class LikelihoodFit:
     part that the plant has beside the dual clutch; its unknowns come last, that of the size first.
     """
 
-    problem: LikelihoodObjective
+    problem: ShiftObjective
     point: ParameterVector
     mean: ParameterVector
     covariance: FloatArray
@@ -68,7 +70,7 @@ class LikelihoodFit:
 
 
 def compute_covariance(
-    problem: LikelihoodObjective, normal: NormalEquations, chi2: float
+    problem: LikelihoodObjective[Any], normal: NormalEquations, chi2: float
 ) -> FloatArray:
     """Compute the covariance (p, p) at a minimum, widened by residual power beyond sensor noise.
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Likelihood objective: residuals of all shifts, their weighting, the priors.
+"""Likelihood objective: residuals of all recordings, their weighting, the priors.
 
-    Q(θ) = Σ_shifts (y - ŷ(θ))ᵀ Σ⁻¹ (y - ŷ(θ)) + (θ - θ₀)ᵀ P₀⁻¹ (θ - θ₀)
+    Q(θ) = Σ_parts (y - ŷ(θ))ᵀ Σ⁻¹ (y - ŷ(θ)) + (θ - θ₀)ᵀ P₀⁻¹ (θ - θ₀)
 
 ŷ is the output of the core, its derivatives are the core's, exact through lock and break-away. Σ
 is held while θ moves.
@@ -16,32 +16,19 @@ errors_in_variables.py).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.errors import InputError, SimulationError
 from drivetwin.estimation.likelihood.budget import EXPANSION, RUN, WEIGHTING, charge
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
-from drivetwin.estimation.likelihood.noise.linear_response import (
-    LinearResponse,
-    build_output_row,
-    linearise_run,
-)
-from drivetwin.estimation.likelihood.noise.residual_covariance import (
-    Whitener,
-    add_input_noise,
-    build_sensor_whitener,
-)
-from drivetwin.estimation.likelihood.parametrization import TE_OFFSET, ShiftModel, retract
-from drivetwin.estimation.likelihood.plant_effect import PlantEffect
+from drivetwin.estimation.likelihood.data.output import Output
+from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.simulation.driveline_run import DrivelineTask
-from drivetwin.simulation.dual_clutch import Signal, Trajectory
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.simulation.dual_clutch import Signal
 
 
 @dataclass(frozen=True)
@@ -52,220 +39,73 @@ class ObjectiveSettings:
     """Residual from which a run counts as failed [standard deviations]."""
     square_rtol: float = 1e-6
     """Tolerance for a negative sum of squares, over the squares in it [ratio]."""
-    own_reach: float = 3.0
-    """Distance from their prior within which unknowns of a part are sought, in its standard
-    deviations: a share of an inertia stays between 0 and 1 [-]."""
 
 
 OBJECTIVE = ObjectiveSettings()
 
 
-@dataclass(frozen=True, eq=False)
-class ShiftTerm:
-    """One shift: its structure, what was recorded, and the weighting of its residuals.
-
-    `record` has the inputs that drive the run; `returned` (n,) is G·(u - û), what those held back
-    would do, 0 before the part is weighted by input noise.
-    """
-
-    structure: ShiftModel
-    record: ShiftRecord
-    weighting: Whitener
-    returned: FloatArray | float = 0.0
-
-    @classmethod
-    def from_sensor_noise(cls, structure: ShiftModel, record: ShiftRecord) -> ShiftTerm:
-        """Build a part whose residuals are weighted by the sensors' noise alone."""
-        return cls(structure, record, build_sensor_whitener(record))
+class Record(Protocol):
+    """Compared samples of a term."""
 
     @property
-    def scale_known(self) -> bool:
-        """True if an output torque is among the compared signals."""
-        return any(out.name == "output_torque" for out in self.record.outputs)
+    def time(self) -> FloatArray:
+        """Grid of the simulation [s]."""
 
-    def simulate(self, point: ParameterVector) -> Trajectory | None:
-        """Simulate the part at `point`; None if the simulation fails or does not reach the end."""
-        try:
-            found = self.simulate_on(point, self.record.time)
-        except (InputError, SimulationError):
-            return None
-        return found if self._is_complete(found) else None
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Compared signals, in the order in which residuals are stacked."""
 
-    def simulate_on(self, point: ParameterVector, time: FloatArray) -> Trajectory:
-        """Simulate the part on `time` (n,) [s]; a failed run returns its status.
+    @property
+    def size(self) -> int:
+        """Number of compared samples."""
 
-        Raises InputError or SimulationError for an impossible description.
-        """
-        return self._build_task(point, self.get_acting_torque(point), time).simulate()
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviation of each compared sample (n,)."""
 
-    def _build_task(
-        self, point: ParameterVector, torque: Signal, time: FloatArray
-    ) -> DrivelineTask:
-        model = self.structure.build_model(point)
-        return DrivelineTask(
-            model,
-            self.structure.build_parts(point, model),
-            torque,
-            self.get_pressures(),
-            self.structure.build_start(point),
-            time,
-        )
 
-    def drop_plant_effect(self) -> ShiftTerm:
-        """Return the part with the dual clutch alone as its plant."""
-        return replace(self, structure=replace(self.structure, plant_effect=None))
+class Term(Protocol):
+    """One recording: what was compared, its simulation, the weighting of its residuals."""
 
-    def _is_complete(self, run: Trajectory) -> bool:
-        """Return whether a run reached its end with residuals that can be squared."""
-        largest = OBJECTIVE.max_residual * self.record.sigma
-        is_small = np.abs(self.compute_residual(run)) < largest  # no quotient, which may overflow
-        return run.status == "completed" and bool(np.all(is_small))
+    @property
+    def record(self) -> Record:
+        """Compared samples."""
 
-    def compute_residual(self, run: Trajectory) -> FloatArray:
-        """Compute measured minus simulated (n,), the latter as for the measured inputs."""
-        return self.record.measured - self.record.sample_run(run) - self.returned
+    @property
+    def weighting(self) -> Whitener:
+        """Weighting of the residuals."""
+
+    @property
+    def label(self) -> str:
+        """Name of the recording among several."""
+
+    @property
+    def inputs(self) -> Mapping[str, Signal]:
+        """Measured inputs by the names of findings."""
+
+    def evaluate(self, point: ParameterVector) -> FloatArray | None:
+        """Compute the residual (n,) at `point`; None if the simulation fails."""
 
     def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
-        `point`."""
-        torque = self.get_acting_torque(point)
-        variables = self._build_task(point.to_variables(), torque, self.record.time)
-        changes = self._compute_torque_changes(point)
-        try:
-            run, derivatives = variables.differentiate(len(point.names))
-        except InputError:
-            return None
-        if not self._is_complete(run):
-            return None
-        slopes = self.record.sample_derivatives(derivatives)
-        response = self.compute_response(point, run)
-        for name, disturbance in changes.items():
-            answer = self.observe(point, response.propagate_inputs({TORQUE: disturbance}))
-            slopes[:, point.names.index(name)] = answer
-        if not np.all(np.isfinite(slopes)):
-            return None
-        return self.compute_residual(run), slopes
+        `point`; None if the simulation fails."""
 
-    def _compute_torque_changes(self, point: ParameterVector) -> dict[str, FloatArray]:
-        """Compute the change (N-1,) of the acting engine torque per unit of its own unknowns.
+    def update_weighting(self, point: ParameterVector) -> Self:
+        """Form the covariance of output and input noise at `point`."""
 
-        The rate is that of the torque without noise: jitter has no age, and would seem to show one.
-        """
-        found = {}
-        age, offset = self.structure.get_unknown("te_delay"), self.structure.get_unknown(TE_OFFSET)
-        if age in point.names:
-            found[age] = self.record.compute_torque_rate(point[age])
-        if offset in point.names:
-            found[offset] = np.full(self.record.time.size - 1, -1.0)
-        return found
-
-    def compute_response(self, point: ParameterVector, run: Trajectory) -> LinearResponse:
-        """Compute the linear response to disturbances of the inputs around `run`."""
-        return linearise_run(self.structure.build_model(point), run, self.record)
-
-    def respond_to_inputs(
-        self, point: ParameterVector, run: Trajectory, disturbance: dict[str, FloatArray]
-    ) -> FloatArray:
-        """Compute the change (n,) of the simulated samples by disturbances (N-1,) of inputs, by
-        name."""
-        return self.observe(point, self.compute_response(point, run).propagate_inputs(disturbance))
-
-    def respond_to_forces(
-        self, point: ParameterVector, run: Trajectory, force: FloatArray
-    ) -> FloatArray:
-        """Compute the change (n,) of the simulated samples by torques (N-1, 4) on the speeds of
-        engine, output and wheel."""
-        return self.observe(point, self.compute_response(point, run).propagate_forces(force))
-
-    def observe(self, point: ParameterVector, z: FloatArray) -> FloatArray:
-        """Project disturbances z (N, 4) of the state onto the compared samples (n,)."""
-        model = self.structure.build_model(point)
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.concatenate(
-                [z[out.centre] @ build_output_row(model, out.name) for out in self.record.outputs]
-            )
-
-    def update_weighting(self, point: ParameterVector) -> ShiftTerm:
-        """Form the covariance of output and input noise at `point`.
-
-        Returns the part unchanged if the simulation fails there or has no finite response.
-        """
-        return self._update_weighting(point) or self
-
-    def update_inputs(self, point: ParameterVector) -> ShiftTerm:
+    def update_inputs(self, point: ParameterVector) -> Self:
         """Subtract the expected input noise at `point` from the inputs, and form the weighting
-        there.
+        there."""
 
-        Returns the part unchanged if the simulation fails with the new inputs.
-        """
-        run = self.simulate(point)
-        noise = (
-            {} if run is None else self.weighting.estimate_input_noise(self.compute_residual(run))
-        )
-        if not noise:
-            return self
-        age = self.structure.get_value(point, "te_delay")
-        return (
-            replace(self, record=self.record.subtract_noise(noise, age))._update_weighting(point)
-            or self
-        )
 
-    def _update_weighting(self, point: ParameterVector) -> ShiftTerm | None:
-        """Form weighting and the effect of the held-back inputs at `point`; None if no run."""
-        run = self.simulate(point)
-        if run is None:
-            return None
-        model = self.structure.build_model(point)
-        response = linearise_run(model, run, self.record)
-        if not response.finite:
-            return None
-        try:
-            weighting = add_input_noise(model, self.record, response)
-        except np.linalg.LinAlgError:
-            return None
-        held_back = self.record.interpolate_held_back(self.structure.get_value(point, "te_delay"))
-        returned = self.observe(point, response.propagate_inputs(held_back))
-        return replace(self, weighting=weighting, returned=returned)
-
-    def add_to_inputs(self, point: ParameterVector, changes: Mapping[str, Signal]) -> ShiftTerm:
-        """Return the part driven by inputs with `changes` by name, at the instants at which they
-        act at `point`."""
-        record, age = self.record, self.structure.get_value(point, "te_delay")
-        torque, pressures = record.engine_torque, dict(record.pressures)
-        for name, change in changes.items():
-            old = torque if name == TORQUE else pressures[name]
-            acts = old.time - age if name == TORQUE else old.time
-            values = old.values + np.interp(acts, change.time, change.values)
-            new = replace(old, values=values)
-            if name == TORQUE:
-                torque = new
-            else:
-                pressures[name] = new
-        return replace(self, record=replace(record, engine_torque=torque, pressures=pressures))
-
-    def get_pressures(self) -> dict[str, Signal]:
-        """Return the pressures of all elements of the model; zero for those that stay open."""
-        ends = self.record.time[[0, -1]]
-        idle = {one.name: Signal(ends, np.zeros(2)) for one in self.structure.spinning}
-        return {**self.record.pressures, **idle}
-
-    def get_acting_torque(self, point: ParameterVector) -> Signal:
-        """Return the engine torque as it acts: measured, less its mean error, advanced by its
-        delay."""
-        signal = self.record.engine_torque
-        values = signal.values
-        offset = self.structure.get_unknown(TE_OFFSET)
-        if offset in point.names:
-            values = values - point[offset]
-        delay = self.structure.get_value(point, "te_delay")
-        return Signal(signal.time, values, -delay)
+T = TypeVar("T", bound=Term)
 
 
 @dataclass(frozen=True, eq=False)
-class LikelihoodObjective:
+class LikelihoodObjective(Generic[T]):
     """Likelihood of all parts, with prior and bounds `lower`, `upper` (p,) of their unknowns."""
 
-    parts: tuple[ShiftTerm, ...]
+    parts: tuple[T, ...]
     prior: Prior
     lower: FloatArray
     upper: FloatArray
@@ -280,59 +120,12 @@ class LikelihoodObjective:
         """log|Σ| of the weighting of all parts."""
         return sum(part.weighting.log_determinant for part in self.parts)
 
-    @property
-    def kinds(self) -> frozenset[str]:
-        """Names of the signals that are of another kind than read, as in `Record.kinds`."""
-        return frozenset[str]().union(*(part.record.kinds for part in self.parts))
-
-    def extend(self, effect: PlantEffect, priors: Sequence[PriorValue]) -> LikelihoodObjective:
-        """Add an effect to the plant of all shifts, with the `priors` of its unknowns.
-
-        These come last. They stay within some standard deviations of their prior.
-        """
-        structures = [replace(part.structure, plant_effect=effect) for part in self.parts]
-        parts = [
-            replace(part, structure=one) for part, one in zip(self.parts, structures, strict=True)
-        ]
-        prior = self.prior
-        for one in priors:
-            prior = prior.append(one.value, one.std)
-        reach = [OBJECTIVE.own_reach * one.std for one in priors]
-        own = [one.value for one in priors]
-        lower = np.append(self.lower, np.subtract(own, reach))
-        upper = np.append(self.upper, np.add(own, reach))
-        return LikelihoodObjective(tuple(parts), prior, lower, upper)
-
-    def drop_plant_effect(self) -> LikelihoodObjective:
-        """Return the problem of the dual clutch alone, without the unknowns of the part."""
-        effect = self.parts[0].structure.plant_effect
-        count = self.lower.size - (0 if effect is None else len(effect.unknowns))
-        prior = Prior(self.prior.mean[:count], self.prior.precision[:count, :count])
-        parts = tuple(part.drop_plant_effect() for part in self.parts)
-        return LikelihoodObjective(parts, prior, self.lower[:count], self.upper[:count])
-
-    def select_modes(self, names: Collection[str]) -> LikelihoodObjective:
-        """Set the sampling modes of all signals to those of `names`; all must be as read."""
-        parts = [
-            ShiftTerm.from_sensor_noise(p.structure, p.record.select_modes(names))
-            for p in self.parts
-        ]
-        return replace(self, parts=tuple(parts))
-
-    def cut(self, ends: Sequence[float]) -> LikelihoodObjective:
-        """Cut each part at its end [s]; weighted by sensor noise."""
-        cut = [
-            ShiftTerm.from_sensor_noise(part.structure, part.record.cut(end))
-            for part, end in zip(self.parts, ends, strict=True)
-        ]
-        return replace(self, parts=tuple(cut))
-
-    def update_weighting(self, point: ParameterVector) -> LikelihoodObjective:
+    def update_weighting(self, point: ParameterVector) -> Self:
         """Form the covariance with input noise at `point`."""
         charge(WEIGHTING)
         return replace(self, parts=tuple(part.update_weighting(point) for part in self.parts))
 
-    def update_inputs(self, point: ParameterVector) -> LikelihoodObjective:
+    def update_inputs(self, point: ParameterVector) -> Self:
         """Drive the problem by the expected inputs at `point`, weighted there."""
         return replace(self, parts=tuple(part.update_inputs(point) for part in self.parts))
 
@@ -341,10 +134,9 @@ class LikelihoodObjective:
         charge(RUN)
         total = self.prior.compute_prior_cost(point.values)
         for part in self.parts:
-            run = part.simulate(point)
-            if run is None:
+            residual = part.evaluate(point)
+            if residual is None:
                 return float("inf")
-            residual = part.compute_residual(run)
             with np.errstate(over="ignore", invalid="ignore"):
                 square = float(residual @ part.weighting.apply_inverse(residual))
             if not _is_square(square):
@@ -353,8 +145,25 @@ class LikelihoodObjective:
         return total
 
     def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
-        """Compute the values (p,) after a `step` (p,); friction laws move along their valley."""
-        return retract(point, step)
+        """Compute the values (p,) after a `step` (p,)."""
+        return np.asarray(point.values + step)
+
+    def compute_curvature(
+        self, point: ParameterVector, normal: NormalEquations, step: FloatArray, share: float
+    ) -> FloatArray | None:
+        """Compute Jᵀ Σ⁻¹ y'' (p,) of the simulated samples y along a `step` (p,), from those after
+        a `share` of it; None if a simulation fails."""
+        charge(RUN)
+        near = point.replace_values(point.values + share * step)
+        total = np.zeros(step.size)
+        parts = zip(self.parts, normal.residuals, normal.slopes, normal.regressors, strict=True)
+        for part, residual, slopes, regressors in parts:
+            there = part.evaluate(near)
+            if there is None:
+                return None
+            bend = (residual - there) / share - slopes @ step
+            total += regressors.T @ (2.0 / share * bend)
+        return total
 
     def normal(self, point: ParameterVector) -> NormalEquations | None:
         """Compute the expansion of Q at `point`; None if a simulation fails."""

@@ -27,7 +27,6 @@ from drivetwin.estimation.data.shift_data import (
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.data.shift_record import RECORD, build_record
 from drivetwin.estimation.likelihood.data.slipping_elements import find_all_slipping_elements
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
     LAW,
@@ -38,6 +37,7 @@ from drivetwin.estimation.likelihood.parametrization import (
     Tie,
     map_log_names,
 )
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.linear.friction_points import LAW_PRIOR
 from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE, compute_mean_speed
 from drivetwin.estimation.linear.momentum_balance import DELAY
@@ -86,7 +86,7 @@ def build_problem(
     loss_law: LossLaw,
     guess: Mapping[str, float],
     hilly: bool = False,
-) -> tuple[LikelihoodObjective, ParameterVector]:
+) -> tuple[ShiftObjective, ParameterVector]:
     """Build the fit of all shifts of one or several logs, and its initial point.
 
     `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
@@ -153,7 +153,7 @@ def build_problem(
     prior = Prior.from_independent(len(point.names), entries)
     sums = list_sum_priors(inertias, drivelines[0].J1, guess["eta"])
     prior = add_sum_priors(prior, point, fixed, sums)
-    return LikelihoodObjective(tuple(parts), prior, lower, upper), point
+    return ShiftObjective(tuple(parts), prior, lower, upper), point
 
 
 def _expand_logs(names: Sequence[str], logs: Sequence[int]) -> list[str]:

@@ -23,11 +23,11 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftData
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW
 from drivetwin.estimation.likelihood.optimize.staged_start import STAGED_START
 from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, START, map_log_names
 from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
@@ -135,7 +135,7 @@ def _collect_values(fit: LikelihoodFit, drivelines: Sequence[KnownDriveline]) ->
 
 
 def _find_new_unknowns(
-    fit: LikelihoodFit, problem: LikelihoodObjective, point: ParameterVector
+    fit: LikelihoodFit, problem: ShiftObjective, point: ParameterVector
 ) -> list[int]:
     """Return the indices of the unknowns that belong to the log or the run and are not in the
     fit."""
@@ -157,7 +157,7 @@ class _GearFit:
 
 
 def _fit_gear_before(
-    problem: LikelihoodObjective, point: ParameterVector, unseen: list[int], ends: Sequence[float]
+    problem: ShiftObjective, point: ParameterVector, unseen: list[int], ends: Sequence[float]
 ) -> _GearFit:
     """Fit the new unknowns to the stretches before the shifts, all others fixed."""
     known = [k for k in range(len(point.names)) if k not in unseen]
@@ -181,7 +181,7 @@ def _fit_gear_before(
 
 
 def _compute_root(
-    fit: LikelihoodFit, problem: LikelihoodObjective, before: _GearFit, unseen: list[int]
+    fit: LikelihoodFit, problem: ShiftObjective, before: _GearFit, unseen: list[int]
 ) -> FloatArray:
     """Compute a root (p, d) of the covariance of all unknowns of the held-out shifts."""
     names = before.point.names

@@ -55,6 +55,9 @@ class GaussNewtonSettings:
     screening_iter: int = 8
     """Iterations after which a search with Q above its limit ends: searches that start far off and
     succeed have converged by then [-]."""
+    bend_ratio: float = 0.0
+    """Ratio of actual to predicted decrease below which a step is bent along the valley; 0 for
+    never [-]."""
     min_refreshes: int = 3
     """Smallest number of points at which the weighting is formed anew [-]."""
     patience: int = 3
@@ -95,6 +98,10 @@ class ConstrainedSettings:
 GAUSS_NEWTON = GaussNewtonSettings()
 LINE_SEARCH = LineSearchSettings()
 CONSTRAINED = ConstrainedSettings()
+_PROBE = 0.1
+"""Share of a step after which the curvature of the model is measured [ratio]."""
+_MAX_BEND = 0.75
+"""Largest geodesic acceleration over the step that it bends [ratio]."""
 _USUAL_ITERATIONS = 10
 """Iterations of a search from a rough start; only the progress shown depends on them."""
 
@@ -186,7 +193,7 @@ def minimise(
         problem, point, normal = weighting.form(problem, point)
         if normal is None:
             return None
-        expected = _predict_decrease(problem, point, normal.information, normal.gradient)
+        expected = predict_decrease(problem, point, normal.information, normal.gradient)
         first = first or expected
         notify_progress(_estimate_progress(first, expected, settings.ftol, iteration))
         is_local = expected < settings.local_decrease
@@ -294,13 +301,50 @@ def _take_damped_step(
     """Raise the damping until Q decreases: the point, the decrease and the next damping."""
     while damping < settings.max_damping:
         step = _solve_bounded(problem, point, normal.information, normal.gradient, damping)
-        values = problem.retract(point, step)
-        trial = point.replace_values(np.clip(values, problem.lower, problem.upper))
-        fall = normal.cost - problem.cost(trial)
+        trial, fall = _try_step(problem, point, normal, step)
+        if settings.bend_ratio > 0.0:
+            expected = -float(2.0 * step @ normal.gradient + step @ normal.information @ step)
+            if fall < settings.bend_ratio * expected:
+                bent = _bend_step(problem, point, normal, step, damping)
+                if bent is not None:
+                    other, lower = _try_step(problem, point, normal, bent)
+                    if lower > fall:
+                        trial, fall = other, lower
         if fall > 0.0:
             return trial, fall, damping / 10.0
         damping *= 10.0
     return None, 0.0, damping
+
+
+def _try_step(
+    problem: Objective, point: ParameterVector, normal: NormalEquations, step: FloatArray
+) -> tuple[ParameterVector, float]:
+    """Compute the point after a step (p,), and the decrease of Q there."""
+    values = problem.retract(point, step)
+    trial = point.replace_values(np.clip(values, problem.lower, problem.upper))
+    return trial, normal.cost - problem.cost(trial)
+
+
+def _bend_step(
+    problem: Objective,
+    point: ParameterVector,
+    normal: NormalEquations,
+    step: FloatArray,
+    damping: float,
+) -> FloatArray | None:
+    """Bend a step (p,) along a curved valley of Q: add its geodesic acceleration.
+
+    None where the model cannot be evaluated on the way, or bends by more than the step is long
+    (Transtrum and Sethna 2012).
+    """
+    curvature = problem.compute_curvature(point, normal, step, _PROBE)
+    if curvature is None:
+        return None
+    bend = 0.5 * solve_step(normal.information, curvature, damping)
+    scale = _compute_scale(normal.information)
+    if np.linalg.norm(scale * bend) > _MAX_BEND * np.linalg.norm(scale * step):
+        return None
+    return np.asarray(step + bend)
 
 
 def _take_bundle_step(
@@ -317,7 +361,7 @@ def _take_bundle_step(
     pieces = [_Subgradient(normal.gradient, 0.0)]
     while True:
         gradient, below = _combine_subgradients(pieces, normal.information)
-        expected = _predict_decrease(problem, point, normal.information, gradient) + below
+        expected = predict_decrease(problem, point, normal.information, gradient) + below
         if expected < settings.ftol or len(pieces) == settings.max_subgradients:
             return None, 0.0, expected
         step = _solve_bounded(problem, point, normal.information, gradient, 0.0)
@@ -422,7 +466,7 @@ def _solve_bounded(
     return np.asarray(np.clip(result.x / scale, *room))
 
 
-def _predict_decrease(
+def predict_decrease(
     problem: Objective, point: ParameterVector, information: FloatArray, gradient: FloatArray
 ) -> float:
     """Predict the decrease of Q by a full step within the bounds."""

@@ -82,3 +82,10 @@ class Objective(Protocol):
 
     def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
         """Compute the values (p,) after a `step` (p,) along the parameter manifold."""
+
+    def compute_curvature(
+        self, point: ParameterVector, normal: NormalEquations, step: FloatArray, share: float
+    ) -> FloatArray | None:
+        """Compute the weighted second derivative of the residuals along a `step` (p,) by the
+        unknowns, Jᵀ Σ⁻¹ r'' (p,), from the residuals after a `share` of it; None where the model
+        cannot be evaluated there."""

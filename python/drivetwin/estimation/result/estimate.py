@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.parameters import get_parameter_spec
+from drivetwin.parameters import ParameterSpec, get_parameter_spec
 from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
 from drivetwin.vehicle.spec import Z95 as Z95  # the place where results look it up
 from drivetwin.vehicle.spec import PriorValue
@@ -37,7 +37,8 @@ class Estimate:
     `std_noise` comes from the sensors' noise; `std_systematic` from the card's tolerances of gain,
     offset and delay, from delayed values in the log, and from effects that the model leaves out.
     `value` is None exactly when the verdict is `not identifiable`. `reason` contains the cause of
-    a verdict other than `identified`, and the recording that would help.
+    a verdict other than `identified`, and the recording that would help. `spec` declares a quantity
+    that is not in the parameter table.
     """
 
     id: str
@@ -47,11 +48,12 @@ class Estimate:
     method: str
     std_systematic: float | None = None
     reason: str = ""
+    spec: ParameterSpec | None = None
 
     @property
     def unit(self) -> str:
-        """SI unit from the parameter table."""
-        return get_parameter_spec(self.id).unit
+        """SI unit from its declaration."""
+        return (self.spec or get_parameter_spec(self.id)).unit
 
     @property
     def std_total(self) -> float | None:

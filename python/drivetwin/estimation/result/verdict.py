@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.findings import Code, Finding, Number, Severity, explain
-from drivetwin.parameters import get_parameter_spec
+from drivetwin.parameters import ParameterSpec, get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue
 
 
@@ -62,9 +62,16 @@ _EXPERIMENT = {
 }
 
 
-def get_experiment(parameter_id: str) -> str:
-    """Return the experiment that would narrow the interval of a parameter."""
-    return _EXPERIMENT[get_parameter_spec(parameter_id).stem]
+_ANY_EXPERIMENT = "Record a manoeuvre that it changes more, or state its prior."
+"""Experiment for a quantity that is not in the parameter table."""
+
+
+def get_experiment(parameter_id: str, declared: ParameterSpec | None = None) -> str:
+    """Return the experiment that would narrow the interval of a parameter.
+
+    Of one `declared` outside of the parameter table it is any that excites it.
+    """
+    return _ANY_EXPERIMENT if declared else _EXPERIMENT[get_parameter_spec(parameter_id).stem]
 
 
 def is_sensor_limited(std_noise: float, std_systematic: float | None) -> bool:
@@ -76,11 +83,16 @@ def is_sensor_limited(std_noise: float, std_systematic: float | None) -> bool:
     return systematic > VERDICT.sensor_share * float(np.hypot(std_noise, systematic))
 
 
-def get_advice(parameter_id: str, std_noise: float, std_systematic: float | None) -> str:
+def get_advice(
+    parameter_id: str,
+    std_noise: float,
+    std_systematic: float | None,
+    declared: ParameterSpec | None = None,
+) -> str:
     """Return advice on narrowing an interval: an experiment or better sensors."""
     if is_sensor_limited(std_noise, std_systematic):
         return explain(Code.SENSOR_LIMITED)
-    return get_experiment(parameter_id)
+    return get_experiment(parameter_id, declared)
 
 
 def assess(
@@ -90,31 +102,36 @@ def assess(
     method: str,
     std_systematic: float | None = None,
     note: str = "",
+    spec: ParameterSpec | None = None,
 ) -> Estimate:
     """Estimate with its verdict from the width of the total 95 % interval.
 
     Up to `weak_above` of the value: identified; up to the value itself: weak; wider, or a value
     outside the parameter's bounds: not identifiable, and no value is given. Delays are judged by
-    absolute width, since zero is a sound value for them.
+    absolute width, since zero is a sound value for them. `spec` declares a quantity that is not in
+    the parameter table.
     """
-    spec = get_parameter_spec(parameter_id)
+    declared, spec = spec, spec or get_parameter_spec(parameter_id)
     half = Z95 * float(np.hypot(std_noise, std_systematic or 0.0))
     if spec.unit == "s":
         width, limit, end = half, VERDICT.delay_identified, 4.0 * VERDICT.delay_identified
     else:
         width, limit, end = half / max(abs(value), 1e-300), spec.weak_above, 1.0
     inside = spec.lower <= value <= spec.upper
-    advice = get_advice(parameter_id, std_noise, std_systematic)
+    advice = get_advice(parameter_id, std_noise, std_systematic, declared)
     if not np.isfinite(width) or width > end or not inside:
         shown = Number(value, spec.unit, half)
         code = Code.INTERVAL_WIDER_THAN_VALUE if inside else Code.OUTSIDE_LIMITS
         reason = join_reasons(explain(code, value=shown), advice)
-        return Estimate(parameter_id, None, None, Verdict.NOT_IDENTIFIABLE, method, reason=reason)
+        verdict = Verdict.NOT_IDENTIFIABLE
+        return Estimate(parameter_id, None, None, verdict, method, reason=reason, spec=declared)
     reason, verdict = note, Verdict.IDENTIFIED
     if width > limit:
         wide = explain(Code.INTERVAL_WIDE, half=Number(half, spec.unit))
         reason, verdict = join_reasons(note, wide, advice), Verdict.WEAK
-    return Estimate(parameter_id, value, std_noise, verdict, method, std_systematic, reason)
+    return Estimate(
+        parameter_id, value, std_noise, verdict, method, std_systematic, reason, declared
+    )
 
 
 def assess_with_prior(
@@ -123,6 +140,7 @@ def assess_with_prior(
     method: str,
     std_systematic: float | None = None,
     note: str = "",
+    declared: ParameterSpec | None = None,
 ) -> Estimate:
     """Estimate of (id, value, standard deviation from noise) in which its own design value took
     part, with its verdict.
@@ -131,17 +149,20 @@ def assess_with_prior(
     be the card's value, which is known less.
     """
     name, value, std = told
+    spec = declared or get_parameter_spec(name)
     if design.std == 0.0:
         return from_prior(name, PriorValue(value), Code.FIXED_BY_CARD)
     if std >= VERDICT.prior_share * design.std:
-        return from_prior(name, PriorValue(value, std), Code.CARD_DOMINATES, std_systematic)
-    one, spec = assess(name, value, std, method, std_systematic, note), get_parameter_spec(name)
+        prior = PriorValue(value, std)
+        return replace(from_prior(name, prior, Code.CARD_DOMINATES, std_systematic), spec=declared)
+    one = assess(name, value, std, method, std_systematic, note, declared)
     if one.value is not None or not spec.lower <= value <= spec.upper:
         return one
     half = Z95 * float(np.hypot(std, std_systematic or 0.0))
-    wide = explain(Code.INTERVAL_WIDE_WITH_PRIOR, half=Number(half, spec.unit))
-    reason = join_reasons(note, wide, get_advice(name, std, std_systematic))
-    return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, reason)
+    code = Code.INTERVAL_WIDE if declared else Code.INTERVAL_WIDE_WITH_PRIOR
+    wide = explain(code, half=Number(half, spec.unit))
+    reason = join_reasons(note, wide, get_advice(name, std, std_systematic, declared))
+    return Estimate(name, value, std, Verdict.WEAK, method, std_systematic, reason, declared)
 
 
 def from_prior(

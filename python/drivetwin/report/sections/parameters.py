@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from drivetwin._util.display_units import (
     Display,
@@ -18,7 +18,7 @@ from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.findings import Finding, Severity, render
 from drivetwin.report.figures.validation import build_overview_panels, plot_overview
-from drivetwin.report.labels import get_parameter_label, get_parameter_name
+from drivetwin.report.labels import get_estimate_label, get_estimate_name
 from drivetwin.report.model_verdict import explain_identification
 from drivetwin.report.sections.blocks import (
     Block,
@@ -57,21 +57,27 @@ def build_result_section(found: Identification) -> Section:
     blocks: list[Block] = [_build_verdict_block(found)]
     if found.evidence.validation:
         blocks.append(_build_overview(found.evidence.validation))
-    blocks.append(build_parameter_table(found))
-    remarks = [
-        f"({number}) {', '.join(_list_labels(found, reason))}: {reason}"
-        for reason, number in _number_reasons(found.estimates.values()).items()
-    ]
-    if remarks:
-        blocks.append(NotesBlock("Remarks on parameters", remarks))
+    blocks += build_parameter_blocks(found.estimates)
     return Section("result", "Result", "", blocks)
 
 
-def build_findings_section(found: Identification) -> Section:
+def build_parameter_blocks(
+    estimates: Mapping[str, Estimate], caption: str | None = None
+) -> list[Block]:
+    """Table of the parameters, and the reasons of their verdicts."""
+    remarks = [
+        f"({number}) {', '.join(_list_labels(estimates, reason))}: {reason}"
+        for reason, number in _number_reasons(estimates.values()).items()
+    ]
+    notes = [NotesBlock("Remarks on parameters", remarks)] if remarks else []
+    return [build_parameter_table(estimates, caption), *notes]
+
+
+def build_findings_section(findings: Sequence[Finding]) -> Section:
     """Findings by severity, errors first, each group with the tables of its findings."""
     blocks: list[Block] = []
     for severity, heading, tone in _SEVERITIES:
-        alike = [one for one in found.findings if one.severity is severity]
+        alike = [one for one in findings if one.severity is severity]
         if alike:
             blocks.append(NotesBlock(heading, render(alike), tone))
         blocks += [_build_rows_table(one) for one in alike if one.rows]
@@ -110,10 +116,10 @@ def _get_fit_percent(one: Validation) -> float:
     return percent if percent == percent else float("inf")
 
 
-def _count_parameters(found: Identification) -> str:
+def _count_parameters(estimates: Mapping[str, Estimate]) -> str:
     """Count the verdicts in a sentence."""
-    count = Counter(estimate.verdict for estimate in found.estimates.values())
-    text = f"{count[Verdict.IDENTIFIED]} of {len(found.estimates)} parameters are identified"
+    count = Counter(estimate.verdict for estimate in estimates.values())
+    text = f"{count[Verdict.IDENTIFIED]} of {len(estimates)} parameters are identified"
     for verdict, words in (
         (Verdict.WEAK, "weak"),
         (Verdict.NOT_IDENTIFIABLE, "not identifiable from this log"),
@@ -124,8 +130,10 @@ def _count_parameters(found: Identification) -> str:
     return f"{text}."
 
 
-def build_parameter_table(found: Identification) -> TableBlock:
-    """All parameters with their intervals and verdicts."""
+def build_parameter_table(
+    estimates: Mapping[str, Estimate], caption: str | None = None
+) -> TableBlock:
+    """All parameters with their intervals and verdicts; the caption counts the latter if None."""
     head = (
         Cell("parameter"),
         Cell("value", number=True),
@@ -135,17 +143,17 @@ def build_parameter_table(found: Identification) -> TableBlock:
         Cell("verdict"),
         Cell("method", secondary=True),
     )
-    caption = _count_parameters(found)
-    if not any(one.std_systematic for one in found.estimates.values()):
-        caption += (
+    counted = _count_parameters(estimates)
+    if not any(one.std_systematic for one in estimates.values()):
+        counted += (
             " The vehicle card states no sensor tolerance, so both intervals are of noise alone."
         )
-    numbers = _number_reasons(found.estimates.values())
+    numbers = _number_reasons(estimates.values())
     rows = [
         _build_parameter_row(one, f" ({numbers[one.reason]})" if one.reason else "")
-        for one in found.estimates.values()
+        for one in estimates.values()
     ]
-    return TableBlock(caption, head, rows)
+    return TableBlock(counted if caption is None else caption, head, rows)
 
 
 def _number_reasons(estimates: Iterable[Estimate]) -> dict[str, int]:
@@ -154,17 +162,17 @@ def _number_reasons(estimates: Iterable[Estimate]) -> dict[str, int]:
     return {reason: number for number, reason in enumerate(reasons, start=1)}
 
 
-def _list_labels(found: Identification, reason: str) -> list[str]:
-    return [get_parameter_label(one.id) for one in found.estimates.values() if one.reason == reason]
+def _list_labels(estimates: Mapping[str, Estimate], reason: str) -> list[str]:
+    return [get_estimate_label(one) for one in estimates.values() if one.reason == reason]
 
 
 def _build_parameter_row(estimate: Estimate, mark: str) -> tuple[Cell, ...]:
     display = scale_display(get_display_unit(estimate.unit), estimate.value or 0.0)
     value, total = format_estimate(estimate, estimate.std_total, display)
     _, noise = format_estimate(estimate, estimate.std_noise, display)
-    is_symbol = get_parameter_label(estimate.id) == estimate.id
+    is_symbol = get_estimate_label(estimate) == estimate.id
     return (
-        Cell(get_parameter_name(estimate.id), note="" if is_symbol else estimate.id),
+        Cell(get_estimate_name(estimate), note="" if is_symbol else estimate.id),
         Cell(value, number=True),
         Cell(total, number=True),
         Cell(noise, number=True, secondary=True),

@@ -197,7 +197,7 @@ def _build_result(outcome: Outcome) -> list[Component]:
         if several is not None:
             content += render_section(build_joint_section(outcome.found, several), "logs")
         if outcome.found.findings:
-            content += render_section(build_findings_section(outcome.found), "findings")
+            content += render_section(build_findings_section(outcome.found.findings), "findings")
         if outcome.found.fit:
             content.append(render_block(build_fit_table(outcome.found.fit), "fit"))
         if outcome.found.friction:

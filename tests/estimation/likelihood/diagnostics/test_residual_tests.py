@@ -35,7 +35,7 @@ def test_a_residual_that_goes_with_an_input_speaks_against_every_value() -> None
     shown = np.interp(part.record.time[torque.place], drive.time, drive.values)
     missing[: torque.values.size] = torque.sigma * (shown - shown.mean()) / shown.std()
     plain = replace(
-        fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record)),)
+        fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record.sigma)),)
     )
     wrong = replace(fit, problem=plain, normal=replace(fit.normal, residuals=(residual + missing,)))
     (one,) = _list_correlated(wrong)
@@ -68,7 +68,7 @@ def test_a_fit_that_leaves_out_the_noise_of_its_inputs_says_so() -> None:
     assert check_weighting(fit, ["shift 2-3"]) == []
     (part,) = fit.problem.parts
     bare = replace(
-        fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record)),)
+        fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record.sigma)),)
     )
     told = build_estimates(
         replace(fit, problem=bare), [made.signals], [made.driveline], {}, EffectPriors()

@@ -10,13 +10,12 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import TorqueOfSpeeds
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, Output
-from drivetwin.estimation.likelihood.noise.linear_response import build_output_row, linearise_run
-from drivetwin.estimation.likelihood.noise.residual_covariance import (
-    add_input_noise,
-    build_sensor_whitener,
-)
-from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.data.output import Output
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE
+from drivetwin.estimation.likelihood.noise.residual_covariance import build_sensor_whitener
+from drivetwin.estimation.likelihood.noise.shift_noise import weight_by_inputs
+from drivetwin.estimation.likelihood.noise.shift_response import build_output_row, linearise_run
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
@@ -36,7 +35,7 @@ def test_weighting_equals_the_dense_covariance() -> None:
     assert run is not None
     model, record = part.structure.build_model(point), part.record
     response = linearise_run(model, run, record)
-    whiteness = add_input_noise(model, record, response)
+    whiteness = weight_by_inputs(model, record, response)
     assert whiteness.path is not None
     columns = []
     for name, power in whiteness.path.power.items():
@@ -90,7 +89,7 @@ def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
     assert run is not None
     model, record = part.structure.build_model(point), part.record
     response = linearise_run(model, run, record)
-    whiteness = add_input_noise(model, record, response)
+    whiteness = weight_by_inputs(model, record, response)
     assert whiteness.path is not None
     effect = {}
     for name in response.drive:
@@ -190,9 +189,9 @@ def test_without_input_noise_the_sensors_weigh_alone() -> None:
     part, _ = _short()
     residual = np.ones(part.record.size)
     assert np.allclose(
-        build_sensor_whitener(part.record).apply_inverse(residual), part.record.sigma**-2
+        build_sensor_whitener(part.record.sigma).apply_inverse(residual), part.record.sigma**-2
     )
-    assert not np.any(build_sensor_whitener(part.record).estimate_input_part(residual))
+    assert not np.any(build_sensor_whitener(part.record.sigma).estimate_input_part(residual))
 
 
 def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> None:

@@ -14,7 +14,6 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection import sampling_mode as of_signals
@@ -26,6 +25,7 @@ from drivetwin.estimation.likelihood.selection.sampling_mode import (
     select_sampling_mode,
     widen_over_modes,
 )
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.objective import ParameterVector
 from tests.estimation.likelihood.fixtures import ROUGH, problem, truth_of
 from tests.support.bench import record_bench
@@ -40,7 +40,7 @@ AS_READ = 2
 
 
 @cache
-def _posed() -> LikelihoodObjective:
+def _posed() -> ShiftObjective:
     return problem(record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH))[0]
 
 
@@ -123,7 +123,7 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
 
 
 @shared
-def _without_torque() -> tuple[LikelihoodObjective, ParameterVector, LikelihoodFit]:
+def _without_torque() -> tuple[ShiftObjective, ParameterVector, LikelihoodFit]:
     """A problem of samples without an output torque, where its search starts, and its minimum."""
     made = record_bench(load_scenario("throttle_steps"), 0, ROUGH)
     signals = replace(made.signals, output_torque=MeasuredSignal(np.empty(0), np.empty(0)))
@@ -215,7 +215,7 @@ def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
 
 
 @shared
-def _at_50_hertz(window: float) -> tuple[LikelihoodObjective, LikelihoodFit]:
+def _at_50_hertz(window: float) -> tuple[ShiftObjective, LikelihoodFit]:
     """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
     the kinds that an expansion tells."""
     base = load_scenario("throttle_steps")

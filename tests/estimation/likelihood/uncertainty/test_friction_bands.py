@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.estimation.likelihood.effects.correction import keep_fit
-from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
 from tests.estimation.likelihood.fixtures import fitted
 

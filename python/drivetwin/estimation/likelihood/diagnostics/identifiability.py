@@ -7,7 +7,7 @@ several per cent at no cost is named by the parameters that make it up.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +27,28 @@ SHARE = 0.3
 NAMED = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "mu_c", "P0", "drum")
 SHOWN = {"eta": "η", "J_e": "J′", "J_out": "Jo′", "J_vehicle": "J3", "Tv_over_if": "T_v"}
 
+_CARD = "the design values of the vehicle card"
+
 
 def find_null_directions(fit: LikelihoodFit) -> list[Finding]:
     """Return a finding for each direction that is not identifiable without the priors."""
     names = fit.point.names
-    keep = [k for k, name in enumerate(names) if _is_reported(name, names)]
-    rest = [k for k in range(len(names)) if k not in keep]
-    size = np.abs(fit.point.values[keep])
-    relative = reduce_information(fit.normal.data, keep, rest) * np.outer(size, size)
+    shown = {k: _format_unknown(name) for k, name in enumerate(names) if _is_reported(name, names)}
+    return report_null_directions(fit.normal.data, np.abs(fit.point.values), shown, _CARD)
+
+
+def report_null_directions(
+    data: FloatArray, sizes: FloatArray, shown: Mapping[int, str], stated: str
+) -> list[Finding]:
+    """Return a finding for each direction that `data` (p, p) does not identify.
+
+    `sizes` (p,) are those of the unknowns, `shown` the names of those that are reported, by
+    number, `stated` what else determines them.
+    """
+    keep = list(shown)
+    rest = [k for k in range(len(sizes)) if k not in shown]
+    size = sizes[keep]
+    relative = reduce_information(data, keep, rest) * np.outer(size, size)
     power, directions = np.linalg.eigh(relative)
     found = []
     for value, direction in zip(power, directions.T, strict=True):
@@ -42,9 +56,9 @@ def find_null_directions(fit: LikelihoodFit) -> list[Finding]:
         if std < MAX_RELATIVE_STD:
             break
         strong = [k for k in np.argsort(-np.abs(direction)) if abs(direction[k]) > SHARE]
-        shown = " and ".join(_format_unknown(names[keep[k]]) for k in strong)
+        named = " and ".join(shown[keep[k]] for k in strong)
         code = Code.NULL_DIRECTIONS if len(strong) > 1 else Code.NULL_DIRECTION
-        found.append(report(code, parameters=shown))
+        found.append(report(code, parameters=named, stated=stated))
     return found
 
 

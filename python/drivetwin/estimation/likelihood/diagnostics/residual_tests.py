@@ -8,8 +8,9 @@ its power in means over m samples.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -19,8 +20,8 @@ from drivetwin.estimation.likelihood.coloured_noise import (
     compute_block_means,
     split_whitened,
 )
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE
-from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.optimize.objective import NormalEquations
 from drivetwin.findings import Code, Finding, Number, Row, make_row, report
 from drivetwin.simulation.dual_clutch import Signal
 
@@ -34,6 +35,18 @@ _ADVICE = (
     "Compare the simulation with the measurement in the report, phase by phase, and check these "
     "sensors for drift"
 )
+
+
+class Minimum(Protocol):
+    """Minimum of an objective."""
+
+    @property
+    def problem(self) -> LikelihoodObjective[Any]:
+        """Objective with its weighting at the minimum."""
+
+    @property
+    def normal(self) -> NormalEquations:
+        """Expansion there."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +71,7 @@ class ResidualTest:
 
 
 def compute_white_residuals(
-    fit: LikelihoodFit, residuals: Sequence[FloatArray] | None = None
+    fit: Minimum, residuals: Sequence[FloatArray] | None = None
 ) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
     """Return times (n,) and normalised residuals (n,), input noise removed, by shift and output.
 
@@ -66,7 +79,7 @@ def compute_white_residuals(
     `residuals` (n,) of each shift replace those of the fit.
     """
     return {
-        part.structure.label: {
+        part.label: {
             out.name: (part.record.time[out.place], white)
             for out, _, white in split_whitened(part, residual)
         }
@@ -75,23 +88,20 @@ def compute_white_residuals(
 
 
 def run_residual_tests(
-    fit: LikelihoodFit, residuals: Sequence[FloatArray] | None = None
+    fit: Minimum, residuals: Sequence[FloatArray] | None = None
 ) -> dict[str, tuple[ResidualTest, ...]]:
     """Test every output by label of the shift; `residuals` as in `compute_white_residuals`."""
     found = {}
     whitened = compute_white_residuals(fit, residuals).values()
     for part, outputs in zip(fit.problem.parts, whitened, strict=True):
-        inputs = {TORQUE: part.record.engine_torque} | {
-            f"pressure of {name}": signal for name, signal in part.record.pressures.items()
-        }
-        found[part.structure.label] = tuple(
-            _run_test(name, time, white, inputs) for name, (time, white) in outputs.items()
+        found[part.label] = tuple(
+            _run_test(name, time, white, part.inputs) for name, (time, white) in outputs.items()
         )
     return found
 
 
 def check_residuals(
-    fit: LikelihoodFit,
+    fit: Minimum,
     labels: Sequence[str],
     residuals: Sequence[FloatArray] | None = None,
     likeliest: str = "",
@@ -147,7 +157,7 @@ def _write_name(name: str) -> str:
     return name.replace("_", " ")
 
 
-def check_weighting(fit: LikelihoodFit, labels: Sequence[str]) -> list[Finding]:
+def check_weighting(fit: Minimum, labels: Sequence[str]) -> list[Finding]:
     """Return a finding for each shift whose weighting omits the noise of the inputs.
 
     That is the case if a run has no finite response to the noise. `labels` are those of the shifts.
@@ -160,7 +170,7 @@ def check_weighting(fit: LikelihoodFit, labels: Sequence[str]) -> list[Finding]:
 
 
 def _run_test(
-    name: str, time: FloatArray, white: FloatArray, inputs: dict[str, Signal]
+    name: str, time: FloatArray, white: FloatArray, inputs: Mapping[str, Signal]
 ) -> ResidualTest:
     _, means = compute_block_means(time, white)
     excess = float(np.mean(means**2) / np.mean(white**2))

@@ -17,8 +17,8 @@ from drivetwin.estimation.likelihood.effects.operating_point import (
 )
 from drivetwin.estimation.likelihood.effects.sensor_tolerance import build_sensor_columns
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.estimation.likelihood.noise.linear_response import STATES, build_output_row
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.noise.shift_response import STATES, build_output_row
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import Group
 from drivetwin.simulation.dual_clutch import Signal
@@ -167,7 +167,7 @@ class EffectColumns:
 
 
 def build_columns(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     point: ParameterVector,
     priors: EffectPriors,
     again: FormedAgain | None = None,
@@ -312,7 +312,7 @@ def _build_curved(
 
 
 def form_inputs(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     point: ParameterVector,
     priors: EffectPriors,
     first: EffectColumns,

@@ -30,7 +30,7 @@ from drivetwin.estimation.likelihood.fit import (
     compute_covariance,
     invert_information,
 )
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import Group
 
@@ -171,7 +171,7 @@ def keep_fit(fit: LikelihoodFit) -> Correction:
 class _Expansion:
     """Point, expansion of Q there, and the weighted sums of all columns."""
 
-    problem: LikelihoodObjective
+    problem: ShiftObjective
     normal: NormalEquations
     point: ParameterVector
     sums: WeightedColumns
@@ -277,7 +277,7 @@ def _expand_again(
 
 
 def _expand_with_inputs(
-    problem: LikelihoodObjective, point: ParameterVector, priors: EffectPriors, amounts: _Amounts
+    problem: ShiftObjective, point: ParameterVector, priors: EffectPriors, amounts: _Amounts
 ) -> _Expansion | None:
     """Expand Q at `point` with effects in the inputs; None if a run does not complete.
 

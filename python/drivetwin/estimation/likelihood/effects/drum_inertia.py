@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
-from drivetwin.estimation.likelihood.noise.linear_response import build_slip_row
+from drivetwin.estimation.likelihood.noise.shift_response import build_slip_row
 from drivetwin.vehicle.effects import EffectId
 
 REFERENCE_TORQUE = 1500.0

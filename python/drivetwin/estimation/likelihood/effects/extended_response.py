@@ -13,7 +13,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
-from drivetwin.estimation.likelihood.noise.linear_response import (
+from drivetwin.estimation.likelihood.noise.shift_response import (
     STATES,
     LinearRates,
     compute_exponentials,

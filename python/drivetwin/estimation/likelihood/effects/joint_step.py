@@ -26,7 +26,7 @@ from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_exce
 from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.objective import NormalEquations
 from drivetwin.estimation.result.cause import Group
 
@@ -145,7 +145,7 @@ class JointStep:
 
 
 def weight_columns(
-    problem: LikelihoodObjective, normal: NormalEquations, columns: EffectColumns
+    problem: ShiftObjective, normal: NormalEquations, columns: EffectColumns
 ) -> WeightedColumns:
     """Form the weighted sums of `columns` at the point of the expansion `normal`."""
     score = compute_column_products(problem, normal, columns.matrices)
@@ -260,7 +260,7 @@ def _join_tolerances(
 
 
 def take_joint_step(
-    problem: LikelihoodObjective, normal: NormalEquations, sums: WeightedColumns
+    problem: ShiftObjective, normal: NormalEquations, sums: WeightedColumns
 ) -> JointStep:
     """Step from the expansion `normal` in the unknowns and the amounts of the effects."""
     size = normal.gradient.size

@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import IndexArray, ShiftRecord
-from drivetwin.estimation.likelihood.noise.linear_response import LinearResponse, linearise_run
-from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.data.output import IndexArray
+from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord
+from drivetwin.estimation.likelihood.noise.shift_response import ShiftResponse, linearise_run
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import DualClutch, Trajectory
@@ -32,7 +33,7 @@ class OperatingPoint:
     point: ParameterVector
     model: DualClutch
     run: Trajectory
-    response: LinearResponse
+    response: ShiftResponse
     rows: IndexArray
 
     @property

@@ -31,7 +31,6 @@ from drivetwin.estimation.likelihood.fit import (
     PlantEvidence,
     compute_covariance,
 )
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.plant_effect import (
     AMOUNT,
     DAMPING,
@@ -40,6 +39,7 @@ from drivetwin.estimation.likelihood.plant_effect import (
     UNKNOWNS,
     PlantEffect,
 )
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import Group
@@ -83,7 +83,7 @@ class Minimum(Protocol):
     """Minimum of Q: a fit, or the result of a search."""
 
     @property
-    def problem(self) -> LikelihoodObjective:
+    def problem(self) -> ShiftObjective:
         """Problem that was minimised."""
 
     @property
@@ -205,11 +205,11 @@ def _build_size_prior(effect: EffectId, prior: EffectPrior) -> PriorValue:
 
 
 def extend_problem(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     point: ParameterVector,
     effect: EffectId,
     priors: Sequence[PriorValue],
-) -> tuple[LikelihoodObjective, ParameterVector]:
+) -> tuple[ShiftObjective, ParameterVector]:
     """Add an effect to the plant; its unknowns come last, at the means of their `priors`."""
     outputs = [out for part in problem.parts for out in part.record.outputs]
     full = max(float(np.max(np.abs(o.values))) for o in outputs if o.name == OUTPUT_TORQUE)
@@ -267,7 +267,7 @@ def _compute_log_determinant(normal: NormalEquations) -> float:
 
 
 def _build_fit(
-    fit: LikelihoodFit, found: OptimizeResult[LikelihoodObjective], plant: PlantEvidence
+    fit: LikelihoodFit, found: OptimizeResult[ShiftObjective], plant: PlantEvidence
 ) -> LikelihoodFit:
     """Build the fit of an extended plant; it has the average over sampling modes of `fit`."""
     problem, point, normal = found.problem, found.point, found.normal

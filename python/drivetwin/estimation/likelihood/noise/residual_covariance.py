@@ -2,8 +2,8 @@
 """Covariance of the residuals, R + G·U·Gᵀ, in factored form.
 
 A residual is sensor noise R plus what the noise U of the inputs, sent through the simulation (G),
-does to its outputs. The driveline has four states, so G·U·Gᵀ is that of a Markov process z driven
-by the input noise, and by Woodbury's identity
+does to its outputs. The driveline has S states, so G·U·Gᵀ is that of a Markov process z driven by
+the input noise, and by Woodbury's identity
 
     Σ⁻¹ = R⁻¹ - R⁻¹H·(P⁻¹ + Hᵀ R⁻¹ H)⁻¹·Hᵀ R⁻¹,   P⁻¹ = Lᵀ W L
 
@@ -24,21 +24,17 @@ passes less than half the sampling rate: a sample's variance times the sampling 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_array
 
 from drivetwin._native import whiten
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
-from drivetwin.estimation.likelihood.noise.linear_response import (
-    STATES,
-    LinearResponse,
-    build_output_row,
-)
-from drivetwin.simulation.dual_clutch import DualClutch
+from drivetwin.estimation.likelihood.noise.linear_response import LinearResponse
 
 
 @dataclass(frozen=True)
@@ -54,38 +50,78 @@ RESIDUAL_COVARIANCE = ResidualCovarianceSettings()
 
 
 @dataclass(frozen=True, eq=False)
+class SeenOutput:
+    """Samples of one output: its `row` (S,) or (N, S) over the states, the points `centre` (n,) of
+    the grid in the middle of what the samples show, and the noise of its sensor."""
+
+    row: FloatArray
+    centre: NDArray[np.intp]
+    sigma: float
+
+    def get_rows(self) -> FloatArray:
+        """Return the row of each sample (n, S)."""
+        if self.row.ndim == 1:
+            return np.tile(self.row, (self.centre.size, 1))
+        return np.asarray(self.row[self.centre])
+
+
+@dataclass(frozen=True, eq=False)
+class SharedNoise:
+    """Noise of an output in an input that is computed from it: `share` (N-1, n), S."""
+
+    input: str
+    share: csr_array
+
+
+@dataclass(frozen=True, eq=False)
+class InputNoise:
+    """Noise of the inputs and what the outputs show of it.
+
+    `power` (N-1,) is the variance of an input's noise over each step, by name; `quiet` (S,) the
+    noise of a sensor of each state, in its unit.
+    """
+
+    outputs: Sequence[SeenOutput]
+    power: Mapping[str, FloatArray]
+    quiet: FloatArray
+    shared: SharedNoise | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class NoisePath:
     """Propagation of input noise to the outputs.
 
-    `seen` is H, `factor` the banded Cholesky factor, `inverse` (N, 4, 4) the inverse process noise
-    of each step, `power` (N-1,) the variance of an input's noise over a step, by name; `share` is
-    S (N-1, n), None where no input has the noise of an output.
+    `seen` is H, `factor` the banded Cholesky factor, `inverse` (N, S, S) the inverse process noise
+    of each step, `power` as in `InputNoise`; `shared` is None where no input has the noise of an
+    output.
     """
 
     response: LinearResponse
-    power: dict[str, FloatArray]
+    power: Mapping[str, FloatArray]
     inverse: FloatArray
     seen: csr_array
     factor: FloatArray
-    share: csr_array | None = None
+    shared: SharedNoise | None = None
 
     def remove_feedback(self, columns: FloatArray) -> FloatArray:
         """Remove from residual columns (n, q) the effect of output noise through a computed
         torque."""
-        if self.share is None:
+        if self.shared is None:
             return columns
-        push = self.response.drive[TORQUE][:, :, None] * (self.share @ columns)[:, None, :]
+        drive, share = self.response.drive[self.shared.input], self.shared.share
+        push = drive[:, :, None] * (share @ columns)[:, None, :]
         z = self.response.propagate_columns(push)
         return np.asarray(columns + self.seen @ z.reshape(-1, columns.shape[1]))
 
     def apply_adjoint_feedback(self, columns: FloatArray) -> FloatArray:
         """Apply the transpose of `freed` to columns (n, q)."""
-        if self.share is None:
+        if self.shared is None:
             return columns
         pull = self.seen.T @ columns
-        back = self.response.propagate_adjoint(pull.reshape(-1, STATES, columns.shape[1]))
-        torque = np.einsum("ki,kiq->kq", self.response.drive[TORQUE], back)
-        return np.asarray(columns + self.share.T @ torque)
+        shape = (-1, self.response.states, columns.shape[1])
+        back = self.response.propagate_adjoint(pull.reshape(shape))
+        torque = np.einsum("ki,kiq->kq", self.response.drive[self.shared.input], back)
+        return np.asarray(columns + self.shared.share.T @ torque)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +148,10 @@ class Whitener:
         if columns.size == 0:
             return columns
         each = columns.reshape(len(columns), -1)
-        if self.path is not None and self.path.share is None and each.shape[1] > 1:
-            rows = self.path.seen.data.reshape(-1, STATES)
-            first = self.path.seen.indices[::STATES].astype(np.uint32)
+        if self.path is not None and self.path.shared is None and each.shape[1] > 1:
+            states = self.path.response.states
+            rows = self.path.seen.data.reshape(-1, states)
+            first = self.path.seen.indices[::states].astype(np.uint32)
             samples = (rows, first, self.variance)
             return whiten(self.path.factor, samples, np.ascontiguousarray(each))
         weighted = (each - self.estimate_input_part(each)) / self.variance[:, None]
@@ -141,15 +178,15 @@ class Whitener:
             return {}
         free = self.path.remove_feedback(residual[:, None])[:, 0]
         state = self._estimate_state(self.path, free)
-        z = state.reshape(-1, STATES)
+        z = state.reshape(-1, self.path.response.states)
         w = z[1:] - np.einsum("kij,kj->ki", self.path.response.transition, z[:-1])
         pull = np.einsum("kij,kj->ki", self.path.inverse[1:], w)
         noise = {
             name: -self.path.power[name] * np.einsum("ki,ki->k", drive, pull)
             for name, drive in self.path.response.drive.items()
         }
-        if self.path.share is not None:
-            noise[TORQUE] += self.path.share @ (free - self.path.seen @ state)
+        if (shared := self.path.shared) is not None:
+            noise[shared.input] += shared.share @ (free - self.path.seen @ state)
         return noise
 
     def _estimate_state(self, path: NoisePath, columns: FloatArray) -> FloatArray:
@@ -159,65 +196,41 @@ class Whitener:
         return np.asarray(cho_solve_banded((path.factor, True), pull, check_finite=False))
 
 
-def build_sensor_whitener(record: ShiftRecord) -> Whitener:
-    """Build the weighting by the sensors' noise alone."""
-    return Whitener(record.sigma**2)
+def build_sensor_whitener(sigma: FloatArray) -> Whitener:
+    """Build the weighting by the sensors' noise `sigma` (n,) alone."""
+    return Whitener(sigma**2)
 
 
-def add_input_noise(model: DualClutch, record: ShiftRecord, response: LinearResponse) -> Whitener:
-    """Build the weighting that includes the noise of engine torque and pressures."""
-    share = record.compute_torque_share()
-    if share is not None:
-        response = response.apply_torque_feedback(np.asarray(share.sum(axis=1)))
-    power = _compute_input_power(record, response)
-    inverse = _invert_process_noise(_compute_process_noise(model, record, response, power))
+def add_input_noise(sigma: FloatArray, response: LinearResponse, noise: InputNoise) -> Whitener:
+    """Build the weighting that includes the noise of the inputs.
+
+    Raises LinAlgError where the response has lost its digits.
+    """
+    inverse = _invert_process_noise(_compute_process_noise(response, noise))
     factor = cholesky_banded(
-        _build_information(inverse, response.transition, model, record),
+        _build_information(inverse, response.transition, noise.outputs),
         overwrite_ab=True,
         lower=True,
         check_finite=False,
     )
+    seen = _build_observation(noise.outputs, inverse.shape[0], response.states)
     factor = np.ascontiguousarray(factor)
-    path = NoisePath(response, power, inverse, _build_observation(model, record), factor, share)
-    return Whitener(record.sigma**2, path)
+    return Whitener(sigma**2, NoisePath(response, noise.power, inverse, seen, factor, noise.shared))
 
 
-def _compute_input_power(record: ShiftRecord, response: LinearResponse) -> dict[str, FloatArray]:
-    """Compute the variance (N-1,) of an input's noise, constant over each step, by name."""
-    found = {}
-    middle = 0.5 * (record.time[1:] + record.time[:-1])
-    for name in response.drive:
-        signal = record.engine_torque if name == TORQUE else record.pressures[name]
-        between = float(np.median(np.diff(signal.time)))
-        variance = np.interp(middle, signal.time, record.compute_variance(name))
-        found[name] = variance * between / response.step
+def _compute_process_noise(response: LinearResponse, noise: InputNoise) -> FloatArray:
+    """Compute the process noise (N, S, S) between successive grid points; the first is that of the
+    start."""
+    states = response.states
+    quiet = RESIDUAL_COVARIANCE.min_process_noise * noise.quiet
+    found = np.zeros((len(response.transition) + 1, states, states)) + np.diag(quiet**2)
+    for name, drive in response.drive.items():
+        found[1:] += noise.power[name][:, None, None] * drive[:, :, None] * drive[:, None, :]
     return found
 
 
-def _compute_process_noise(
-    model: DualClutch, record: ShiftRecord, response: LinearResponse, power: dict[str, FloatArray]
-) -> FloatArray:
-    """Compute the process noise (N, 4, 4) between successive grid points; the first is that of the
-    start.
-
-    Where the log has no output torque, its noise counts as that which the shaft turns the noise of
-    the output speed into.
-    """
-    sigma = {out.name: out.sigma for out in record.outputs}
-    wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
-    impedance = float(np.sqrt(model.k_o * model.J_out))
-    torque = sigma.get("output_torque", impedance * sigma["output_speed"])
-    quiet = RESIDUAL_COVARIANCE.min_process_noise * np.array(
-        [sigma["engine_speed"], sigma["output_speed"], wheel, torque / model.k_o]
-    )
-    noise = np.zeros((record.time.size, STATES, STATES)) + np.diag(quiet**2)
-    for name, drive in response.drive.items():
-        noise[1:] += power[name][:, None, None] * drive[:, :, None] * drive[:, None, :]
-    return noise
-
-
 def _invert_process_noise(noise: FloatArray) -> FloatArray:
-    """Invert process noise (N, 4, 4), whose first entry is the quiet one.
+    """Invert process noise (N, S, S), whose first entry is the quiet one.
 
     Formed in units of that: where states are counted in units of so different size, the digits of
     the one direction that an input's noise drives are lost beside the quiet ones.
@@ -229,33 +242,29 @@ def _invert_process_noise(noise: FloatArray) -> FloatArray:
 
 
 def _build_information(
-    inverse: FloatArray, transition: FloatArray, model: DualClutch, record: ShiftRecord
+    inverse: FloatArray, transition: FloatArray, outputs: Sequence[SeenOutput]
 ) -> FloatArray:
-    """Compute P⁻¹ + Hᵀ R⁻¹ H in lower banded storage (8, 4N)."""
-    count = record.time.size
+    """Compute P⁻¹ + Hᵀ R⁻¹ H in lower banded storage (2S, S·N)."""
+    count, states = inverse.shape[:2]
     through = inverse[1:] @ transition
     diagonal = inverse.copy()
     diagonal[:-1] += transition.transpose(0, 2, 1) @ through
-    for out in record.outputs:
-        row = build_output_row(model, out.name)
-        seen = np.bincount(out.centre, minlength=count)
-        diagonal += seen[:, None, None] * (np.outer(row, row) / out.sigma**2)
-    banded = np.zeros((2 * STATES, STATES * count))
-    for i in range(STATES):
+    for out in outputs:
+        seen = np.bincount(out.centre, minlength=count) / out.sigma**2
+        diagonal += seen[:, None, None] * (out.row[..., :, None] * out.row[..., None, :])
+    banded = np.zeros((2 * states, states * count))
+    for i in range(states):
         for j in range(i + 1):
-            banded[i - j, j::STATES] = diagonal[:, i, j]
-        for j in range(STATES):
-            banded[STATES + i - j, j : STATES * (count - 1) : STATES] = -through[:, i, j]
+            banded[i - j, j::states] = diagonal[:, i, j]
+        for j in range(states):
+            banded[states + i - j, j : states * (count - 1) : states] = -through[:, i, j]
     return banded
 
 
-def _build_observation(model: DualClutch, record: ShiftRecord) -> csr_array:
-    """Build the observation matrix H (compared samples, 4N)."""
-    data, columns, count = [], [], 0
-    for out in record.outputs:
-        data.append(np.tile(build_output_row(model, out.name), out.centre.size))
-        columns.append((STATES * out.centre[:, None] + np.arange(STATES)).ravel())
-        count += out.centre.size
-    start = np.arange(count + 1) * STATES
-    shape = (count, STATES * record.time.size)
-    return csr_array((np.concatenate(data), np.concatenate(columns), start), shape=shape)
+def _build_observation(outputs: Sequence[SeenOutput], count: int, states: int) -> csr_array:
+    """Build the observation matrix H (compared samples, S·N)."""
+    rows = np.concatenate([out.get_rows() for out in outputs])
+    centre = np.concatenate([out.centre for out in outputs])
+    columns = (states * centre[:, None] + np.arange(states)).ravel()
+    start = np.arange(centre.size + 1) * states
+    return csr_array((rows.ravel(), columns, start), shape=(centre.size, states * count))

@@ -12,8 +12,8 @@ from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.budget import REMEDY, BudgetExceeded
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.staged_start import find_staged_start
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.shifts.shift import Shift
@@ -64,7 +64,7 @@ class NoConvergence(IdentificationError):
 
 
 def fit_multistart(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     start: ParameterVector,
     shifts: Sequence[Shift],
     thorough: bool = True,
@@ -84,7 +84,7 @@ def fit_multistart(
 
 def refine(
     known: LikelihoodFit,
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     start: ParameterVector,
     shifts: Sequence[Shift],
 ) -> LikelihoodFit:
@@ -129,7 +129,7 @@ def _report_progress(attempts: Iterator[LikelihoodFit | None]) -> Iterator[Likel
 
 
 def _iterate_attempts(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     start: ParameterVector,
     shifts: Sequence[Shift],
     restarts: Sequence[float],
@@ -148,7 +148,7 @@ def _iterate_attempts(
 
 
 def _iterate_other_attempts(
-    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
 ) -> Iterator[LikelihoodFit | None]:
     """Yield fits by stages, without the start that `_iterate_attempts` began with."""
     restarts = (
@@ -157,19 +157,19 @@ def _iterate_other_attempts(
     yield from _iterate_staged_starts(problem, start, shifts, restarts)
 
 
-def _is_near(problem: LikelihoodObjective, start: ParameterVector) -> bool:
+def _is_near(problem: ShiftObjective, start: ParameterVector) -> bool:
     """Return whether the direct search comes first."""
     return problem.update_weighting(start).cost(start) < MULTI_START.direct_chi2 * problem.size
 
 
 def _iterate_staged_starts(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     start: ParameterVector,
     shifts: Sequence[Shift],
     restarts: Sequence[float],
 ) -> Generator[LikelihoodFit | None, None, bool]:
     """Yield fits from staged starts; return whether any of them came near the measurement."""
-    doubtful: list[OptimizeResult[LikelihoodObjective]] = []
+    doubtful: list[OptimizeResult[ShiftObjective]] = []
     promising = 0
     for tried, shaft in enumerate(restarts, 1):
         factor = [shaft if name == "k_o" else 1.0 for name in start.names]
@@ -190,7 +190,7 @@ def _iterate_staged_starts(
     return promising > 0 or bool(doubtful)
 
 
-def _is_doubtful(problem: LikelihoodObjective, near: OptimizeResult[LikelihoodObjective]) -> bool:
+def _is_doubtful(problem: ShiftObjective, near: OptimizeResult[ShiftObjective]) -> bool:
     """Return whether a staged start ended too far from the measurement for the right minimum."""
     if near.normal.cost <= MULTI_START.doubtful_chi2 * problem.size:
         return False
@@ -199,7 +199,7 @@ def _is_doubtful(problem: LikelihoodObjective, near: OptimizeResult[LikelihoodOb
 
 
 def fit_local(
-    problem: LikelihoodObjective, start: ParameterVector, most: float = MULTI_START.far_chi2
+    problem: ShiftObjective, start: ParameterVector, most: float = MULTI_START.far_chi2
 ) -> LikelihoodFit | None:
     """Find the local minimum of Q with input noise; None if Q per sample stays above `most`.
 
@@ -222,8 +222,8 @@ def fit_local(
 
 
 def _fit_inputs(
-    problem: LikelihoodObjective, found: OptimizeResult[LikelihoodObjective], limit: float
-) -> OptimizeResult[LikelihoodObjective] | None:
+    problem: ShiftObjective, found: OptimizeResult[ShiftObjective], limit: float
+) -> OptimizeResult[ShiftObjective] | None:
     """Find the joint minimum over unknowns and inputs, from the one with the measured inputs.
 
     For an element that slips at a constant noisy pressure, the noise is mistaken for information
@@ -231,7 +231,7 @@ def _fit_inputs(
     the search is repeated. Returns None if the first search does not converge. `iterations` is the
     sum over all searches.
     """
-    joint: OptimizeResult[LikelihoodObjective] | None = None
+    joint: OptimizeResult[ShiftObjective] | None = None
     expected = found.problem.update_inputs(found.point)
     for _ in range(MULTI_START.max_input_rounds):
         following = minimise(expected, found.point, limit=limit)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.shifts.shift import Shift
@@ -51,8 +51,8 @@ STAGED_START = StagedStartSettings()
 
 
 def find_staged_start(
-    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
-) -> OptimizeResult[LikelihoodObjective] | None:
+    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> OptimizeResult[ShiftObjective] | None:
     """Fit the output error over growing spans, weighted by sensor noise.
 
     Returns None if a run fails, or if a stage ends far from the measurement.
@@ -74,8 +74,8 @@ def find_staged_start(
 
 
 def fit_lower_gear_only(
-    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
-) -> OptimizeResult[LikelihoodObjective] | None:
+    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> OptimizeResult[ShiftObjective] | None:
     """Fit the output error over the gear before each shift alone; None if a run fails."""
     gear = _fix_friction(_restrict_bounds(problem, start), start)
     return minimise(
@@ -83,13 +83,13 @@ def fit_lower_gear_only(
     )
 
 
-def _is_too_far(found: OptimizeResult[LikelihoodObjective]) -> bool:
+def _is_too_far(found: OptimizeResult[ShiftObjective]) -> bool:
     """Return whether a stage ended too far from the measurement for input noise to explain it."""
     problem = found.problem.update_weighting(found.point)
     return problem.cost(found.point) > STAGED_START.max_chi2 * problem.size
 
 
-def _fix_friction(problem: LikelihoodObjective, start: ParameterVector) -> LikelihoodObjective:
+def _fix_friction(problem: ShiftObjective, start: ParameterVector) -> ShiftObjective:
     """Fix all parameters of the elements at the start."""
     prior = problem.prior
     elements = {one.name for part in problem.parts for one in part.structure.elements}
@@ -99,7 +99,7 @@ def _fix_friction(problem: LikelihoodObjective, start: ParameterVector) -> Likel
     return replace(problem, prior=prior)
 
 
-def _scale_friction(problem: LikelihoodObjective, point: ParameterVector) -> ParameterVector:
+def _scale_friction(problem: ShiftObjective, point: ParameterVector) -> ParameterVector:
     """Scale the friction levels to the tried factors with the smallest Q."""
     factors = np.geomspace(
         STAGED_START.min_friction_factor,
@@ -117,7 +117,7 @@ def _scale_friction(problem: LikelihoodObjective, point: ParameterVector) -> Par
     return point
 
 
-def _restrict_bounds(problem: LikelihoodObjective, start: ParameterVector) -> LikelihoodObjective:
+def _restrict_bounds(problem: ShiftObjective, start: ParameterVector) -> ShiftObjective:
     """Restrict positive unknowns of `SOUGHT` to bounds about the start."""
     sought = np.array([name in LOCAL_UNKNOWNS for name in start.names]) & (start.values > 0.0)
     lower = np.where(

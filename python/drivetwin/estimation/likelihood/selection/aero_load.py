@@ -13,7 +13,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate_set import report_growth
@@ -35,7 +35,7 @@ def report_aero_load(best: LikelihoodFit) -> list[Finding]:
     return [report_growth(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
 
 
-def drop_growth(best: LikelihoodFit, narrower: LikelihoodObjective) -> LikelihoodFit:
+def drop_growth(best: LikelihoodFit, narrower: ShiftObjective) -> LikelihoodFit:
     """The fit of the model without the growing part, where that of the wider one ends without any.
 
     It is the same minimum. What lies on its bound has no place in the covariance: it would widen

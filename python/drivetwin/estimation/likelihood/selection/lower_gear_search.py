@@ -18,13 +18,13 @@ from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluat
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.plant_refit import compare_plants, extend_problem
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.optimize.staged_start import (
     find_staged_start,
     fit_lower_gear_only,
 )
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS, refit_best_mode
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.shifts.shift import Shift
@@ -53,7 +53,7 @@ MODES = (frozenset[str](), frozenset(SPEEDS), frozenset((*SPEEDS, OUTPUT_TORQUE)
 
 
 def fit_from_lower_gear(
-    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
 ) -> LikelihoodFit | None:
     """Fit the dual clutch; None where no sampling mode leads to a minimum. `problem` has signals as
     read."""
@@ -61,7 +61,7 @@ def fit_from_lower_gear(
 
 
 def fit_with_backlash(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     start: ParameterVector,
     shifts: Sequence[Shift],
     priors: Sequence[PriorValue],
@@ -79,7 +79,7 @@ def fit_with_backlash(
     return None if found is None else replace(found, plant=_compare(found, priors))
 
 
-def _is_reversed(problem: LikelihoodObjective) -> bool:
+def _is_reversed(problem: ShiftObjective) -> bool:
     """Return whether the measured output torque goes to either side of zero."""
     outputs = [out for part in problem.parts for out in part.record.outputs]
     torques = [out.values for out in outputs if out.name == OUTPUT_TORQUE]
@@ -91,7 +91,7 @@ def _is_reversed(problem: LikelihoodObjective) -> bool:
 
 
 def _search(
-    problem: LikelihoodObjective, starts: Sequence[ParameterVector], shifts: Sequence[Shift]
+    problem: ShiftObjective, starts: Sequence[ParameterVector], shifts: Sequence[Shift]
 ) -> LikelihoodFit | None:
     """Search from the fits of the lower gear, the best first; None where none leads to a minimum or
     the work runs out."""
@@ -108,8 +108,8 @@ def _search(
 
 
 def _fit_lower_gears(
-    problem: LikelihoodObjective, starts: Sequence[ParameterVector], shifts: Sequence[Shift]
-) -> list[tuple[LikelihoodObjective, ParameterVector]]:
+    problem: ShiftObjective, starts: Sequence[ParameterVector], shifts: Sequence[Shift]
+) -> list[tuple[ShiftObjective, ParameterVector]]:
     """Fit the lower gear with each sampling mode, from the best of the `starts`; best modes
     first."""
     found = []

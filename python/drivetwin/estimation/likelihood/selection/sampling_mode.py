@@ -36,9 +36,9 @@ from drivetwin.estimation.likelihood.column_products import compute_column_produ
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.optimize.staged_start import fit_lower_gear_only
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95
@@ -74,8 +74,8 @@ ROUNDS = 3
 
 
 def select_sampling_mode(
-    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
-) -> tuple[LikelihoodObjective, LikelihoodObjective]:
+    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
+) -> tuple[ShiftObjective, ShiftObjective]:
     """The problem, which has signals as read, with the kinds that promise least from `start`, and
     with the speeds, or all slow outputs, of the other kind.
 
@@ -93,7 +93,7 @@ def select_sampling_mode(
     return problem.select_modes(kinds), problem.select_modes(other)
 
 
-def _far_apart(problem: LikelihoodObjective) -> frozenset[str]:
+def _far_apart(problem: ShiftObjective) -> frozenset[str]:
     """The outputs of which half a period is nearly an age of the inputs and too far away for an
     expansion: the speeds of a log without an output torque, and all outputs where they are slow.
 
@@ -107,7 +107,7 @@ def _far_apart(problem: LikelihoodObjective) -> frozenset[str]:
     return _shown(problem) if min(periods) > SLOW else frozenset()
 
 
-def _told_near(problem: LikelihoodObjective, point: ParameterVector) -> frozenset[str] | None:
+def _told_near(problem: ShiftObjective, point: ParameterVector) -> frozenset[str] | None:
     """The kinds that promise least from `point`; None where it is far from the measurement."""
     weighted = problem.update_weighting(point)
     normal = weighted.normal(point)
@@ -116,7 +116,7 @@ def _told_near(problem: LikelihoodObjective, point: ParameterVector) -> frozense
     return _promising(weighted, point, normal)
 
 
-def refit_best_mode(problem: LikelihoodObjective, best: LikelihoodFit) -> LikelihoodFit:
+def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
     """The fit with every signal of the likeliest kind.
 
     `problem` has signals as read, `best` is its fit with some kinds. Without an output torque half
@@ -145,7 +145,7 @@ def refit_best_mode(problem: LikelihoodObjective, best: LikelihoodFit) -> Likeli
     return better_of(best, best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_outputs(best))
 
 
-def refit_slow_outputs(problem: LikelihoodObjective, best: LikelihoodFit) -> LikelihoodFit:
+def refit_slow_outputs(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
     """The fit, or where the outputs of a log with an output torque are slow that with all of them
     of the other kind, if it is likelier. `problem` has signals as read."""
     outputs = _far_apart(problem)
@@ -162,7 +162,7 @@ def refit_slow_outputs(problem: LikelihoodObjective, best: LikelihoodFit) -> Lik
 
 
 def refit_mode_beside(
-    problem: LikelihoodObjective, best: LikelihoodFit, effects: WeightedColumns
+    problem: ShiftObjective, best: LikelihoodFit, effects: WeightedColumns
 ) -> LikelihoodFit:
     """Fit with the sampling modes that are likeliest beside effects that the log shows.
 
@@ -176,7 +176,7 @@ def refit_mode_beside(
 
 
 def average_modes(
-    problem: LikelihoodObjective, best: LikelihoodFit, effects: WeightedColumns | None = None
+    problem: ShiftObjective, best: LikelihoodFit, effects: WeightedColumns | None = None
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """The fit with mean and covariance over all kinds, weighted by their likelihood, and findings
     on kinds that the log hardly tells.
@@ -200,7 +200,7 @@ def average_modes(
 
 
 def widen_over_modes(
-    problem: LikelihoodObjective, best: LikelihoodFit
+    problem: ShiftObjective, best: LikelihoodFit
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """The fit with its covariance widened up to the minimum that has the outputs which lie
     `_far_apart` of the other kind, and a finding; as it is where the deviance rises much to
@@ -243,7 +243,7 @@ def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
     return np.asarray(weight / np.sum(weight))
 
 
-def _fitted(problem: LikelihoodObjective, best: LikelihoodFit, choices: _Choices) -> _Choices:
+def _fitted(problem: ShiftObjective, best: LikelihoodFit, choices: _Choices) -> _Choices:
     """The choices as seen from the minimum of the first, those fitted that would matter: what an
     expansion says of a minimum far away is too rough to weigh it by.
 
@@ -268,7 +268,7 @@ def _fitted(problem: LikelihoodObjective, best: LikelihoodFit, choices: _Choices
 
 
 def _nearby(
-    problem: LikelihoodObjective, best: LikelihoodFit, start: ParameterVector
+    problem: ShiftObjective, best: LikelihoodFit, start: ParameterVector
 ) -> LikelihoodFit | None:
     """The minimum from `start`; None where it is surely no better than `best`, of other kinds, or
     not found with the work that is left."""
@@ -278,7 +278,7 @@ def _nearby(
         return None
 
 
-def _rise(problem: LikelihoodObjective, one: LikelihoodFit, other: LikelihoodFit) -> float:
+def _rise(problem: ShiftObjective, one: LikelihoodFit, other: LikelihoodFit) -> float:
     """Rise from `one` to the `other` of what kinds compare by, with their prices: the deviance
     where all outputs are of the other kind, Q where not."""
     kinds, others = one.problem.kinds, other.problem.kinds
@@ -306,7 +306,7 @@ def report_modes(kinds: frozenset[str]) -> list[Finding]:
 
 
 def _promising(
-    problem: LikelihoodObjective, point: ParameterVector, normal: NormalEquations
+    problem: ShiftObjective, point: ParameterVector, normal: NormalEquations
 ) -> frozenset[str]:
     """Names of the signals that are better taken for something else than read."""
     choices = _choices(problem, point, normal)
@@ -318,7 +318,7 @@ def _flipped(kinds: frozenset[str], flips: FloatArray) -> frozenset[str]:
     return kinds ^ {name for name, flip in zip(SIGNALS, flips, strict=True) if flip}
 
 
-def _price(problem: LikelihoodObjective, kinds: frozenset[str]) -> float:
+def _price(problem: ShiftObjective, kinds: frozenset[str]) -> float:
     """Compute the penalty of modes other than read: twice the logarithm of the odds against
     them."""
     speeds = _shown(problem).intersection(SPEEDS)
@@ -328,7 +328,7 @@ def _price(problem: LikelihoodObjective, kinds: frozenset[str]) -> float:
     return COMMON_PRICE * common + RARE_PRICE * rare
 
 
-def _shown(problem: LikelihoodObjective) -> frozenset[str]:
+def _shown(problem: ShiftObjective) -> frozenset[str]:
     """Names of the outputs that the log holds."""
     return frozenset(out.name for part in problem.parts for out in part.record.outputs)
 
@@ -350,7 +350,7 @@ class _Choices:
 
 
 def _choices(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     point: ParameterVector,
     normal: NormalEquations,
     effects: WeightedColumns | None = None,

@@ -22,7 +22,6 @@ from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluat
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
     NoConvergence,
@@ -42,6 +41,7 @@ from drivetwin.estimation.likelihood.selection.sampling_mode import (
     widen_over_modes,
 )
 from drivetwin.estimation.likelihood.selection.touch_point_minima import find_best_minimum
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.findings import Finding
@@ -122,7 +122,7 @@ def select_model(
 
 
 def _average_modes(
-    problem: LikelihoodObjective, best: LikelihoodFit, priors: EffectPriors
+    problem: ShiftObjective, best: LikelihoodFit, priors: EffectPriors
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """Average over sampling modes, with the effects that the log shows as further unknowns."""
     found = expand_effects(best, priors)
@@ -137,9 +137,9 @@ def _average_modes(
 def _restrict(
     wider: LikelihoodFit,
     point: ParameterVector,
-    narrower: tuple[LikelihoodObjective, ParameterVector],
+    narrower: tuple[ShiftObjective, ParameterVector],
     shifts: Sequence[Shift],
-) -> tuple[LikelihoodFit, LikelihoodObjective] | None:
+) -> tuple[LikelihoodFit, ShiftObjective] | None:
     """Fit the model without the effects that the log does not show, and return its problem.
 
     Returns None if the log shows all effects, or if the work runs out: the wider model is correct
@@ -159,7 +159,7 @@ def _restrict(
 
 
 def fit_candidates(
-    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
 ) -> LikelihoodFit:
     """Fit with every signal in its likeliest sampling mode.
 
@@ -177,7 +177,7 @@ def fit_candidates(
 
 
 def _try_fit(
-    problem: LikelihoodObjective, start: ParameterVector, shifts: Sequence[Shift]
+    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
 ) -> LikelihoodFit | None:
     """Fit up to the first plausible minimum; None if there is none.
 

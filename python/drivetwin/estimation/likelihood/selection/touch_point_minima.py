@@ -18,9 +18,9 @@ from drivetwin._util.progress import scale_progress
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
 from drivetwin.estimation.likelihood.data.input_smoothing import SMOOTHING
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective, ShiftTerm
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.selection.sampling_mode import TIE, WORSE
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.likelihood.slip_contact import SLIPPING, evaluate_contact
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95
@@ -29,7 +29,7 @@ LINGERS = 0.05
 """Time [s] that an element must slip about P0: one that just lets go passes in half of it."""
 
 
-def find_best_minimum(problem: LikelihoodObjective, best: LikelihoodFit) -> LikelihoodFit:
+def find_best_minimum(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
     """The lowest of the minima about `best`, its covariance widened up to those that Q hardly tells
     from it. `problem` has signals as read.
 
@@ -46,7 +46,7 @@ def find_best_minimum(problem: LikelihoodObjective, best: LikelihoodFit) -> Like
     return replace(found, covariance=found.covariance + np.outer(far, far) / Z95**2)
 
 
-def _others(problem: LikelihoodObjective, best: LikelihoodFit) -> Iterator[LikelihoodFit]:
+def _others(problem: ShiftObjective, best: LikelihoodFit) -> Iterator[LikelihoodFit]:
     """Minima found from either side of the P0 of each element that lingers about it."""
     problem = problem.select_modes(best.problem.kinds)
     most = WORSE * best.normal.cost / problem.size

@@ -14,8 +14,8 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, ShiftModel
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import OVER_ETA, get_parameter_spec, make_law_id
@@ -28,7 +28,7 @@ DIRECT = ("J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 
 
 def compute_parameters(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     point: ParameterVector,
     signals: Sequence[ShiftSignals],
     slips: Mapping[str, float] | None = None,
@@ -74,7 +74,7 @@ def compute_friction(
     return float(evaluate_stribeck(theta, np.array([slip]))[0][0])
 
 
-def compute_laws(problem: LikelihoodObjective, point: ParameterVector) -> dict[str, float]:
+def compute_laws(problem: ShiftObjective, point: ParameterVector) -> dict[str, float]:
     """Compute the coefficients of the friction laws of all elements, by `make_law_id`."""
     return {
         make_law_id(element.name, key): value
@@ -122,7 +122,7 @@ def compute_oscillation(structure: ShiftModel, point: ParameterVector) -> tuple[
 
 
 def compute_jacobian(
-    problem: LikelihoodObjective,
+    problem: ShiftObjective,
     point: ParameterVector,
     std: FloatArray,
     signals: Sequence[ShiftSignals],

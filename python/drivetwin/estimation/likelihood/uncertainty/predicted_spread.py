@@ -13,9 +13,9 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.noise.linear_response import STATES, build_output_row
 from drivetwin.estimation.likelihood.noise.residual_covariance import NoisePath
-from drivetwin.estimation.likelihood.objective import ShiftTerm
+from drivetwin.estimation.likelihood.noise.shift_response import STATES, build_output_row
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.spread import PredictedSpread
 

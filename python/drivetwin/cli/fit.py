@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin fit MODEL LOG...`: identify any driveline from recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from drivetwin.cli.arguments import require_logs
+from drivetwin.cli.output import (
+    JsonFlag,
+    make_table,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+    show_findings,
+    show_step,
+)
+from drivetwin.cli.outputs import Output, Shape
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from drivetwin.estimation.analysis.profile_likelihood import Profile
+    from drivetwin.findings import Finding
+    from drivetwin.fit.holdout import HeldOut
+    from drivetwin.fit.recording import Recording
+    from drivetwin.fit.result import ModelFit
+
+RESULT, MODEL, REPORT = "fit.json", "model.toml", "report.html"
+"""Files that `fit -o` writes."""
+
+
+def fit(
+    model: Annotated[
+        Path,
+        typer.Argument(metavar="MODEL", help="Model file (TOML); see 'drivetwin schema model'."),
+    ],
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG...", help="Recordings of any format.", callback=require_logs),
+    ],
+    hold_out: Annotated[
+        list[Path] | None,
+        typer.Option("--hold-out", metavar="LOG", help="Predict a recording with the fit."),
+    ] = None,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(metavar="UNKNOWN", help="Compute the profile likelihood of an unknown."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the draws of the search.")] = 0,
+    output: Annotated[
+        Path | None,
+        Output(Shape.FOLDER),
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for result, model and report."),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Identify the unknowns of a model of any driveline from recordings.
+
+    The model file has the elements of the driveline, the columns of the log for its inputs and
+    outputs, and the unknowns with first guess and prior. Print the values with intervals and
+    verdicts, the agreement of simulation and recordings, and the findings. The fitted model is
+    written as a model file.
+    """
+    from drivetwin.fit.fit import fit_network
+    from drivetwin.fit.holdout import predict
+    from drivetwin.fit.model_file import format_model, read_model
+    from drivetwin.fit.profile import compute_profile
+
+    network, channels = read_model(model)
+    answer = _Answer([one.name for one in logs])
+    with show_step(f"reading {len(logs)} recordings"):
+        recordings = list(_read_recordings(answer, logs, network, channels))
+        held = list(_read_recordings(answer, hold_out or [], network, channels))
+    with show_step(f"fitting {network.name}"):
+        answer.found = found = fit_network(network, recordings, seed=seed)
+    with show_step("predicting"):
+        names = [one.name for one in hold_out or []]
+        answer.held_out = dict(zip(names, predict(found, held), strict=True))
+    with show_step("computing profiles"):
+        answer.profiles = [compute_profile(found, name) for name in profile or []]
+    files = [] if output is None else _write_outputs(output, answer, format_model(
+        found.fitted, channels
+    ))  # fmt: skip
+    if as_json:
+        print_json(answer.to_document())
+        return
+    _print_answer(answer)
+    for file in files:
+        print_line(f"wrote {file}")
+
+
+@dataclass
+class _Answer:
+    """Everything that the command found."""
+
+    logs: Sequence[str]
+    remarks: tuple[Finding, ...] = ()
+    found: ModelFit | None = None
+    held_out: Mapping[str, HeldOut] | None = None
+    profiles: Sequence[Profile] = ()
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the content of the result file, with the profiles."""
+        from drivetwin.files.fit_file import build_fit_file
+
+        assert self.found is not None
+        file = build_fit_file(self.found, self.logs, self.held_out or {}, self.remarks)
+        document = file.model_dump(mode="json", by_alias=True)
+        if self.profiles:
+            document["profiles"] = {
+                one.parameter: {
+                    "values": one.values.tolist(),
+                    "rise": one.rise.tolist(),
+                    "interval": list(one.interval),
+                }
+                for one in self.profiles
+            }
+        return document
+
+
+def _read_recordings(
+    answer: _Answer, logs: Sequence[Path], network: Any, channels: Any
+) -> Iterator[Recording]:
+    from drivetwin.fit.read import read_recording
+
+    for log in logs:
+        recording, findings = read_recording(log, network, channels)
+        answer.remarks += findings
+        yield recording
+
+
+def _write_outputs(folder: Path, answer: _Answer, model: str) -> list[Path]:
+    """Write result, fitted model and report, all or none."""
+    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.files.fit_file import build_fit_file, format_fit_file
+    from drivetwin.report.fit import render_fit
+
+    assert answer.found is not None
+    held_out = answer.held_out or {}
+    file = build_fit_file(answer.found, answer.logs, held_out, answer.remarks)
+    texts = {
+        RESULT: format_fit_file(file),
+        MODEL: model,
+        REPORT: render_fit(answer.found, answer.logs, held_out, answer.remarks),
+    }
+    with write_atomically(folder) as place:
+        for name, text in texts.items():
+            (place / name).write_text(text, encoding="utf-8", newline="\n")
+    return [folder / name for name in texts]
+
+
+def _print_answer(answer: _Answer) -> None:
+    from drivetwin.cli.tables import build_parameter_table, list_remarks
+
+    found = answer.found
+    assert found is not None
+    title = f"{found.model.name}: {found.status.value}, Q per sample {found.chi2:.3f}"
+    print_table(build_parameter_table(found.estimates, title))
+    for remark in list_remarks(found.estimates):
+        print_paragraph(remark)
+    print_table(_build_agreement_table(answer, found))
+    print_line(f"{found.agreeing} of {len(found.starts)} starts led to the best minimum")
+    for one in answer.profiles:
+        low, high = one.interval
+        print_line(f"profile of {one.parameter}: 95 % from {low:.6g} to {high:.6g}")
+    show_findings((*answer.remarks, *found.findings))
+
+
+def _build_agreement_table(answer: _Answer, found: ModelFit) -> Table:
+    numbers = ("fit %", "rmse")
+    table = make_table("Simulation and recordings", "log", "output", *numbers, right=numbers)
+    rows = list(zip(answer.logs, found.agreement, strict=True))
+    rows += [(f"{name} (held out)", one.agreement) for name, one in (answer.held_out or {}).items()]
+    for log, agreement in rows:
+        for name, one in agreement.items():
+            table.add_row(log, name, f"{one.fit_percent:.1f}", f"{one.rmse:.4g}")
+    return table

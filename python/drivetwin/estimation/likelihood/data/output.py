@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""Compared signal of a record: samples at instants, or means over their period."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivetwin._util.arrays import FloatArray
+
+IndexArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """A compared signal: `values` (n,) stamped at the points `place` (n,) of the record's grid.
+
+    With a `window` [s] a sample is the mean over that time before its stamp, as encoders on a bus
+    send it. `centre` (n,) are the points in the middle of what a sample shows.
+    """
+
+    name: str
+    place: IndexArray
+    values: FloatArray
+    sigma: float
+    window: float = 0.0
+    centre: IndexArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+
+    def __post_init__(self) -> None:
+        """Without a window the middle is the stamp."""
+        if self.window == 0.0:
+            object.__setattr__(self, "centre", self.place)
+
+    def cut(self, count: int) -> Output:
+        """Keep the samples stamped within the first `count` points of the grid."""
+        keep = int(np.searchsorted(self.place, count))
+        return replace(
+            self, place=self.place[:keep], values=self.values[:keep], centre=self.centre[:keep]
+        )
+
+    def get_period(self, time: FloatArray) -> float:
+        """Return the sampling time [s]."""
+        return float(np.median(np.diff(time[self.place])))
+
+    def drop_first_period(self, time: FloatArray) -> Output:
+        """Keep the samples stamped a period or more after the grid `time` (N,) starts: point
+        samples and means are then both defined on it."""
+        first = int(np.searchsorted(time[self.place], time[0] + self.get_period(time)))
+        return replace(
+            self, place=self.place[first:], values=self.values[first:], centre=self.centre[first:]
+        )
+
+    def convert_to_means(self, time: FloatArray) -> Output:
+        """Interpret the samples as means over the time since the previous one."""
+        window = self.get_period(time)
+        centre = np.searchsorted(time, time[self.place] - 0.5 * window)
+        return replace(self, window=window, centre=centre)
+
+    def sample(self, time: FloatArray, column: FloatArray) -> FloatArray:
+        """Sample a quantity (N,) on the grid `time` (N,) as this sensor does; shape (n,).
+
+        Also several quantities, (N, k) to (n, k).
+        """
+        if self.window == 0.0:
+            return column[self.place]
+        return self._compute_means(time, column, self.window)
+
+    def sample_other_mode(self, time: FloatArray, column: FloatArray) -> FloatArray:
+        """Sample a quantity in the other mode (n,): means instead of point samples, or the
+        reverse."""
+        if self.window > 0.0:
+            return column[self.place]
+        return self._compute_means(time, column, self.get_period(time))
+
+    def _compute_means(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
+        """Compute means (n,) over the `window` [s] before each stamp."""
+        step = np.diff(time).reshape(-1, *[1] * (column.ndim - 1))
+        sums = np.cumsum(0.5 * (column[1:] + column[:-1]) * step, axis=0)
+        total = np.concatenate([np.zeros_like(column[:1]), sums])
+        begin = time[self.place] - window
+        after = np.clip(np.searchsorted(time, begin), 1, time.size - 1)
+        share = np.clip((begin - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
+        share = share.reshape(-1, *[1] * (column.ndim - 1))
+        before = total[after - 1] + share * (total[after] - total[after - 1])
+        return np.asarray((total[self.place] - before) / window)

@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: MIT
+"""Shifts in the likelihood: residuals of each, and the parts that their plants may have."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import InputError, SimulationError
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
+from drivetwin.estimation.likelihood.noise.residual_covariance import (
+    Whitener,
+    build_sensor_whitener,
+)
+from drivetwin.estimation.likelihood.noise.shift_noise import weight_by_inputs
+from drivetwin.estimation.likelihood.noise.shift_response import (
+    ShiftResponse,
+    build_output_row,
+    linearise_run,
+)
+from drivetwin.estimation.likelihood.objective import OBJECTIVE, LikelihoodObjective
+from drivetwin.estimation.likelihood.parametrization import TE_OFFSET, ShiftModel, retract
+from drivetwin.estimation.likelihood.plant_effect import PlantEffect
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.simulation.driveline_run import DrivelineTask
+from drivetwin.simulation.dual_clutch import Signal, Trajectory
+from drivetwin.vehicle.spec import PriorValue
+
+OWN_REACH = 3.0
+"""Distance from their prior within which unknowns of a part are sought, in its standard deviations:
+a share of an inertia stays between 0 and 1 [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftTerm:
+    """One shift: its structure, what was recorded, and the weighting of its residuals.
+
+    `record` has the inputs that drive the run; `returned` (n,) is G·(u - û), what those held back
+    would do, 0 before the part is weighted by input noise.
+    """
+
+    structure: ShiftModel
+    record: ShiftRecord
+    weighting: Whitener
+    returned: FloatArray | float = 0.0
+
+    @classmethod
+    def from_sensor_noise(cls, structure: ShiftModel, record: ShiftRecord) -> ShiftTerm:
+        """Build a part whose residuals are weighted by the sensors' noise alone."""
+        return cls(structure, record, build_sensor_whitener(record.sigma))
+
+    @property
+    def label(self) -> str:
+        """Label of the shift."""
+        return self.structure.label
+
+    @property
+    def inputs(self) -> dict[str, Signal]:
+        """Measured inputs by the names of findings."""
+        pressures = self.record.pressures.items()
+        named = {f"pressure of {name}": signal for name, signal in pressures}
+        return {TORQUE: self.record.engine_torque, **named}
+
+    @property
+    def scale_known(self) -> bool:
+        """True if an output torque is among the compared signals."""
+        return any(out.name == "output_torque" for out in self.record.outputs)
+
+    def simulate(self, point: ParameterVector) -> Trajectory | None:
+        """Simulate the part at `point`; None if the simulation fails or does not reach the end."""
+        try:
+            found = self.simulate_on(point, self.record.time)
+        except (InputError, SimulationError):
+            return None
+        return found if self._is_complete(found) else None
+
+    def evaluate(self, point: ParameterVector) -> FloatArray | None:
+        """Compute the residual (n,) at `point`; None if the simulation fails."""
+        run = self.simulate(point)
+        return None if run is None else self.compute_residual(run)
+
+    def simulate_on(self, point: ParameterVector, time: FloatArray) -> Trajectory:
+        """Simulate the part on `time` (n,) [s]; a failed run returns its status.
+
+        Raises InputError or SimulationError for an impossible description.
+        """
+        return self._build_task(point, self.get_acting_torque(point), time).simulate()
+
+    def _build_task(
+        self, point: ParameterVector, torque: Signal, time: FloatArray
+    ) -> DrivelineTask:
+        model = self.structure.build_model(point)
+        return DrivelineTask(
+            model,
+            self.structure.build_parts(point, model),
+            torque,
+            self.get_pressures(),
+            self.structure.build_start(point),
+            time,
+        )
+
+    def drop_plant_effect(self) -> ShiftTerm:
+        """Return the part with the dual clutch alone as its plant."""
+        return replace(self, structure=replace(self.structure, plant_effect=None))
+
+    def _is_complete(self, run: Trajectory) -> bool:
+        """Return whether a run reached its end with residuals that can be squared."""
+        largest = OBJECTIVE.max_residual * self.record.sigma
+        is_small = np.abs(self.compute_residual(run)) < largest  # no quotient, which may overflow
+        return run.status == "completed" and bool(np.all(is_small))
+
+    def compute_residual(self, run: Trajectory) -> FloatArray:
+        """Compute measured minus simulated (n,), the latter as for the measured inputs."""
+        return self.record.measured - self.record.sample_run(run) - self.returned
+
+    def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
+        """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
+        `point`."""
+        torque = self.get_acting_torque(point)
+        variables = self._build_task(point.to_variables(), torque, self.record.time)
+        changes = self._compute_torque_changes(point)
+        try:
+            run, derivatives = variables.differentiate(len(point.names))
+        except InputError:
+            return None
+        if not self._is_complete(run):
+            return None
+        slopes = self.record.sample_derivatives(derivatives)
+        response = self.compute_response(point, run)
+        for name, disturbance in changes.items():
+            answer = self.observe(point, response.propagate_inputs({TORQUE: disturbance}))
+            slopes[:, point.names.index(name)] = answer
+        if not np.all(np.isfinite(slopes)):
+            return None
+        return self.compute_residual(run), slopes
+
+    def _compute_torque_changes(self, point: ParameterVector) -> dict[str, FloatArray]:
+        """Compute the change (N-1,) of the acting engine torque per unit of its own unknowns.
+
+        The rate is that of the torque without noise: jitter has no age, and would seem to show one.
+        """
+        found = {}
+        age, offset = self.structure.get_unknown("te_delay"), self.structure.get_unknown(TE_OFFSET)
+        if age in point.names:
+            found[age] = self.record.compute_torque_rate(point[age])
+        if offset in point.names:
+            found[offset] = np.full(self.record.time.size - 1, -1.0)
+        return found
+
+    def compute_response(self, point: ParameterVector, run: Trajectory) -> ShiftResponse:
+        """Compute the linear response to disturbances of the inputs around `run`."""
+        return linearise_run(self.structure.build_model(point), run, self.record)
+
+    def respond_to_inputs(
+        self, point: ParameterVector, run: Trajectory, disturbance: dict[str, FloatArray]
+    ) -> FloatArray:
+        """Compute the change (n,) of the simulated samples by disturbances (N-1,) of inputs, by
+        name."""
+        return self.observe(point, self.compute_response(point, run).propagate_inputs(disturbance))
+
+    def respond_to_forces(
+        self, point: ParameterVector, run: Trajectory, force: FloatArray
+    ) -> FloatArray:
+        """Compute the change (n,) of the simulated samples by torques (N-1, 4) on the speeds of
+        engine, output and wheel."""
+        return self.observe(point, self.compute_response(point, run).propagate_forces(force))
+
+    def observe(self, point: ParameterVector, z: FloatArray) -> FloatArray:
+        """Project disturbances z (N, 4) of the state onto the compared samples (n,)."""
+        model = self.structure.build_model(point)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.concatenate(
+                [z[out.centre] @ build_output_row(model, out.name) for out in self.record.outputs]
+            )
+
+    def update_weighting(self, point: ParameterVector) -> ShiftTerm:
+        """Form the covariance of output and input noise at `point`.
+
+        Returns the part unchanged if the simulation fails there or has no finite response.
+        """
+        return self._update_weighting(point) or self
+
+    def update_inputs(self, point: ParameterVector) -> ShiftTerm:
+        """Subtract the expected input noise at `point` from the inputs, and form the weighting
+        there.
+
+        Returns the part unchanged if the simulation fails with the new inputs.
+        """
+        run = self.simulate(point)
+        noise = (
+            {} if run is None else self.weighting.estimate_input_noise(self.compute_residual(run))
+        )
+        if not noise:
+            return self
+        age = self.structure.get_value(point, "te_delay")
+        return (
+            replace(self, record=self.record.subtract_noise(noise, age))._update_weighting(point)
+            or self
+        )
+
+    def _update_weighting(self, point: ParameterVector) -> ShiftTerm | None:
+        """Form weighting and the effect of the held-back inputs at `point`; None if no run."""
+        run = self.simulate(point)
+        if run is None:
+            return None
+        model = self.structure.build_model(point)
+        response = linearise_run(model, run, self.record)
+        if not response.finite:
+            return None
+        try:
+            weighting = weight_by_inputs(model, self.record, response)
+        except np.linalg.LinAlgError:
+            return None
+        held_back = self.record.interpolate_held_back(self.structure.get_value(point, "te_delay"))
+        returned = self.observe(point, response.propagate_inputs(held_back))
+        return replace(self, weighting=weighting, returned=returned)
+
+    def add_to_inputs(self, point: ParameterVector, changes: Mapping[str, Signal]) -> ShiftTerm:
+        """Return the part driven by inputs with `changes` by name, at the instants at which they
+        act at `point`."""
+        record, age = self.record, self.structure.get_value(point, "te_delay")
+        torque, pressures = record.engine_torque, dict(record.pressures)
+        for name, change in changes.items():
+            old = torque if name == TORQUE else pressures[name]
+            acts = old.time - age if name == TORQUE else old.time
+            values = old.values + np.interp(acts, change.time, change.values)
+            new = replace(old, values=values)
+            if name == TORQUE:
+                torque = new
+            else:
+                pressures[name] = new
+        return replace(self, record=replace(record, engine_torque=torque, pressures=pressures))
+
+    def get_pressures(self) -> dict[str, Signal]:
+        """Return the pressures of all elements of the model; zero for those that stay open."""
+        ends = self.record.time[[0, -1]]
+        idle = {one.name: Signal(ends, np.zeros(2)) for one in self.structure.spinning}
+        return {**self.record.pressures, **idle}
+
+    def get_acting_torque(self, point: ParameterVector) -> Signal:
+        """Return the engine torque as it acts: measured, less its mean error, advanced by its
+        delay."""
+        signal = self.record.engine_torque
+        values = signal.values
+        offset = self.structure.get_unknown(TE_OFFSET)
+        if offset in point.names:
+            values = values - point[offset]
+        delay = self.structure.get_value(point, "te_delay")
+        return Signal(signal.time, values, -delay)
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftObjective(LikelihoodObjective[ShiftTerm]):
+    """Likelihood of shifts."""
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Names of the signals that are of another kind than read, as in `Record.kinds`."""
+        return frozenset[str]().union(*(part.record.kinds for part in self.parts))
+
+    def extend(self, effect: PlantEffect, priors: Sequence[PriorValue]) -> ShiftObjective:
+        """Add an effect to the plant of all shifts, with the `priors` of its unknowns.
+
+        These come last. They stay within some standard deviations of their prior.
+        """
+        structures = [replace(part.structure, plant_effect=effect) for part in self.parts]
+        parts = [
+            replace(part, structure=one) for part, one in zip(self.parts, structures, strict=True)
+        ]
+        prior = self.prior
+        for one in priors:
+            prior = prior.append(one.value, one.std)
+        reach = [OWN_REACH * one.std for one in priors]
+        own = [one.value for one in priors]
+        lower = np.append(self.lower, np.subtract(own, reach))
+        upper = np.append(self.upper, np.add(own, reach))
+        return ShiftObjective(tuple(parts), prior, lower, upper)
+
+    def drop_plant_effect(self) -> ShiftObjective:
+        """Return the problem of the dual clutch alone, without the unknowns of the part."""
+        effect = self.parts[0].structure.plant_effect
+        count = self.lower.size - (0 if effect is None else len(effect.unknowns))
+        prior = Prior(self.prior.mean[:count], self.prior.precision[:count, :count])
+        parts = tuple(part.drop_plant_effect() for part in self.parts)
+        return ShiftObjective(parts, prior, self.lower[:count], self.upper[:count])
+
+    def select_modes(self, names: Collection[str]) -> ShiftObjective:
+        """Set the sampling modes of all signals to those of `names`; all must be as read."""
+        parts = [
+            ShiftTerm.from_sensor_noise(p.structure, p.record.select_modes(names))
+            for p in self.parts
+        ]
+        return replace(self, parts=tuple(parts))
+
+    def cut(self, ends: Sequence[float]) -> ShiftObjective:
+        """Cut each part at its end [s]; weighted by sensor noise."""
+        cut = [
+            ShiftTerm.from_sensor_noise(part.structure, part.record.cut(end))
+            for part, end in zip(self.parts, ends, strict=True)
+        ]
+        return replace(self, parts=tuple(cut))
+
+    def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
+        """Compute the values (p,) after a `step` (p,); friction laws move along their valley."""
+        return retract(point, step)

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""`fit.json`: result of the fit of a network, for machines."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import Field, FiniteFloat
+
+from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.version import get_program_version
+from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.files.records import (
+    FindingRecord,
+    FitRecord,
+    Interval,
+    OptionalFloat,
+    ParameterRecord,
+    Record,
+    SchemaName,
+)
+from drivetwin.findings import Finding
+from drivetwin.fit.holdout import HeldOut
+from drivetwin.fit.result import ModelFit
+
+FIT_SCHEMA = "drivetwin/fit-1"
+
+
+class UnknownRecord(ParameterRecord):
+    """An unknown, SI. `minimum` is its value at the minimum, whatever its verdict; `interval` the
+    95 % interval about it, of a positive number by its logarithm."""
+
+    minimum: FiniteFloat
+    interval: Interval
+
+
+class StartRecord(Record):
+    """A start that was refined: Q of the minimum that it led to."""
+
+    cost: OptionalFloat
+    iterations: int
+
+
+class HeldOutRecord(Record):
+    """Prediction of a recording that took no part in the fit."""
+
+    log: str
+    chi2: FiniteFloat
+    fit: dict[str, FitRecord]
+
+
+class FitFile(Record):
+    """Result of a fit. `fit` is the agreement by log and output; `agreeing` the number of starts in
+    the best minimum."""
+
+    schema_name: SchemaName = FIT_SCHEMA
+    version: str
+    model: str
+    logs: list[str]
+    status: ModelStatus
+    chi2: FiniteFloat
+    cost: FiniteFloat
+    unknowns: dict[str, UnknownRecord]
+    correlation: dict[str, dict[str, FiniteFloat]]
+    fit: list[dict[str, FitRecord]]
+    starts: list[StartRecord]
+    agreeing: int
+    held_out: list[HeldOutRecord] = Field(default_factory=list)
+    findings: list[FindingRecord]
+
+
+def build_fit_file(
+    found: ModelFit,
+    logs: Sequence[str],
+    held_out: Mapping[str, HeldOut],
+    remarks: Sequence[Finding] = (),
+) -> FitFile:
+    """Build the file of a fit to `logs`, with predictions by log and `remarks` of the reader."""
+    names = [one.name for one in found.sought]
+    values = found.values
+    return FitFile(
+        version=get_program_version(),
+        model=found.model.name,
+        logs=list(logs),
+        status=found.status,
+        chi2=found.chi2,
+        cost=found.cost,
+        unknowns={
+            name: UnknownRecord(
+                value=one.value,
+                unit=one.unit,
+                std_noise=one.std_noise,
+                ci95=one.ci95,
+                std_total=one.std_total,
+                ci95_total=one.ci95_total,
+                verdict=one.verdict,
+                method=one.method,
+                reason=one.reason,
+                minimum=values[name],
+                interval=found.intervals[name],
+            )
+            for name, one in found.estimates.items()
+        },
+        correlation={
+            name: dict(zip(names, row.tolist(), strict=True))
+            for name, row in zip(names, found.correlation, strict=True)
+        },
+        fit=[_build_fits(one) for one in found.agreement],
+        starts=[StartRecord(cost=one.cost, iterations=one.iterations) for one in found.starts],
+        agreeing=found.agreeing,
+        held_out=[
+            HeldOutRecord(log=name, chi2=one.chi2, fit=_build_fits(one.agreement))
+            for name, one in held_out.items()
+        ],
+        findings=[FindingRecord.from_result(one) for one in (*remarks, *found.findings)],
+    )
+
+
+def _build_fits(agreement: Mapping[str, Any]) -> dict[str, FitRecord]:
+    return {
+        name: FitRecord(rmse=one.rmse, fit_percent=one.fit_percent)
+        for name, one in agreement.items()
+    }
+
+
+def format_fit_file(file: FitFile) -> str:
+    """Return the file as JSON text."""
+    content = to_plain_values(file.model_dump(mode="json", by_alias=True))
+    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=2) + "\n"

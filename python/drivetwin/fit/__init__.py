@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Identification of any driveline from recordings of any manoeuvre."""

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""Fit of a network to recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin.errors import InputError
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.plant import Plant
+from drivetwin.fit.recording import Recording, build_network_record
+from drivetwin.fit.result import ModelFit, conclude
+from drivetwin.fit.search import Problem, search
+from drivetwin.fit.starts import guess_start
+from drivetwin.fit.term import NetworkTerm
+from drivetwin.fit.unknown import SoughtNumber, resolve_unknown
+from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
+from drivetwin.simulation.input_value import make_input
+
+_DELAY_REACH = 5.0
+"""Standard deviations of its prior by which a delay may be off."""
+_USUAL_DELAY = 0.05
+"""Reach of a delay without prior or bounds [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Coordinates:
+    """Coordinates of the search with their priors and bounds."""
+
+    names: list[str]
+    values: list[float]
+    priors: dict[int, tuple[float, float]]
+    limits: list[tuple[float, float]]
+
+    def add(
+        self, name: str, value: float, spread: float | None, limits: tuple[float, float]
+    ) -> None:
+        if spread is not None:
+            self.priors[len(self.names)] = (value, spread)
+        self.names.append(name)
+        self.values.append(value)
+        self.limits.append(limits)
+
+
+def fit_network(model: NetworkModel, recordings: Sequence[Recording], *, seed: int = 0) -> ModelFit:
+    """Identify the unknowns of a network from recordings.
+
+    Parameters
+    ----------
+    model
+        Network with its unknowns.
+    recordings
+        One or several recordings; each has a start of its own.
+    seed
+        Seed of the draws from which the search starts.
+
+    Returns
+    -------
+    ModelFit
+        Estimates with intervals and verdicts.
+
+    Raises
+    ------
+    InputError
+        With the path of an unknown, or the name of a channel, that is wrong.
+    IdentificationError
+        Where no start leads to a minimum.
+    """
+    problem, point, sought = build_problem(model, recordings)
+    return conclude(model, sought, search(problem, point, sought, seed))
+
+
+def build_problem(
+    model: NetworkModel, recordings: Sequence[Recording]
+) -> tuple[Problem, ParameterVector, list[SoughtNumber]]:
+    """Build the objective, the first guess of all its unknowns, and those of the network."""
+    _require_consistent(model, recordings)
+    sought = [resolve_unknown(name, one, model.elements) for name, one in model.unknowns.items()]
+    found = _Coordinates([], [], {}, [])
+    for one in sought:
+        found.add(one.name, one.start, one.spread, one.limits)
+    plain = Plant(model.elements, {}, model.start, model.outputs, sought)
+    parts = []
+    for number, recording in enumerate(recordings, start=1):
+        record = build_network_record(recording, list(model.outputs), _find_reach(sought))
+        guess = guess_start(model.start, recording.start, model.elements, model.outputs, record)
+        named = {path.partition(".")[2] for one in sought for path in one.factors}
+        own = [name for name in guess.priors if name not in named]
+        label = f"log{number}" if len(recordings) > 1 else ""
+        span = (float(record.time[0]), float(record.time[-1]))
+        inputs = {
+            name: make_input(name, value, span)
+            for name, value in model.inputs.items()
+            if name not in recording.inputs
+        }
+        plant = replace(plain, inputs=inputs, start=guess.start, own=own, label=label)
+        for name in own:
+            prior = guess.priors[name]
+            limits = (-np.inf, np.inf)
+            found.add(plant.get_start_name(name), prior.value, prior.std, limits)
+        parts.append(NetworkTerm.from_sensor_noise(plant, record))
+    prior = Prior.from_independent(len(found.names), found.priors)
+    lower, upper = np.array(found.limits).T
+    point = ParameterVector(tuple(found.names), np.array(found.values))
+    return LikelihoodObjective(tuple(parts), prior, lower, upper), point, sought
+
+
+def _find_reach(sought: Sequence[SoughtNumber]) -> dict[str, float]:
+    """Find the time [s] by which each input with an unknown delay may act early or late."""
+    reach = {}
+    for one in sought:
+        for path in one.factors:
+            head, _, name = path.partition(".")
+            if head == "delay":
+                spread = _USUAL_DELAY if one.spread is None else _DELAY_REACH * one.spread
+                reach[name] = abs(one.unknown.value) + spread
+    return reach
+
+
+def _require_consistent(model: NetworkModel, recordings: Sequence[Recording]) -> None:
+    """Raise InputError for a model without unknowns, or recordings that do not fit it."""
+    refuse_faults(find_element_faults(model.elements))
+    if not model.unknowns:
+        raise InputError("the model has no unknowns", "name at least one path with a first guess")
+    if not model.outputs:
+        raise InputError("the model has no outputs", "name the quantities that were measured")
+    if not recordings:
+        raise InputError("there is no recording", "give at least one")
+    if model.start.speeds or model.start.locked:
+        return
+    raise InputError("the model has no start", "state speeds by node, as first guesses")

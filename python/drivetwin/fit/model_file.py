@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: MIT
+"""Model file: elements, channels, start and unknowns of a fit as TOML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from drivetwin._util.toml import (
+    StrictModel,
+    format_key,
+    format_text,
+    raise_faults,
+    read_toml,
+    validate_schema,
+)
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.errors import InputError
+from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.unknown import Unknown, resolve_unknown
+from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
+from drivetwin.simulation.network import Output, Start
+
+Positive = Annotated[float, Field(gt=0)]
+_REMEDY = "correct the model file; 'drivetwin schema model' prints its JSON Schema"
+
+
+class ModelFileError(InputError):
+    """A model file that describes no network to be identified."""
+
+
+class ChannelEntry(StrictModel):
+    """Column of the log that an input or output stands in: see the channel mapping."""
+
+    source: str | None = None
+    group: str | None = None
+    unit: str | None = None
+    sign: Literal[1, -1] = 1
+    scale: Positive = 1.0
+    offset: float = 0.0
+    time_shift_s: float = 0.0
+
+    def to_spec(self, name: str) -> ChannelSpec:
+        """Return the spec of the channel; without `source` the column has the `name` itself."""
+        return ChannelSpec(
+            self.source or name,
+            self.unit,
+            self.sign,
+            self.scale,
+            self.offset,
+            self.time_shift_s,
+            self.group,
+        )
+
+
+class InputEntry(ChannelEntry):
+    """`[inputs.NAME]`: a column of the log, or a constant `value` in SI."""
+
+    value: float | None = None
+
+
+class OutputEntry(ChannelEntry):
+    """`[outputs.NAME]`: a column of the log, and the quantity of the model that it measures.
+
+    `quantity` is a kind and a name, such as `["speed", "engine"]`; `sigma` the noise of a sample in
+    SI, estimated from the log where it is left out.
+    """
+
+    quantity: Annotated[list[str], Field(min_length=2, max_length=2)]
+    sigma: Positive | None = None
+
+
+class StartTable(StrictModel):
+    """`[start]`: speeds of nodes [rad/s] and twists of shafts [rad], as first guesses.
+
+    The nodes determine the speeds of all others. Those in `known` are known; `locked` are the
+    elements without slip.
+    """
+
+    speeds: dict[str, float] = Field(default_factory=dict)
+    twists: dict[str, float] = Field(default_factory=dict)
+    locked: list[str] = Field(default_factory=list)
+    known: list[str] = Field(default_factory=list)
+
+
+class UnknownTable(StrictModel):
+    """`[unknowns."PATH"]`: first guess, prior, bounds; `paths` where several numbers share it."""
+
+    value: float
+    std: Positive | None = None
+    bounds: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    paths: dict[str, float] | list[str] | None = None
+
+    @model_validator(mode="after")
+    def _check_bounds(self) -> UnknownTable:
+        if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
+            raise ValueError("bounds are the least and the largest value")
+        return self
+
+    def to_unknown(self) -> Unknown:
+        """Return the unknown."""
+        bounds = (None, None) if self.bounds is None else (self.bounds[0], self.bounds[1])
+        return Unknown(self.value, self.std, bounds, self.paths)
+
+
+class ModelTable(StrictModel):
+    """`[model]`: name of the driveline."""
+
+    name: str = "driveline"
+
+
+class NetworkFile(StrictModel):
+    """A model file."""
+
+    model: ModelTable = ModelTable()
+    elements: Annotated[list[dict[str, Any]], Field(min_length=1)]
+    inputs: dict[str, InputEntry] = Field(default_factory=dict)
+    outputs: dict[str, OutputEntry] = Field(default_factory=dict)
+    start: StartTable = StartTable()
+    unknowns: dict[str, UnknownTable] = Field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelChannels:
+    """Columns of the logs by the names of inputs and outputs, noise by output, known starts."""
+
+    inputs: Mapping[str, ChannelSpec]
+    outputs: Mapping[str, ChannelSpec]
+    sigma: Mapping[str, float]
+    known: Mapping[str, float]
+
+
+def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
+    """Read a model file.
+
+    Raises
+    ------
+    ModelFileError
+        With all faults and their key paths.
+    InputError
+        For elements that the core refuses, or an unknown whose path leads to no number.
+    """
+    document = read_toml(path, ModelFileError)
+    raise_faults(validate_schema(document, NetworkFile), ModelFileError, str(path), _REMEDY)
+    file = NetworkFile.model_validate(document)
+    elements = [_to_plain(one) for one in file.elements]
+    refuse_faults(find_element_faults(elements))
+    needed = dict.fromkeys(name for one in elements for name in list_inputs(one))
+    constant = {name: entry.value for name, entry in file.inputs.items() if entry.value is not None}
+    start = file.start
+    model = NetworkModel(
+        file.model.name,
+        elements,
+        constant,
+        Start(start.speeds, start.twists, tuple(start.locked)),
+        {name: _to_output(one.quantity) for name, one in file.outputs.items()},
+        {name: one.to_unknown() for name, one in file.unknowns.items()},
+    )
+    for name, unknown in model.unknowns.items():
+        resolve_unknown(name, unknown, elements)
+    channels = ModelChannels(
+        {
+            name: file.inputs.get(name, InputEntry()).to_spec(name)
+            for name in needed
+            if name not in constant
+        },
+        {name: one.to_spec(name) for name, one in file.outputs.items()},
+        {name: one.sigma for name, one in file.outputs.items() if one.sigma is not None},
+        _collect_known(start, str(path)),
+    )
+    return model, channels
+
+
+def _to_output(quantity: Sequence[str]) -> Output:
+    return (quantity[0], quantity[1])
+
+
+def _collect_known(start: StartTable, file: str) -> dict[str, float]:
+    stated = {**start.twists, **start.speeds}
+    missing = [name for name in start.known if name not in stated]
+    if missing:
+        raise ModelFileError(
+            f"{file}: start.known names {', '.join(missing)} without a speed or twist",
+            "state it under start.speeds or start.twists",
+        )
+    return {name: stated[name] for name in start.known}
+
+
+def _to_plain(value: Any) -> Any:
+    """Return numbers of a file without their text."""
+    if isinstance(value, dict):
+        return {key: _to_plain(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_to_plain(one) for one in value]
+    return float(value) if isinstance(value, float) else value
+
+
+def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> str:
+    """Write a model as the text of a model file."""
+    lines = ["[model]", f"name = {format_text(model.name)}"]
+    for element in model.elements:
+        lines += ["", "[[elements]]", *(_format_entry(*item) for item in dict(element).items())]
+    for name, value in model.inputs.items():
+        if isinstance(value, int | float):
+            lines += ["", f"[inputs.{format_key(name)}]", _format_entry("value", value)]
+    for name, spec in (channels.inputs if channels else {}).items():
+        lines += ["", f"[inputs.{format_key(name)}]", *_format_spec(spec)]
+    for name, output in model.outputs.items():
+        lines += ["", f"[outputs.{format_key(name)}]", _format_entry("quantity", list(output))]
+        if channels is not None:
+            lines += _format_spec(channels.outputs[name])
+            if name in channels.sigma:
+                lines.append(_format_entry("sigma", channels.sigma[name]))
+    start = model.start
+    lines += ["", "[start]", _format_entry("speeds", dict(start.speeds))]
+    lines.append(_format_entry("twists", dict(start.twists)))
+    lines.append(_format_entry("locked", list(start.locked)))
+    lines.append(_format_entry("known", list(channels.known) if channels else []))
+    for name, one in model.unknowns.items():
+        lines += ["", f"[unknowns.{format_key(name)}]", _format_entry("value", one.value)]
+        if one.std is not None:
+            lines.append(_format_entry("std", one.std))
+        low, high = one.bounds
+        if low is not None and high is not None:
+            lines.append(_format_entry("bounds", [low, high]))
+        if one.paths is not None:
+            lines.append(_format_entry("paths", one.get_factors(name)))
+    return "\n".join(lines) + "\n"
+
+
+def _format_spec(spec: ChannelSpec) -> list[str]:
+    entries: dict[str, Any] = {"source": spec.source}
+    usual = ChannelSpec(spec.source)
+    for key in ("group", "unit", "sign", "scale", "offset"):
+        if getattr(spec, key) != getattr(usual, key):
+            entries[key] = getattr(spec, key)
+    if spec.time_shift:
+        entries["time_shift_s"] = spec.time_shift
+    return [_format_entry(*item) for item in entries.items()]
+
+
+def _format_entry(key: str, value: Any) -> str:
+    return f"{format_key(key)} = {_format_value(value)}"
+
+
+def _format_value(value: Any) -> str:
+    if isinstance(value, str):
+        return format_text(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        inside = ", ".join(
+            f"{format_key(key)} = {_format_value(one)}" for key, one in value.items()
+        )
+        return f"{{{inside}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_format_value, value))}]"
+    return repr(value) if isinstance(value, int) else repr(float(value))

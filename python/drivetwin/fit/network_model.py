@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+"""Network to be identified: elements, start, compared quantities, unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from drivetwin.fit.unknown import Unknown
+from drivetwin.simulation.input_value import InputValue
+from drivetwin.simulation.network import Element, Output, Start
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkModel:
+    """Network to be identified.
+
+    `inputs` are those that no recording gives; `start` states the nodes whose speeds determine all
+    others, with first guesses; `outputs` are the compared quantities by name.
+    """
+
+    name: str
+    elements: Sequence[Element]
+    inputs: Mapping[str, InputValue]
+    start: Start
+    outputs: Mapping[str, Output]
+    unknowns: Mapping[str, Unknown]

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""Recordings of a manoeuvre: measured inputs and outputs of a network."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import InputError
+from drivetwin.estimation.data.noise import estimate_white_noise
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.likelihood.data.input_smoothing import (
+    smooth_local_cubic,
+    smooth_pressure,
+)
+from drivetwin.estimation.likelihood.data.output import Output
+from drivetwin.estimation.likelihood.data.shift_record import RECORD, fill_grid
+from drivetwin.simulation.dual_clutch import Signal
+
+_MIN_SAMPLES = 20
+"""Fewest samples of a compared quantity."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Measured quantity: `values` (n,) at `time` (n,) [s], SI.
+
+    `sigma` is the standard deviation of the white noise of a sample; estimated from the record
+    where it is None.
+    """
+
+    time: FloatArray
+    values: FloatArray
+    sigma: float | None = None
+
+    def get_noise(self) -> float:
+        """Return the noise of a sample, at least that of an ideal sensor."""
+        least = RECORD.min_noise * float(np.ptp(self.values))
+        found = estimate_white_noise(self.values) if self.sigma is None else self.sigma
+        return max(found, least, np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Recording of one manoeuvre.
+
+    Parameters
+    ----------
+    inputs
+        Measured inputs by the names that the network gives them, SI. Their noise is estimated.
+    outputs
+        Measured quantities by name.
+    start
+        Speeds of nodes [rad/s] and twists of shafts [rad] that are known at the start; all others
+        of the start of the model are unknowns.
+    """
+
+    inputs: Mapping[str, Signal]
+    outputs: Mapping[str, Measured]
+    start: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkRecord:
+    """Recording made ready for a fit.
+
+    `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
+    `inputs` drive the simulation: the values as read less `held_back`; `input_sigma` is the white
+    noise of their samples.
+    """
+
+    time: FloatArray
+    outputs: tuple[Output, ...]
+    inputs: Mapping[str, Signal]
+    input_sigma: Mapping[str, float]
+    held_back: Mapping[str, FloatArray]
+
+    @property
+    def size(self) -> int:
+        """Number of compared samples."""
+        return sum(out.values.size for out in self.outputs)
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviation of each compared sample (size,)."""
+        return np.concatenate([np.full(out.values.size, out.sigma) for out in self.outputs])
+
+    @property
+    def measured(self) -> FloatArray:
+        """Compared samples, stacked (size,)."""
+        return np.concatenate([out.values for out in self.outputs])
+
+    def sample(self, columns: Mapping[str, FloatArray]) -> FloatArray:
+        """Sample quantities (N,) or (N, p) on the grid, by name; (size,) or (size, p)."""
+        return np.concatenate([out.sample(self.time, columns[out.name]) for out in self.outputs])
+
+    def subtract_noise(
+        self, noise: Mapping[str, FloatArray], delays: Mapping[str, float]
+    ) -> NetworkRecord:
+        """Subtract the expected `noise` (N-1,) per step of the grid from the inputs, which act by
+        their `delays` [s] later."""
+        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        inputs, held_back = dict(self.inputs), dict(self.held_back)
+        for name, steps in noise.items():
+            signal = self.inputs[name]
+            at = signal.time + delays[name]
+            own = np.where(
+                (at >= middle[0]) & (at <= middle[-1]), np.interp(at, middle, steps), 0.0
+            )
+            own = smooth_local_cubic(signal.time, own)
+            inputs[name] = replace(signal, values=signal.values - own)
+            held_back[name] = self.held_back[name] + own
+        return replace(self, inputs=inputs, held_back=held_back)
+
+    def interpolate_held_back(self, delays: Mapping[str, float]) -> dict[str, FloatArray]:
+        """Compute the held-back part of each input (N-1,) in the middle of each step."""
+        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        return {
+            name: np.interp(middle, self.inputs[name].time + delays[name], values)
+            for name, values in self.held_back.items()
+        }
+
+
+def build_network_record(
+    recording: Recording, outputs: Sequence[str], reach: Mapping[str, float]
+) -> NetworkRecord:
+    """Build the record over the span that all channels cover.
+
+    Parameters
+    ----------
+    recording
+        Measured channels.
+    outputs
+        Names of the compared quantities, in their order.
+    reach
+        Time [s] by which an input may act earlier or later than it is stamped, by name.
+
+    Raises
+    ------
+    InputError
+        Where a channel is missing, holds no numbers, or the channels have too little time in
+        common.
+    """
+    _require_channels(recording, outputs)
+    inputs = recording.inputs
+    start = max(float(one.time[0]) + reach.get(name, 0.0) for name, one in inputs.items())
+    end = min(float(one.time[-1]) - reach.get(name, 0.0) for name, one in inputs.items())
+    compared = {}
+    for name in outputs:
+        one = recording.outputs[name]
+        inside = (one.time >= start) & (one.time <= end) & np.isfinite(one.values)
+        if np.count_nonzero(inside) < _MIN_SAMPLES:
+            what = f"{name}: {np.count_nonzero(inside)} samples from {start:.3f} to {end:.3f} s"
+            raise InputError(what, "record the outputs over the same time as the inputs")
+        compared[name] = replace(one, time=one.time[inside], values=one.values[inside])
+    time = fill_grid(np.unique(np.concatenate([one.time for one in compared.values()])))
+    samples = tuple(
+        Output(name, np.searchsorted(time, one.time), one.values, one.get_noise())
+        for name, one in compared.items()
+    )
+    sigma = {name: Measured(one.time, one.values).get_noise() for name, one in inputs.items()}
+    smooth = {
+        name: smooth_pressure(MeasuredSignal(one.time, one.values, sigma[name]))
+        for name, one in inputs.items()
+    }
+    return NetworkRecord(
+        time,
+        samples,
+        {name: replace(one, values=smooth[name]) for name, one in inputs.items()},
+        sigma,
+        {name: one.values - smooth[name] for name, one in inputs.items()},
+    )
+
+
+def _require_channels(recording: Recording, outputs: Sequence[str]) -> None:
+    missing = [name for name in outputs if name not in recording.outputs]
+    if missing:
+        known = ", ".join(recording.outputs)
+        raise InputError(f"the recording has no {', '.join(missing)}", f"it has {known}")
+    for name, one in recording.inputs.items():
+        if one.time.size < 2 or not np.all(np.isfinite(one.values)):
+            what = f"{name}: the input has {one.time.size} samples, or some that are no numbers"
+            raise InputError(what, "fill the gaps of an input, or cut the recording")

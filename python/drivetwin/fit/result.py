@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""Result of the fit of a network: estimates with verdicts, starts, residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.diagnostics.identifiability import report_null_directions
+from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
+    check_residuals,
+    check_weighting,
+)
+from drivetwin.estimation.likelihood.fit import compute_covariance
+from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
+from drivetwin.estimation.optimize.objective import NormalEquations
+from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
+from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.verdict import (
+    apply_errors,
+    assess,
+    assess_with_prior,
+    compute_correlation,
+)
+from drivetwin.findings import Finding
+from drivetwin.fit.gate import find_doubts, find_failures, judge_status
+from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.search import FoundMinimum, Problem, RefinedStart
+from drivetwin.fit.unknown import SoughtNumber
+from drivetwin.simulation.network import NetworkRun
+from drivetwin.vehicle.spec import PriorValue
+
+METHOD = "maximum likelihood"
+"""Method of an estimate."""
+WITH_PRIOR = "maximum likelihood with prior"
+"""Method of an estimate in which its own prior took part."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFit:
+    """Result of a fit.
+
+    `estimates` by name of the unknown; `intervals` are their 95 % intervals, those of a positive
+    number by its logarithm. `starts` are the minima that the refined starts led to, `agreeing` the
+    number of those in the best one. `agreement` compares the simulation with each recording, by
+    output.
+    """
+
+    model: NetworkModel
+    sought: Sequence[SoughtNumber]
+    minimum: OptimizeResult[Problem]
+    covariance: FloatArray
+    estimates: Mapping[str, Estimate]
+    intervals: Mapping[str, tuple[float, float]]
+    starts: tuple[RefinedStart, ...]
+    agreeing: int
+    agreement: tuple[Mapping[str, SignalFit], ...]
+    findings: tuple[Finding, ...]
+    status: ModelStatus
+
+    @property
+    def problem(self) -> Problem:
+        """Objective with its weighting at the minimum."""
+        return self.minimum.problem
+
+    @property
+    def normal(self) -> NormalEquations:
+        """Expansion of Q at the minimum."""
+        return self.minimum.normal
+
+    @property
+    def cost(self) -> float:
+        """Q at the minimum: squares of the residuals over their noise, and of the priors."""
+        return self.minimum.normal.cost
+
+    @property
+    def chi2(self) -> float:
+        """Q per sample without the priors; 1 where the model explains the recordings."""
+        return _compute_chi2(self.minimum)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values at the minimum by name of the unknown, SI, whatever their verdicts."""
+        return {one.name: one.to_value(self.minimum.point[one.name]) for one in self.sought}
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard deviations of the values by name of the unknown, SI, whatever their verdicts."""
+        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return {
+            one.name: float(std) * (value if one.is_positive else 1.0)
+            for one, std, value in zip(self.sought, spread, self.values.values(), strict=False)
+        }
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation matrix of the unknowns in their order."""
+        count = len(self.sought)
+        return compute_correlation(self.covariance[:count, :count])
+
+    @cached_property
+    def fitted(self) -> NetworkModel:
+        """Model with the values at the minimum in place of the first guesses."""
+        task = self.problem.parts[0].plant.build_task(self.minimum.point, {}, np.zeros(0))
+        unknowns = {
+            one.name: replace(one.unknown, value=self.values[one.name]) for one in self.sought
+        }
+        return replace(self.model, elements=task.elements, start=task.start, unknowns=unknowns)
+
+    def simulate(self) -> tuple[NetworkRun, ...]:
+        """Simulate every recording at the minimum, on its grid."""
+        return tuple(part.simulate(self.minimum.point) for part in self.problem.parts)
+
+
+def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMinimum) -> ModelFit:
+    """Judge the unknowns and the model at a minimum."""
+    minimum = found.result
+    problem, chi2 = minimum.problem, _compute_chi2(minimum)
+    covariance = compute_covariance(problem, minimum.normal, chi2)
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    estimates, intervals = {}, {}
+    for one, coordinate, std in zip(sought, minimum.point.values, spread, strict=False):
+        estimates[one.name] = _judge(one, float(coordinate), float(std))
+        ends = coordinate + Z95 * std * np.array([-1.0, 1.0])
+        intervals[one.name] = (one.to_value(float(ends[0])), one.to_value(float(ends[1])))
+    agreement = tuple(part.compare(minimum.point) for part in problem.parts)
+    failures = tuple(find_failures(problem.parts, minimum.normal.residuals, agreement, chi2))
+    doubts = find_doubts(problem.parts, agreement)
+    findings = (*failures, *doubts, *_collect_findings(minimum, sought))
+    estimates = apply_errors(estimates, findings)
+    return ModelFit(
+        model,
+        sought,
+        minimum,
+        covariance,
+        estimates,
+        intervals,
+        found.starts,
+        found.agreeing,
+        agreement,
+        findings,
+        judge_status(failures, findings, estimates),
+    )
+
+
+def _compute_chi2(minimum: OptimizeResult[Problem]) -> float:
+    prior = minimum.problem.prior.compute_prior_cost(minimum.point.values)
+    return (minimum.normal.cost - prior) / minimum.problem.size
+
+
+def _judge(one: SoughtNumber, coordinate: float, std: float) -> Estimate:
+    """Return the estimate of an unknown from its coordinate and its standard deviation."""
+    value = one.to_value(coordinate)
+    told = one.name, value, value * std if one.is_positive else std
+    if one.unknown.std is None:
+        return assess(*told, METHOD, spec=one.spec)
+    prior = PriorValue(one.unknown.value, one.unknown.std)
+    return assess_with_prior(told, prior, WITH_PRIOR, declared=one.spec)
+
+
+def _collect_findings(
+    minimum: OptimizeResult[Problem], sought: Sequence[SoughtNumber]
+) -> tuple[Finding, ...]:
+    """Test the residuals, and name the directions that the recordings do not identify."""
+    state = _State(minimum.problem, minimum.normal)
+    labels = [part.label for part in minimum.problem.parts]
+    sizes = np.abs(minimum.point.values)
+    for k, one in enumerate(sought):
+        if one.is_positive:
+            sizes[k] = 1.0
+    shown = {k: one.name for k, one in enumerate(sought)}
+    return (
+        *check_residuals(state, labels),
+        *check_weighting(state, labels),
+        *report_null_directions(minimum.normal.data, sizes, shown, "their priors"),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    problem: Problem
+    normal: NormalEquations

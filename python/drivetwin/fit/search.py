@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: MIT
+"""Search for the minimum of a fit: a screen of draws, then damped Gauss-Newton from the best.
+
+A forward simulation with another order of events has a gradient that knows nothing of the right
+one, so a search from one start ends in a wrong minimum in every fifth case. The screen simulates
+draws from the priors side by side; only the best are refined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin._util.progress import scale_progress
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.optimize.gauss_newton import (
+    GaussNewtonSettings,
+    OptimizeResult,
+    minimise,
+    predict_decrease,
+)
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.fit.term import NetworkTerm
+from drivetwin.fit.unknown import SoughtNumber
+from drivetwin.simulation.network_batch import NetworkScenario, simulate_network_batch
+
+Problem = LikelihoodObjective[NetworkTerm]
+
+
+@dataclass(frozen=True)
+class FitSearchSettings:
+    """Settings of the search."""
+
+    draws: int = 128
+    """Draws of the screen, the first guess among them [count]."""
+    usual_spread: float = 0.3
+    """Relative spread of the draws of a number without prior or bounds [ratio]."""
+    min_starts: int = 2
+    """Starts that are always refined [count]."""
+    max_starts: int = 8
+    """Starts that are refined while no minimum explains the recordings [count]."""
+    accept_chi2: float = 1.05
+    """Q per sample, beyond its own scatter, up to which a minimum explains the recordings [-]."""
+    far_ratio: float = 4.0
+    """Q over that of the best start from which a search is given up after its first steps [-]."""
+    same_cost: float = 2.0
+    """Difference of Q up to which two starts have led to the same minimum [-]."""
+    max_input_rounds: int = 4
+    """Largest number of successive minima over the inputs [count]."""
+    min_input_decrease: float = 5.0
+    """Decrease of Q by the expected inputs from which another minimum is sought [-]."""
+
+
+FIT_SEARCH = FitSearchSettings()
+BENT = GaussNewtonSettings(bend_ratio=0.75)
+"""Search whose steps bend along curved valleys, as those of inertias on both sides of a shaft."""
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedStart:
+    """Minimum that a start led to: Q there as its expansion by the weighting of the best start
+    predicts it, and the iterations."""
+
+    point: ParameterVector
+    cost: float
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class FoundMinimum:
+    """Best minimum, and all that were reached, in the order of their starts."""
+
+    result: OptimizeResult[Problem]
+    starts: tuple[RefinedStart, ...]
+
+    @property
+    def agreeing(self) -> int:
+        """Number of starts that led to the best minimum."""
+        best = min(one.cost for one in self.starts)
+        return sum(one.cost - best < FIT_SEARCH.same_cost for one in self.starts)
+
+
+def search(
+    problem: Problem, start: ParameterVector, sought: Sequence[SoughtNumber], seed: int
+) -> FoundMinimum:
+    """Find the minimum of Q.
+
+    Parameters
+    ----------
+    problem
+        Terms weighted by the sensors' noise.
+    start
+        First guess of all unknowns.
+    sought
+        Unknowns of the network, which come first; those of the starts stay at their guess in the
+        screen.
+    seed
+        Seed of the draws.
+
+    Raises
+    ------
+    IdentificationError
+        Where no draw can be simulated, or no start leads to a minimum.
+    """
+    with scale_progress(0.0, 0.1):
+        candidates = _screen(problem, start, sought, np.random.default_rng(seed))
+    best = _Attempts(problem)
+    for number, candidate in enumerate(candidates[: FIT_SEARCH.max_starts]):
+        with scale_progress(0.1 + 0.08 * number, 0.18 + 0.08 * number):
+            best.refine(candidate)
+        if len(best.starts) >= FIT_SEARCH.min_starts and best.explains:
+            break
+    if best.weighted is None:
+        raise IdentificationError(
+            "the simulation could not be brought onto the recordings from any start",
+            "check first guesses, bounds and units against the recordings, and the start speeds",
+        )
+    with scale_progress(0.74, 1.0):
+        return FoundMinimum(_expect_inputs(best.polish()), tuple(best.starts))
+
+
+class _Attempts:
+    """Starts refined by the sensors' noise, compared by the weighting at the best of them."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.weighted: Problem | None = None
+        self.starts: list[RefinedStart] = []
+
+    @property
+    def best(self) -> RefinedStart:
+        """Start with the lowest Q."""
+        return min(self.starts, key=lambda one: one.cost)
+
+    @property
+    def explains(self) -> bool:
+        """True if a minimum explains the recordings: Q per sample is about 1."""
+        size = self.problem.size
+        return self.best.cost / size < FIT_SEARCH.accept_chi2 + 3.0 * np.sqrt(2.0 / size)
+
+    def refine(self, start: ParameterVector) -> None:
+        """Refine a start; one that fails is left out."""
+        limit = FIT_SEARCH.far_ratio * self.rough if self.starts else np.inf
+        found = minimise(self.problem, start, rough=True, limit=limit, settings=BENT)
+        if found is None:
+            return
+        if self.weighted is None or found.normal.cost < self.rough:
+            self.rough = found.normal.cost
+            self.weighted = self.problem.update_weighting(found.point)
+            self.starts = [self._weigh(one.point, one.iterations) for one in self.starts]
+        self.starts.append(self._weigh(found.point, found.iterations))
+
+    def _weigh(self, point: ParameterVector, iterations: int) -> RefinedStart:
+        """Compute the minimum of Q that its expansion at a point predicts."""
+        assert self.weighted is not None
+        normal = self.weighted.normal(point)
+        if normal is None:
+            return RefinedStart(point, np.inf, iterations)
+        below = predict_decrease(self.weighted, point, normal.information, normal.gradient)
+        return RefinedStart(point, normal.cost - below, iterations)
+
+    def polish(self) -> OptimizeResult[Problem]:
+        """Minimise from the best start, with the weighting formed anew at the minimum."""
+        assert self.weighted is not None
+        found = minimise(self.weighted, self.best.point, settings=BENT)
+        if found is None:
+            raise IdentificationError(
+                "the simulation fails beside its best start",
+                "state priors that keep the unknowns where the driveline can be simulated",
+            )
+        again = self.weighted.update_weighting(found.point)
+        return minimise(again, found.point, settings=BENT) or found
+
+
+def _expect_inputs(found: OptimizeResult[Problem]) -> OptimizeResult[Problem]:
+    """Minimise over the inputs as well: drive the runs by those that the residuals show."""
+    for _ in range(FIT_SEARCH.max_input_rounds):
+        problem = found.problem.update_inputs(found.point)
+        again = minimise(problem, found.point, settings=BENT)
+        if again is None or again.normal.cost >= found.normal.cost:
+            break
+        decrease = found.normal.cost - again.normal.cost
+        found = again
+        if decrease < FIT_SEARCH.min_input_decrease:
+            break
+    return found
+
+
+def _screen(
+    problem: Problem,
+    start: ParameterVector,
+    sought: Sequence[SoughtNumber],
+    rng: np.random.Generator,
+) -> list[ParameterVector]:
+    """Return draws from the priors that can be simulated, the best first."""
+    draws = np.array([_draw(one, rng) for one in sought]).T
+    score = np.zeros(FIT_SEARCH.draws)
+    for part in problem.parts:
+        score += _compute_scores(part, start, sought, draws)
+    order = [int(k) for k in np.argsort(score, kind="stable") if np.isfinite(score[k])]
+    count = len(sought)
+    return [start.replace_values(np.concatenate([draws[k], start.values[count:]])) for k in order]
+
+
+def _draw(one: SoughtNumber, rng: np.random.Generator) -> FloatArray:
+    """Draw coordinates of an unknown from its prior or bounds, the first guess as the first."""
+    low, high = one.limits
+    spread = one.spread
+    if spread is None and all(bound is not None for bound in one.unknown.bounds):
+        values = rng.uniform(low, high, FIT_SEARCH.draws)
+    else:
+        usual = FIT_SEARCH.usual_spread * (1.0 if one.is_positive else abs(one.start))
+        values = one.start + (usual if spread is None else spread) * rng.standard_normal(
+            FIT_SEARCH.draws
+        )
+    values[0] = one.start
+    return np.clip(values, low, high)
+
+
+def _compute_scores(
+    part: NetworkTerm, start: ParameterVector, sought: Sequence[SoughtNumber], draws: FloatArray
+) -> FloatArray:
+    """Compute the misfit of each draw: -2 log likelihood with a noise of each output that is
+    unknown beyond that of its sensor; infinite where the run fails."""
+    task = part.plant.build_task(start, part.record.inputs, part.record.time)
+    measured = np.full((len(task.outputs), part.record.time.size), np.nan)
+    for row, out in zip(measured, part.record.outputs, strict=True):
+        row[out.place] = out.values
+    sets = {
+        path: factor * (np.exp(column) if one.is_positive else column)
+        for one, column in zip(sought, draws.T, strict=True)
+        for path, factor in one.factors.items()
+        if not path.startswith("delay.")
+    }
+    scenario = NetworkScenario(task.inputs, task.start)
+    found = simulate_network_batch(
+        task.elements, [scenario], task.time, task.outputs, sets, keep=list(measured)
+    )
+    score = np.zeros(len(draws))
+    for out, squares in zip(part.record.outputs, found.values.T, strict=True):
+        count = out.values.size
+        score += count * np.log1p(squares / (count * out.sigma**2))
+    return np.where(np.isfinite(score), score, np.inf)

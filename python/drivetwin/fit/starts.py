@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Unknowns of the start of a recording: first guesses from the channels, and weak priors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.fit.recording import NetworkRecord
+from drivetwin.simulation.network import Element, Output, Start
+from drivetwin.vehicle.spec import PriorValue
+
+_GUESS_SAMPLES = 20
+"""Samples through which a line gives the value at the start [count]."""
+_SPEED_SHARE = 0.3
+"""Standard deviation of the prior of a speed over the fastest speed in sight [ratio]."""
+_TWIST_FACTOR = 3.0
+"""Standard deviation of the prior of a twist over that by the largest torque in sight [ratio]."""
+_USUAL_TWIST = 0.3
+"""Standard deviation of the prior of a twist where no torque or stiffness is in sight [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class StartGuess:
+    """Start of a recording: the stated `start` with values from the channels, and the prior of each
+    unknown node or shaft."""
+
+    start: Start
+    priors: Mapping[str, PriorValue]
+
+
+def guess_start(
+    stated: Start,
+    known: Mapping[str, float],
+    elements: Sequence[Element],
+    outputs: Mapping[str, Output],
+    record: NetworkRecord,
+) -> StartGuess:
+    """Guess the start of a recording.
+
+    Parameters
+    ----------
+    stated
+        Start of the model: the nodes whose speeds determine all others, first guesses, elements
+        without slip.
+    known
+        Speeds [rad/s] and twists [rad] that are known at the start of this recording.
+    elements
+        Elements of the network; each of its shafts has a twist.
+    outputs
+        Compared quantities by name.
+    record
+        Their samples.
+    """
+    springs = {str(one["name"]): one for one in elements if "stiffness" in one}
+    speeds = dict(stated.speeds)
+    twists = {**dict.fromkeys(springs, 0.0), **stated.twists}
+    first = _read_first_values(outputs, record)
+    for name in speeds:
+        speeds[name] = first.get(("speed", name), speeds[name])
+    for name, one in springs.items():
+        torque = first.get(("shaft_torque", name))
+        if torque is not None:
+            twists[name] = torque / float(one["stiffness"])
+    for name, value in known.items():
+        (speeds if name in speeds else twists)[name] = value
+    fastest = max([1.0, *map(abs, speeds.values()), *map(abs, first.values())])
+    priors = {
+        name: PriorValue(value, _SPEED_SHARE * fastest)
+        for name, value in speeds.items()
+        if name not in known
+    }
+    largest = _find_largest_torque(elements, outputs, record)
+    for name, value in twists.items():
+        if name not in known:
+            stiffness = float(springs[name]["stiffness"]) if name in springs else 0.0
+            usual = largest / stiffness if stiffness > 0.0 and largest > 0.0 else _USUAL_TWIST
+            priors[name] = PriorValue(value, _TWIST_FACTOR * max(abs(value), usual))
+    return StartGuess(Start(speeds, twists, stated.locked), priors)
+
+
+def _read_first_values(outputs: Mapping[str, Output], record: NetworkRecord) -> dict[Output, float]:
+    """Read the value of each compared quantity at the start of the grid."""
+    found = {}
+    for out in record.outputs:
+        time = record.time[out.place][:_GUESS_SAMPLES] - record.time[0]
+        line = np.polynomial.polynomial.polyfit(time, out.values[:_GUESS_SAMPLES], 1)
+        found[outputs[out.name]] = float(line[0])
+    return found
+
+
+def _find_largest_torque(
+    elements: Sequence[Element], outputs: Mapping[str, Output], record: NetworkRecord
+) -> float:
+    """Find the largest torque [N m] among measured inputs and outputs; 0 where there is none."""
+    inputs = [str(one["input"]) for one in elements if one["type"] == "torque"]
+    found = [record.inputs[name].values for name in inputs if name in record.inputs]
+    torques = ("shaft_torque", "torque", "friction_torque")
+    found += [one.values for one in record.outputs if outputs[one.name][0] in torques]
+    return max((_largest(values) for values in found), default=0.0)
+
+
+def _largest(values: FloatArray | Any) -> float:
+    return float(np.max(np.abs(values)))

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""Recording of a network in the likelihood: residuals, derivatives, weighting."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import InputError
+from drivetwin.estimation.likelihood.noise.linear_response import LinearResponse
+from drivetwin.estimation.likelihood.noise.residual_covariance import (
+    InputNoise,
+    SeenOutput,
+    Whitener,
+    add_input_noise,
+    build_sensor_whitener,
+)
+from drivetwin.estimation.likelihood.objective import OBJECTIVE
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.result.agreement import compute_fit
+from drivetwin.estimation.result.estimate import SignalFit
+from drivetwin.fit.plant import Plant
+from drivetwin.fit.recording import NetworkRecord
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import NetworkRun, simulate
+from drivetwin.simulation.network_response import NetworkResponse, compute_response
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkTerm:
+    """One recording of a network.
+
+    `returned` (n,) is G·(u - û): what the part of the inputs that is held back from the run would
+    do; 0 before the term is weighted by input noise.
+    """
+
+    plant: Plant
+    record: NetworkRecord
+    weighting: Whitener
+    returned: FloatArray | float = 0.0
+
+    @classmethod
+    def from_sensor_noise(cls, plant: Plant, record: NetworkRecord) -> Self:
+        """Build a term whose residuals are weighted by the sensors' noise alone."""
+        return cls(plant, record, build_sensor_whitener(record.sigma))
+
+    @property
+    def label(self) -> str:
+        """Name of the recording among several."""
+        return self.plant.label
+
+    @property
+    def inputs(self) -> Mapping[str, Signal]:
+        """Measured inputs by the names of findings."""
+        return self.record.inputs
+
+    def simulate(self, point: ParameterVector) -> NetworkRun:
+        """Simulate at `point`; a failed run returns its status.
+
+        Raises InputError for an impossible description.
+        """
+        task = self.plant.build_task(point, self.record.inputs, self.record.time)
+        return simulate(task.elements, task.inputs, task.start, task.time, task.outputs)
+
+    def evaluate(self, point: ParameterVector) -> FloatArray | None:
+        """Compute the residual (n,) at `point`; None if the simulation fails."""
+        try:
+            run = self.simulate(point)
+        except InputError:
+            return None
+        return self._compute_residual(run)
+
+    def compare(self, point: ParameterVector) -> dict[str, SignalFit]:
+        """Compare the simulation at `point` with the recording, by output."""
+        run = self.simulate(point)
+        return {
+            out.name: compute_fit(
+                out.values,
+                out.sample(self.record.time, run.columns[self.plant.outputs[out.name]]),
+                float(np.mean(out.values)),
+            )
+            for out in self.record.outputs
+        }
+
+    def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
+        """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
+        `point`; None if the simulation fails."""
+        task = self.plant.build_task(point.to_variables(), self.record.inputs, self.record.time)
+        try:
+            found = task.differentiate(len(point.names))
+        except InputError:
+            return None
+        residual = self._compute_residual(found.run)
+        if residual is None:
+            return None
+        by_name = {name: found.derivatives[output] for name, output in self.plant.outputs.items()}
+        slopes = self.record.sample(by_name)
+        return (residual, slopes) if np.all(np.isfinite(slopes)) else None
+
+    def _compute_residual(self, run: NetworkRun) -> FloatArray | None:
+        """Compute measured minus simulated (n,), the latter as for the measured inputs; None for
+        a run that did not reach its end with residuals that can be squared."""
+        if run.status != "completed":
+            return None
+        columns = {name: run.columns[output] for name, output in self.plant.outputs.items()}
+        residual = self.record.measured - self.record.sample(columns) - self.returned
+        with np.errstate(invalid="ignore"):
+            is_small = np.abs(residual) < OBJECTIVE.max_residual * self.record.sigma
+        return residual if bool(np.all(is_small)) else None
+
+    def update_weighting(self, point: ParameterVector) -> Self:
+        """Form the covariance of output and input noise at `point`.
+
+        Returns the term unchanged if the simulation fails there or has no finite response.
+        """
+        return self._update_weighting(point) or self
+
+    def update_inputs(self, point: ParameterVector) -> Self:
+        """Subtract the expected input noise at `point` from the inputs, and form the weighting
+        there.
+
+        Returns the term unchanged if the simulation fails with the new inputs.
+        """
+        residual = self.evaluate(point)
+        noise = {} if residual is None else self.weighting.estimate_input_noise(residual)
+        if not noise:
+            return self
+        record = self.record.subtract_noise(noise, self._get_delays(point))
+        return replace(self, record=record)._update_weighting(point) or self
+
+    def _update_weighting(self, point: ParameterVector) -> Self | None:
+        found = self._compute_response(point)
+        if found is None:
+            return None
+        record, step = self.record, np.diff(self.record.time)
+        drive = {name: found.drive[name] for name in record.inputs if name in found.drive}
+        response = LinearResponse(step, found.transition, drive)
+        if not response.finite:
+            return None
+        rows = {name: found.rows[output] for name, output in self.plant.outputs.items()}
+        seen = [SeenOutput(rows[out.name], out.centre, out.sigma) for out in record.outputs]
+        power = self._compute_power(response)
+        try:
+            noise = InputNoise(seen, power, _compute_quiet_noise(seen))
+            weighting = add_input_noise(record.sigma, response, noise)
+        except np.linalg.LinAlgError:
+            return None
+        held_back = record.interpolate_held_back(self._get_delays(point))
+        z = response.propagate_inputs({name: held_back[name] for name in drive})
+        columns = {name: np.einsum("ks,ks->k", row, z) for name, row in rows.items()}
+        return replace(self, weighting=weighting, returned=record.sample(columns))
+
+    def _compute_response(self, point: ParameterVector) -> NetworkResponse | None:
+        task = self.plant.build_task(point, self.record.inputs, self.record.time)
+        outputs = list(dict.fromkeys(task.outputs))
+        try:
+            return compute_response(task.elements, task.inputs, task.start, task.time, outputs)
+        except InputError:
+            return None
+
+    def _compute_power(self, response: LinearResponse) -> dict[str, FloatArray]:
+        """Compute the variance (N-1,) of an input's noise over each step, by name."""
+        found = {}
+        for name in response.drive:
+            signal = self.record.inputs[name]
+            between = float(np.median(np.diff(signal.time)))
+            found[name] = self.record.input_sigma[name] ** 2 * between / response.step
+        return found
+
+    def _get_delays(self, point: ParameterVector) -> Mapping[str, float]:
+        task = self.plant.build_task(point, self.record.inputs, self.record.time[:2])
+        inputs = {name: task.inputs[name] for name in self.record.inputs}
+        return {name: float(one.delay) for name, one in inputs.items() if isinstance(one, Signal)}
+
+
+def _compute_quiet_noise(outputs: list[SeenOutput]) -> FloatArray:
+    """Compute the noise (S,) of a sensor of each state: the smallest change that one of the
+    outputs shows by its noise.
+
+    A state that no output sees has the largest of the others.
+    """
+    best = np.max(
+        [np.max(np.abs(np.atleast_2d(out.row)), axis=0) / out.sigma for out in outputs], 0
+    )
+    seen = best > 0.0
+    if not np.any(seen):
+        return np.ones_like(best)
+    return np.where(seen, 1.0 / np.where(seen, best, 1.0), np.max(1.0 / best[seen]))

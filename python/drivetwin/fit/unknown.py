@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""Unknowns of a fit: numbers of a network by path, with priors or bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from drivetwin._util.spelling import suggest_spelling
+from drivetwin.errors import InputError
+from drivetwin.parameters import ParameterSpec
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS, Field, FieldKind
+
+Bounds = tuple[float | None, float | None]
+"""Least and largest value, None where there is none."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """Number to be identified.
+
+    Parameters
+    ----------
+    value
+        First guess, and mean of the prior where `std` is stated; SI.
+    std
+        Standard deviation of the prior, SI; None where nothing is known. That of a positive number
+        is relative: its logarithm has the standard deviation `std / value`.
+    bounds
+        Least and largest value.
+    paths
+        Paths on which it acts, with a factor for each; None where its name is the path. With
+        several paths it is shared: `{"B2.friction.mu_c": 1.0, "B3.friction.mu_c": 1.0}`.
+    """
+
+    value: float
+    std: float | None = None
+    bounds: Bounds = (None, None)
+    paths: Mapping[str, float] | Sequence[str] | None = None
+
+    def get_factors(self, name: str) -> dict[str, float]:
+        """Return the factor of each path of the unknown with this name."""
+        if self.paths is None:
+            return {name: 1.0}
+        if isinstance(self.paths, Mapping):
+            return {path: float(factor) for path, factor in self.paths.items()}
+        return dict.fromkeys(self.paths, 1.0)
+
+
+@dataclass(frozen=True)
+class SoughtNumber:
+    """Unknown resolved against a network: a coordinate of the search.
+
+    A number that is positive by its law is sought by its logarithm. `factors` are those of its
+    paths.
+    """
+
+    name: str
+    unknown: Unknown
+    factors: Mapping[str, float]
+    is_positive: bool
+    spec: ParameterSpec
+
+    @property
+    def start(self) -> float:
+        """Coordinate of the first guess."""
+        return self.to_coordinate(self.unknown.value)
+
+    @property
+    def spread(self) -> float | None:
+        """Standard deviation of the prior of the coordinate; None where nothing is known."""
+        std = self.unknown.std
+        return std if std is None or not self.is_positive else std / self.unknown.value
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Bounds of the coordinate."""
+        low, high = self.spec.lower, self.spec.upper
+        if not self.is_positive:
+            return low, high
+        return (math.log(low) if low > 0.0 else -math.inf), math.log(high)
+
+    def to_coordinate(self, value: float) -> float:
+        """Return the coordinate of a value."""
+        return math.log(value) if self.is_positive else value
+
+    def to_value(self, coordinate: float) -> float:
+        """Return the value at a coordinate."""
+        return math.exp(coordinate) if self.is_positive else coordinate
+
+
+def resolve_unknown(
+    name: str, unknown: Unknown, elements: Sequence[Mapping[str, Any]]
+) -> SoughtNumber:
+    """Resolve an unknown against the elements of a network.
+
+    Raises InputError for a path that leads to no number, naming the known ones, for a value beyond
+    its bounds or the limits of the field, and for a prior that is no spread.
+    """
+    factors = unknown.get_factors(name)
+    fields = [one for path in factors if (one := _find_field(path, elements)) is not None]
+    low, high = (_bound(unknown.bounds[k], fields, k) for k in (0, 1))
+    first = fields[0] if fields else None
+    spec = ParameterSpec(
+        stem=name,
+        name=name,
+        symbol=name,
+        unit=_get_unit(next(iter(factors)), first),
+        meaning=first.help if first else "",
+        lower=low,
+        upper=high,
+    )
+    is_positive = low >= 0.0 and unknown.value > 0.0 and bool(fields)
+    found = SoughtNumber(name, unknown, factors, is_positive, spec)
+    _require_sound(found)
+    return found
+
+
+def _require_sound(one: SoughtNumber) -> None:
+    given, name, spec = one.unknown, one.name, one.spec
+    if not math.isfinite(given.value) or not spec.lower <= given.value <= spec.upper:
+        what = f"{name}: the value {given.value:g} is outside {spec.lower:g} to {spec.upper:g}"
+        raise InputError(what, "correct the value or its bounds")
+    if given.std is not None and not (math.isfinite(given.std) and given.std > 0.0):
+        what = f"{name}: the standard deviation {given.std:g} is no spread"
+        raise InputError(what, "give a positive number, or leave it out where nothing is known")
+
+
+def _bound(stated: float | None, fields: Sequence[Field], side: int) -> float:
+    """Return the bound of a value on one side: the stated one, or the limit of the fields."""
+    limits = [] if stated is None else [float(stated)]
+    for one in (field.limit for field in fields):
+        if one is not None:
+            ends = (one.least, one.above) if side == 0 else (one.most,)
+            limits += [end for end in ends if end is not None]
+    if side == 0:
+        return max(limits, default=-math.inf)
+    return min(limits, default=math.inf)
+
+
+def _get_unit(path: str, first: Field | None) -> str:
+    if first is not None:
+        return first.unit.replace("·", "*") or "1"
+    return "s" if path.startswith("delay.") else "1"
+
+
+def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> Field | None:
+    """Return the field of the number at a path; None for a start or a delay."""
+    head, *names = path.split(".")
+    if head in ("start", "delay"):
+        return None
+    by_name = {str(one["name"]): one for one in elements}
+    if head not in by_name:
+        hint = suggest_spelling(head, by_name)
+        known = ", ".join(by_name)
+        raise InputError(f"{path}: no element {head!r}{hint}", f"known are {known}")
+    place: Any = by_name[head]
+    fields: Mapping[str, Field] = ELEMENT_FIELDS[str(place["type"])]
+    found: Field | None = None
+    for name in names:
+        if isinstance(place, list | tuple):
+            place = place[int(name)] if name.isdecimal() and int(name) < len(place) else None
+            continue
+        known = _list_numbers(fields, place)
+        if name not in fields or name not in place:
+            hint = suggest_spelling(name, known)
+            raise InputError(f"{path}: no field {name!r}{hint}", f"known are {', '.join(known)}")
+        found, place = fields[name], place[name]
+        if found.kind is FieldKind.GROUP:
+            keys = set(place)
+            fields = next((one for one in found.group if keys <= set(one)), found.group[0])
+    if not isinstance(place, int | float) or found is None:
+        known = _list_numbers(fields, place) if isinstance(place, Mapping) else []
+        raise InputError(f"{path} is no number", f"known are {', '.join(known)}")
+    return found
+
+
+def _list_numbers(fields: Mapping[str, Field], place: Mapping[str, Any]) -> list[str]:
+    """List the fields of an element or group that hold numbers, or groups of them."""
+    wanted = (FieldKind.NUMBER, FieldKind.NUMBERS, FieldKind.ROWS, FieldKind.GROUP)
+    return [name for name, one in fields.items() if one.kind in wanted and name in place]

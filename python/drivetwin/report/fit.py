@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""Fit of a network as one HTML page that opens offline."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from drivetwin._util.display_units import NM, RPM, Display, format_significant, format_uncertainty
+from drivetwin.estimation.result.estimate import SignalFit
+from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.findings import Finding
+from drivetwin.fit.holdout import HeldOut
+from drivetwin.fit.result import ModelFit
+from drivetwin.fit.term import NetworkTerm
+from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
+from drivetwin.report.html import render_page
+from drivetwin.report.sections.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    Section,
+    TableBlock,
+    VerdictBlock,
+    make_cells,
+)
+from drivetwin.report.sections.parameters import (
+    STATUS_TONES,
+    build_findings_section,
+    build_parameter_blocks,
+)
+from drivetwin.report.style import MEASURED, MUTED, SIMULATED
+from drivetwin.simulation.network import NetworkRun
+
+_DISPLAYS = {
+    **dict.fromkeys(("speed", "slip"), RPM),
+    **dict.fromkeys(("shaft_torque", "torque", "friction_torque"), NM),
+}
+_HEIGHT = 190
+"""Height of a panel [px]."""
+_ACTIONS = {
+    ModelStatus.VALID: "Use the values and the fitted model.",
+    ModelStatus.LIMITED: "Use the identified values; see the findings for the others.",
+    ModelStatus.NOT_VALID: "Compare simulation and recording, and correct the model.",
+    ModelStatus.NOT_VALIDATED: "Compare simulation and recording.",
+}
+
+
+def render_fit(
+    found: ModelFit,
+    logs: Sequence[str],
+    held_out: Mapping[str, HeldOut],
+    remarks: Sequence[Finding] = (),
+) -> str:
+    """HTML text of the page; equal fits give equal text."""
+    parts = zip(logs, found.problem.parts, found.simulate(), strict=True)
+    figures = [_build_figure(log, part, run) for log, part, run in parts]
+    agreement = dict(zip(logs, found.agreement, strict=True))
+    agreement |= {f"{name}, held out": one.agreement for name, one in held_out.items()}
+    sections = [
+        Section("result", "Result", "", [_build_verdict(found), *_build_parameters(found)]),
+        build_findings_section((*remarks, *found.findings)),
+        Section(
+            "recordings",
+            "Recordings",
+            "Measured and simulated quantities, driven by the measured inputs.",
+            [*figures, _build_agreement_table(agreement)],
+        ),
+        Section(
+            "search",
+            "Search",
+            "Starts from the screen of draws, and the minima that they led to.",
+            [_build_start_table(found)],
+        ),
+    ]
+    subtitle = f"{found.problem.size} samples · Q per sample {found.chi2:.3f}"
+    shown = [one for one in sections if one.blocks]
+    return render_page(f"{found.model.name}: fit of {', '.join(logs)}", subtitle, shown)
+
+
+def _build_verdict(found: ModelFit) -> VerdictBlock:
+    size = format_significant(found.chi2, 3)
+    reason = f"The residuals are {size} times the noise, in squares per sample."
+    action = _ACTIONS[found.status]
+    return VerdictBlock(found.status.value, reason, action, STATUS_TONES[found.status])
+
+
+def _build_parameters(found: ModelFit) -> list[Block]:
+    count = len(found.estimates)
+    return build_parameter_blocks(found.estimates, f"{count} unknowns of the model.")
+
+
+def _build_figure(log: str, part: NetworkTerm, run: NetworkRun) -> FigureBlock:
+    """Draw the outputs of a recording, measured and simulated, and the inputs below."""
+    panels = []
+    for out in part.record.outputs:
+        output = part.plant.outputs[out.name]
+        curves = [
+            Curve("measured", part.record.time[out.place], out.values, MEASURED),
+            Curve("simulated", run.time, run.columns[output], SIMULATED),
+        ]
+        panels.append(Panel(out.name, _DISPLAYS.get(output[0], Display("")), curves))
+    for name, signal in part.record.inputs.items():
+        curve = Curve("input", signal.time, signal.values, MUTED)
+        panels.append(Panel(name, Display(""), [curve], weight=0.6))
+    view = (float(run.time[0]), float(run.time[-1]))
+    figure = plot_over_time_axis(panels, view, _HEIGHT * len(panels))
+    return FigureBlock(figure, f"{log}.", panels)
+
+
+def _build_agreement_table(agreement: Mapping[str, Mapping[str, SignalFit]]) -> TableBlock:
+    head = (*make_cells("log", "output"), *make_cells("fit %", "rmse, SI", number=True))
+    rows = [
+        (
+            *make_cells(log, name),
+            Cell(f"{one.fit_percent:.1f}", number=True),
+            Cell(format_significant(one.rmse, 3), number=True),
+        )
+        for log, fits in agreement.items()
+        for name, one in fits.items()
+    ]
+    return TableBlock("Agreement of simulation and measurement", head, rows)
+
+
+def _build_start_table(found: ModelFit) -> TableBlock:
+    best = min(one.cost for one in found.starts)
+    values = "first value" if len(found.sought) == 1 else "first values"
+    head = (Cell("start"), *make_cells("Q above the best", "iterations", number=True), Cell(values))
+    rows = []
+    for number, start in enumerate(found.starts, start=1):
+        texts = [
+            f"{one.name} {format_uncertainty(one.to_value(start.point[one.name]), None)[0]}"
+            for one in found.sought[:4]
+        ]
+        cells = (Cell(f"{start.cost - best:.2f}", number=True), Cell(f"{start.iterations}", True))
+        rows.append((Cell(str(number)), *cells, Cell(", ".join(texts), secondary=True)))
+    caption = f"{found.agreeing} of {len(found.starts)} starts led to the best minimum"
+    return TableBlock(caption, head, rows)
