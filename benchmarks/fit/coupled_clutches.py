@@ -22,6 +22,7 @@ from drivetwin.fit.unknown import Unknown
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.plates import Plates
 from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import Output
 
 PUBLISHED = (
     Path(__file__).resolve().parents[3]
@@ -152,10 +153,7 @@ def _fit_noisy(
     unknowns = {
         name: Unknown(mean, SPREAD * mean, paths=PATHS[name]) for name, mean in means.items()
     }
-    wanted = {f"w{k}": ("speed", f"J{k}") for k in (1, 2, 3, 4)}
+    wanted: dict[str, Output] = {f"w{k}": ("speed", f"J{k}") for k in (1, 2, 3, 4)}
     model = build_model(means, inputs)
     found = model.fit([Recording(inputs, outputs, known)], unknowns, wanted, seed=0)
-    return {
-        name: (float(found.estimates[name].value), float(found.estimates[name].std))
-        for name in TRUTH
-    }
+    return {name: (found.values[name], found.std[name]) for name in TRUTH}

@@ -173,10 +173,13 @@ def _derive(
 ) -> dict[str, tuple[float, float]]:
     """Return the parameters that the likelihood fit reports, with their standard deviations."""
 
+    output = bench.driveline.J_out
+    assert output is not None
+
     def compute(point: FloatArray) -> dict[str, float]:
         by_name = dict(zip(names, point.tolist(), strict=True))
         one = bench.driveline.oncoming
-        inertia = by_name["J1"] * by_name["eta"] + bench.driveline.J_out.value / one.ratio**2
+        inertia = by_name["J1"] * by_name["eta"] + output.value / one.ratio**2
         law = (by_name["mu_c"], by_name["mu_s"] - by_name["mu_c"], by_name["mu_v"])
         mu, _ = evaluate_stribeck(
             np.array([*law, np.log(by_name["v_s"])]), np.array(list(SLIPS.values()))
