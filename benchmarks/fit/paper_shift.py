@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""Shift of the paper: `Model.fit` beside the likelihood fit of `identify`, on the same noise.
+
+The likelihood fit is that without effects: one search, no selection of the load or of the sampling
+modes. Both start from the linear estimates and have the same priors, except for the off-going
+element: the likelihood fit gives it a level and a rise of its own, `Model.fit` its own mu_s. The
+age of the engine torque is minus the delay of the input.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.estimation.study import SLIPS, START_INERTIA, propagate
+from benchmarks.fit.report import format_header, format_row
+from drivetwin._util.arrays import FloatArray
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
+from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
+from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
+from drivetwin.estimation.linear.friction_points import evaluate_stribeck
+from drivetwin.estimation.linear.pipeline import identify_shift
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.fit.recording import Measured, Recording
+from drivetwin.fit.unknown import Unknown
+from drivetwin.modeling.model import Model
+from drivetwin.modeling.model_parts import Place
+from drivetwin.modeling.part import Part
+from drivetwin.simulation.driveline import ENGINE, OUTPUT, SHAFT, WHEEL, build_driveline
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, Signal
+from drivetwin.simulation.network import Output
+from tests.support.bench import Bench, Knowledge, record_bench
+
+COUNT = 3
+"""Noise realisations."""
+MU_STD, MU_V_STD, DELAY_STD = 0.2, 2e-3, 0.03
+"""Priors of the likelihood fit: mu_c and mu_s, mu_v [s/rad], age of the engine torque [s]."""
+OUTPUTS: dict[str, Output] = {
+    "output_torque": ("shaft_torque", SHAFT),
+    "engine_speed": ("speed", ENGINE),
+    "output_speed": ("speed", OUTPUT),
+    "wheel_speed": ("speed", WHEEL),
+}
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Estimates of one program: value and standard deviation by parameter; CPU time [s]."""
+
+    estimates: Mapping[str, tuple[float, float]]
+    seconds: float
+
+
+def run(seed: int) -> str:
+    """Fit all realisations by both programs.
+
+    Parameters
+    ----------
+    seed
+        Seed of the first realisation.
+
+    Returns
+    -------
+    str
+        Table by parameter: largest difference in standard deviations of the likelihood fit, ratio
+        of the stated standard deviations.
+    """
+    differences: dict[str, list[float]] = {}
+    ratios: dict[str, list[float]] = {}
+    seconds = []
+    for at in range(seed, seed + COUNT):
+        likelihood, network = fit_both(at)
+        seconds.append((likelihood.seconds, network.seconds))
+        for name, (value, std) in network.estimates.items():
+            other, spread = likelihood.estimates[name]
+            differences.setdefault(name, []).append((value - other) / spread)
+            ratios.setdefault(name, []).append(std / spread)
+    head = ("parameter", "largest difference", "least ratio", "largest ratio")
+    lines = ["## Shift of the paper: Model.fit beside identify", "", format_header(*head)]
+    for name, found in differences.items():
+        cells = [f"{max(map(abs, found)):.2f}"]
+        cells += [f"{end(ratios[name]):.2f}" for end in (min, max)]
+        lines.append(format_row(name, *cells))
+    first, second = np.mean(seconds, axis=0)
+    lines += ["", f"CPU time: likelihood fit {first:.1f} s, Model.fit {second:.1f} s.", ""]
+    return "\n".join(lines)
+
+
+def fit_both(seed: int) -> tuple[Fitted, Fitted]:
+    """Fit the realisation of a seed by the likelihood fit and by `Model.fit`."""
+    scenario = load_scenario(ScenarioName.PAPER_STEPS)
+    bench = record_bench(scenario, seed, Knowledge())
+    began = time.process_time()
+    linear = identify_shift(bench.signals, bench.driveline, START_INERTIA)
+    guess = estimate_initial_values([linear], [bench.driveline])
+    law = scenario.model.loss_law
+    problem, start = build_problem([bench.signals], [bench.driveline], law, guess)
+    first = time.process_time() - began
+    found = fit_multistart(problem, start, [bench.signals.shift])
+    values = propagate(problem, found.mean, found.covariance, bench.signals)
+    likelihood = Fitted(values, time.process_time() - began)
+    began = time.process_time()
+    network = _fit_network(bench, problem, start)
+    return likelihood, Fitted(network, first + time.process_time() - began)
+
+
+def _fit_network(
+    bench: Bench, problem: LikelihoodObjective[ShiftTerm], start: ParameterVector
+) -> dict[str, tuple[float, float]]:
+    part = problem.parts[0]
+    dual = part.structure.build_model(start)
+    record = part.record
+    outputs = {
+        one.name: Measured(record.time[one.place], one.values, one.sigma) for one in record.outputs
+    }
+    signals = bench.signals
+    measured = {ENGINE_TORQUE: signals.engine_torque, **signals.pressures}
+    inputs = {name: Signal(one.time, one.values) for name, one in measured.items()}
+    unknowns = _build_unknowns(bench, dual, start)
+    found = _build_model(bench, dual, start, inputs).fit(
+        [Recording(inputs, outputs)], unknowns, OUTPUTS, seed=0
+    )
+    values = np.array([found.values[name] for name in unknowns])
+    std = np.array([found.std[name] for name in unknowns])
+    covariance = found.correlation * np.outer(std, std)
+    return _derive(bench, list(unknowns), values, covariance)
+
+
+def _build_model(
+    bench: Bench, dual: DualClutch, start: ParameterVector, inputs: Mapping[str, Signal]
+) -> Model:
+    model = Model("shift of the paper")
+    model.add_elements(build_driveline(dual), inputs)
+    speeds: dict[Place, float] = {OUTPUT: start["start0.speed"], WHEEL: start["start0.wheel_speed"]}
+    twists: dict[Part | str, float] = {SHAFT: start["start0.twist"]}
+    model.start(speeds, twists=twists, locked=[bench.driveline.offgoing.name])
+    return model
+
+
+def _build_unknowns(bench: Bench, dual: DualClutch, start: ParameterVector) -> dict[str, Unknown]:
+    off, on = bench.driveline.offgoing.name, bench.driveline.oncoming.name
+    law = next(one.friction for one in dual.elements if one.name == on)
+
+    def share(key: str) -> tuple[str, ...]:
+        return tuple(f"{one}.friction.{key}" for one in (on, off))
+
+    guess = {key: float(getattr(law, key)) for key in ("mu_c", "mu_s", "v_s", "mu_v")}
+    return {
+        "eta": Unknown(dual.eta, paths=("i_in.loss.eta",)),
+        "J1": Unknown(dual.J1, paths=("J1.inertia",)),
+        "J_vehicle": Unknown(dual.J_v, paths=("J_v.inertia",)),
+        "load": Unknown(dual.load.constant, paths=("load.constant",)),
+        "k_o": Unknown(dual.k_o, paths=(f"{SHAFT}.stiffness",)),
+        "c_o": Unknown(dual.c_o, paths=(f"{SHAFT}.damping",)),
+        "te_delay": Unknown(-start["te_delay"], DELAY_STD, paths=(f"delay.{ENGINE_TORQUE}",)),
+        "mu_c": Unknown(guess["mu_c"], MU_STD, paths=share("mu_c")),
+        "mu_s": Unknown(guess["mu_s"], MU_STD, paths=(f"{on}.friction.mu_s",)),
+        "v_s": Unknown(guess["v_s"], guess["v_s"], paths=share("v_s")),
+        "mu_v": Unknown(guess["mu_v"], MU_V_STD, paths=share("mu_v")),
+        "mu_s of the off-going": Unknown(guess["mu_s"], MU_STD, paths=(f"{off}.friction.mu_s",)),
+    }
+
+
+def _derive(
+    bench: Bench, names: list[str], values: FloatArray, covariance: FloatArray
+) -> dict[str, tuple[float, float]]:
+    """Return the parameters that the likelihood fit reports, with their standard deviations."""
+
+    output = bench.driveline.J_out
+    assert output is not None
+
+    def compute(point: FloatArray) -> dict[str, float]:
+        by_name = dict(zip(names, point.tolist(), strict=True))
+        one = bench.driveline.oncoming
+        inertia = by_name["J1"] * by_name["eta"] + output.value / one.ratio**2
+        law = (by_name["mu_c"], by_name["mu_s"] - by_name["mu_c"], by_name["mu_v"])
+        mu, _ = evaluate_stribeck(
+            np.array([*law, np.log(by_name["v_s"])]), np.array(list(SLIPS.values()))
+        )
+        return {
+            **{key: by_name[key] for key in ("eta", "J_vehicle", "k_o", "c_o")},
+            "te_delay": -by_name["te_delay"],
+            f"J_prime_{one.gear}": inertia,
+            "Tv_over_if": by_name["load"] / bench.driveline.i_f,
+            **dict(zip(SLIPS, mu.tolist(), strict=True)),
+        }
+
+    base = compute(values)
+    steps = 1e-3 * np.sqrt(np.diag(covariance))
+    columns = [
+        (np.array(list(compute(values + step * unit).values())) - list(base.values())) / step
+        for step, unit in zip(steps, np.eye(values.size), strict=True)
+    ]
+    matrix = np.column_stack(columns)
+    std = np.sqrt(np.einsum("qp,pr,qr->q", matrix, covariance, matrix))
+    return dict(zip(base, zip(base.values(), std.tolist(), strict=True), strict=True))
