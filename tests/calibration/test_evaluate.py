@@ -43,5 +43,5 @@ def test_late_pressures_move_the_shift_by_their_delay() -> None:
     locks = []
     for delay in (0.0, 0.01):
         plant, draws = make_plant(replace(shift, pressure_delay=delay)), make_draws(shift, 4)
-        locks.append(plant.simulate(control, draws, ("shaft_torque",))[1])
+        locks.append(plant.simulate(control, draws, (shift.body.drive,))[1])
     np.testing.assert_allclose(locks[1] - locks[0], 0.01, rtol=0.1)

@@ -22,6 +22,8 @@ from tests.calibration.cases import ACTUATOR, FILLING, QUICK
 from tests.calibration.twins import STD, make_hydraulic_twin, make_twin
 
 REQUEST = Request(("2", "3"), 0.5, settings=QUICK)
+_DRAWN = {"eta": "i_in.loss.eta", "k_o": "output shaft.stiffness", "J_vehicle": "J_v.inertia"}
+"""Paths of some numbers by the parameter that they are."""
 
 
 def test_operating_point_and_limits_come_from_the_twin() -> None:
@@ -39,13 +41,13 @@ def test_draws_have_the_covariance_of_the_twin() -> None:
     twin = make_twin()
     task = build_task(twin, replace(REQUEST, spread=Spread(0.0, 0.0, 0.0), limits=()))
     sets = draw_for(task, 1500, Purpose.SEARCH).sets
-    for name, parameter in (("eta", "eta"), ("k_o", "k_o"), ("J_v", "J_vehicle")):
+    for parameter, name in _DRAWN.items():
         value = twin.parameters[parameter].value
         assert value is not None
         assert sets[name].std() / value == pytest.approx(STD, rel=0.08)
     band = 0.02 / 1.959963984540054  # half width of the friction band in standard deviations
-    assert (sets["B3.mu_c"] / 0.12).std() == pytest.approx(band, rel=0.08)
-    assert (sets["B3.mu_c"] != sets["B2.mu_c"]).all()
+    assert (sets["B3.friction.mu_c"] / 0.12).std() == pytest.approx(band, rel=0.08)
+    assert (sets["B3.friction.mu_c"] != sets["B2.friction.mu_c"]).all()
 
 
 def test_draws_follow_correlations() -> None:
@@ -57,7 +59,8 @@ def test_draws_follow_correlations() -> None:
     covariance[a, b] = covariance[b, a] = 0.9 * np.sqrt(covariance[a, a] * covariance[b, b])
     task = build_task(replace(twin, covariance=covariance), replace(REQUEST, limits=()))
     sets = draw_for(task, 800, Purpose.SEARCH).sets
-    assert np.corrcoef(sets["k_o"], sets["J_v"])[0, 1] == pytest.approx(0.9, abs=0.03)
+    pair = [sets[_DRAWN[name]] for name in ("k_o", "J_vehicle")]
+    assert np.corrcoef(*pair)[0, 1] == pytest.approx(0.9, abs=0.03)
 
 
 def test_a_twin_without_identified_values_is_refused() -> None:

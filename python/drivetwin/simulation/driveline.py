@@ -15,7 +15,7 @@ from typing import Any
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, RoadLoad, ShiftElement
 from drivetwin.simulation.element_schema import list_ports
-from drivetwin.simulation.network import Element, build_element
+from drivetwin.simulation.network import Element, Output, build_element
 from drivetwin.simulation.vehicle_parts import NO_PARTS, InputShaft, OpenConverter, VehicleParts
 
 CRANK, ENGINE, INPUT, OUTPUT, AXLE, WHEEL, VEHICLE = (
@@ -42,6 +42,33 @@ class OutputSide:
     def from_model(cls, model: DualClutch) -> OutputSide:
         """Select the output side of a model."""
         return cls(model.k_o, model.c_o, model.i_f, model.J_v, model.load)
+
+
+@dataclass(frozen=True, eq=False)
+class Driveline:
+    """Dual clutch with the parts beside it."""
+
+    model: DualClutch
+    parts: VehicleParts = NO_PARTS
+
+
+@dataclass(frozen=True)
+class VehicleBody:
+    """Inertia that moves with the vehicle: path of the number, and the torque that drives it.
+
+    The torque at the inertia [N m] is `factor` times the output `drive`.
+    """
+
+    inertia: str
+    drive: Output
+    factor: float
+
+
+def find_body(driveline: Driveline) -> VehicleBody:
+    """Find the inertia that moves with the vehicle: behind the tyre where there is one."""
+    if driveline.parts.tyre is None:
+        return VehicleBody("J_v.inertia", ("shaft_torque", SHAFT), driveline.model.i_f)
+    return VehicleBody("vehicle.inertia", ("torque", "tyre.b"), 1.0)
 
 
 def build_driveline(model: DualClutch, parts: VehicleParts = NO_PARTS) -> list[Element]:
