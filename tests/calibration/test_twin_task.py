@@ -18,8 +18,9 @@ from drivetwin.calibration.twin_task import Hardware, Request, build_task
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.simulation.shift_control import ControlledUnit
+from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.calibration.cases import ACTUATOR, FILLING, QUICK
-from tests.calibration.twins import STD, make_hydraulic_twin, make_twin
+from tests.calibration.twins import PARTS, STD, add_part, make_hydraulic_twin, make_twin
 
 REQUEST = Request(("2", "3"), 0.5, settings=QUICK)
 _DRAWN = {"eta": "i_in.loss.eta", "k_o": "output shaft.stiffness", "J_vehicle": "J_v.inertia"}
@@ -61,6 +62,34 @@ def test_draws_follow_correlations() -> None:
     sets = draw_for(task, 800, Purpose.SEARCH).sets
     pair = [sets[_DRAWN[name]] for name in ("k_o", "J_vehicle")]
     assert np.corrcoef(*pair)[0, 1] == pytest.approx(0.9, abs=0.03)
+
+
+@pytest.mark.parametrize("part", list(PARTS))
+def test_draws_contain_the_part(part: str) -> None:
+    plain = replace(REQUEST, spread=Spread(0.0, 0.0, 0.0), limits=())
+    task = build_task(add_part(make_twin(), PARTS[part]), plain)
+    assert task.maneuver.parts != NO_PARTS
+    sets = draw_for(task, 600, Purpose.SEARCH).sets
+    relative = {
+        "input shaft": ("input shaft.stiffness", np.hypot(2.0 * STD, np.hypot(STD, 2**0.5 * STD))),
+        "backlash": ("output shaft.gap", STD),
+        "tyre": ("tyre.slip_stiffness", 2**0.5 * STD),
+        "progressive shaft": ("output shaft.torque.0", None),
+    }
+    path, std = relative[part]
+    if std is None:
+        assert np.unique(sets[path]).size == 600
+    else:
+        assert sets[path].std() / sets[path].mean() == pytest.approx(std, rel=0.08)
+
+
+def test_a_part_without_an_interval_is_held() -> None:
+    twin = add_part(make_twin(), PARTS["backlash"])
+    ids, covariance = make_twin().covariance_ids, make_twin().covariance
+    known = replace(twin, covariance_ids=ids, covariance=covariance)
+    task = build_task(known, replace(REQUEST, limits=()))
+    assert task.maneuver.parts.gap == 0.02
+    assert "output shaft.gap" not in draw_for(task, 20, Purpose.SEARCH).sets
 
 
 def test_a_twin_without_identified_values_is_refused() -> None:

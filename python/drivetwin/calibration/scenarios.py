@@ -115,11 +115,11 @@ def draw_scenarios(
 def collect_scenarios(maneuver: Maneuver, drivelines: Sequence[Driveline]) -> Scenarios:
     """Collect drivelines as parameter sets; numbers that are equal in all are left out.
 
-    The start of each is its own steady acceleration: its shaft twist is a parameter too. Ratios and
-    drums are those of the maneuver.
+    The start of each is its own steady acceleration: its shaft twist is a parameter too. Ratios,
+    drums and axes of tables are those of the maneuver.
     """
     base = _describe(maneuver, maneuver.driveline)
-    tables = [_describe(maneuver, one) for one in drivelines]
+    tables = [_describe(maneuver, one.share_axes(maneuver.parts)) for one in drivelines]
     sets = {
         path: np.array([table[path] for table in tables])
         for path, value in base.items()

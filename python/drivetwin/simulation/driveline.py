@@ -51,6 +51,10 @@ class Driveline:
     model: DualClutch
     parts: VehicleParts = NO_PARTS
 
+    def share_axes(self, other: VehicleParts) -> Driveline:
+        """Return the driveline with tables of its parts over the axes of those of `other`."""
+        return Driveline(self.model, self.parts.share_axes(other))
+
 
 @dataclass(frozen=True)
 class VehicleBody:

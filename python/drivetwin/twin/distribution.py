@@ -86,7 +86,7 @@ class ModelDistribution:
         signed = (*LAW_KEYS, "Tv_over_if", "te_delay", "p_delay", PROGRESSION)
         if any(value <= 0.0 and not name.startswith(signed) for name, value in named.items()):
             return None
-        if any(abs(named.get(name, 0.0)) >= SPECS[name].upper for name in PART_IDS):
+        if not has_possible_parts(named):
             return None
         model = self.build_model(values)
         elements = tuple(
@@ -97,6 +97,11 @@ class ModelDistribution:
         if any(isinstance(law, Stribeck) and min(law.mu_c, law.mu_s) <= 0.0 for law in laws):
             return None
         return replace(model, elements=elements)
+
+
+def has_possible_parts(named: Mapping[str, float]) -> bool:
+    """Return whether the parameters of parts among `named`, by id, are below their bounds."""
+    return all(abs(named.get(name, 0.0)) < SPECS[name].upper for name in PART_IDS)
 
 
 def describe_model(
