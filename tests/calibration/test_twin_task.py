@@ -60,8 +60,8 @@ def test_draws_follow_correlations() -> None:
     covariance[a, b] = covariance[b, a] = 0.9 * np.sqrt(covariance[a, a] * covariance[b, b])
     task = build_task(replace(twin, covariance=covariance), replace(REQUEST, limits=()))
     sets = draw_for(task, 800, Purpose.SEARCH).sets
-    pair = [sets[_DRAWN[name]] for name in ("k_o", "J_vehicle")]
-    assert np.corrcoef(*pair)[0, 1] == pytest.approx(0.9, abs=0.03)
+    found = np.corrcoef(sets[_DRAWN["k_o"]], sets[_DRAWN["J_vehicle"]])
+    assert found[0, 1] == pytest.approx(0.9, abs=0.03)
 
 
 @pytest.mark.parametrize("part", list(PARTS))

@@ -92,6 +92,7 @@ PARTS = {
 
 def add_part(twin: Twin, values: Mapping[str, float]) -> Twin:
     """Return the twin with parameters of a part, by id, that it knows as well as the others."""
+    assert twin.covariance is not None
     stds = [STD * value for value in values.values()]
     own = {
         name: Estimate(name, value, std, Verdict.IDENTIFIED, "likelihood")
