@@ -83,7 +83,7 @@ def test_the_predicted_motion_is_that_of_the_whole_network(part: str, kind: Poli
         "B2": profiles.offgoing,
         "B3": profiles.oncoming,
     }
-    elements, start = assemble(shift, PARTS[part]), shift.build_network_start()
+    elements, start = assemble(shift, PARTS[part]), shift.start
     run = simulate(elements, inputs, start, shift.time, list_outputs(shift))
     assert run.status == "completed"
     for column, expected in zip(columns[0], run.columns.values(), strict=True):

@@ -42,7 +42,7 @@ def test_start_with_a_part_accelerates_steadily(part: str) -> None:
     time = shift.time[:300]
     outputs: list[Output] = [("shaft_torque", SHAFT), ("acceleration", ENGINE)]
     inputs = {name: Signal(time[[0, -1]], np.full(2, one)) for name, one in held.items()}
-    run = simulate_network(shift.elements, inputs, shift.build_network_start(), time, outputs)
+    run = simulate_network(shift.elements, inputs, shift.start, time, outputs)
     torque, rate = (run.columns[one] for one in outputs)
     assert np.ptp(torque) < 1e-4 * np.abs(torque).max()
     ratio = shift.ratios[0]

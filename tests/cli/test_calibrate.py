@@ -156,7 +156,7 @@ def test_a_twin_with_a_part_is_calibrated_with_it(part: str, tmp_path: Path) -> 
         name: Signal(shift.time, np.interp(after, one.axis.points, one.values))
         for name, one in zip((ENGINE_TORQUE, "B2", "B3"), curves, strict=True)
     }
-    start, outputs = shift.build_network_start(), list_outputs(shift)
+    start, outputs = shift.start, list_outputs(shift)
     run = simulate(assemble(shift, PARTS[part]), inputs, start, shift.time, outputs)
     torque, old, old_slip, new, new_slip = run.columns.values()
     jerk = np.gradient(0.5 * shift.model.i_f / shift.model.J_v * torque, shift.step)

@@ -47,7 +47,7 @@ def make_network(
     units: Sequence[ControlledUnit], parameters: Mapping[str, FloatArray] | None = None
 ) -> ControlledNetwork:
     """The shift with numbers (units,) that change by path."""
-    return ControlledNetwork(SHIFT.elements, SHIFT.build_network_start(), units, parameters or {})
+    return ControlledNetwork(SHIFT.elements, SHIFT.start, units, parameters or {})
 
 
 def run(unit: ControlledUnit, step: float = 1e-3) -> ControlledBatch:

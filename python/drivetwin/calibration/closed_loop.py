@@ -37,7 +37,7 @@ def compute_nominal_profiles(maneuver: Maneuver, control: Control) -> Profiles:
     """
     if isinstance(control, Profiles):
         return control
-    start = maneuver.build_network_start()
+    start = maneuver.start
     plant = ControlledNetwork(maneuver.elements, start, [control.unit], {})
     batch = simulate_network_controlled(
         plant, [control.controller], maneuver.time, [maneuver.body.drive], with_inputs=True

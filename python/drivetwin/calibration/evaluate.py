@@ -82,7 +82,7 @@ class Plant:
             shift.offgoing.name: sampled.offgoing,
             shift.oncoming.name: sampled.oncoming,
         }
-        given = to_core_scenarios([NetworkScenario(inputs, shift.build_network_start())])
+        given = to_core_scenarios([NetworkScenario(inputs, shift.start)])
         native = to_native(shift.elements, outputs)
         # Checks of `simulate_network_batch` take a tenth of a run, and these elements are built.
         asked = BatchRequest.build(given, shift.time, scenarios.sets, native, Keep.COLUMNS)
@@ -95,7 +95,7 @@ class Plant:
         """Simulate all controllers on all scenarios together; as `simulate` for each controller."""
         self.count.runs += len(controls) * scenarios.count
         shift = self.maneuver
-        start = shift.build_network_start()
+        start = shift.start
         plant = ControlledNetwork(shift.elements, start, scenarios.units, scenarios.sets)
         batch = simulate_network_controlled(
             plant,
@@ -107,8 +107,14 @@ class Plant:
         return [(batch.values[:, k], batch.last_lock[:, k]) for k in range(len(controls))]
 
     def _measure(self, columns: FloatArray, last_lock: FloatArray, chosen: Scenarios) -> Outcome:
-        vehicle = chosen.get_values(self.maneuver, self.maneuver.body.inertia)
+        vehicle = get_vehicle_inertias(self.maneuver, chosen)
         return compute_metrics(self.maneuver, columns, last_lock, vehicle, self.metrics)
+
+
+def get_vehicle_inertias(maneuver: Maneuver, scenarios: Scenarios) -> FloatArray:
+    """Return the inertia (runs,) [kg m^2] that moves with the vehicle."""
+    body = maneuver.body
+    return scenarios.sets.get(body.path, np.full(scenarios.count, body.inertia))
 
 
 def _join(parts: list[Outcome]) -> Outcome:

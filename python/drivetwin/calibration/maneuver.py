@@ -58,7 +58,7 @@ class Maneuver:
         """Network of the nominal driveline."""
         return build_driveline(self.model, self.parts)
 
-    @property
+    @cached_property
     def body(self) -> VehicleBody:
         """Inertia that moves with the vehicle."""
         return find_body(self.driveline)
@@ -97,9 +97,13 @@ class Maneuver:
         twist = compute_twist(model, driveline.parts, torque)
         return State(speed, output, wheel, twist, (self.offgoing.name,))
 
-    def build_network_start(self, driveline: Driveline | None = None) -> Start:
-        """Return this start of the network; speeds of gearbox and wheel are the nominal ones."""
-        driveline = driveline or self.driveline
+    @cached_property
+    def start(self) -> Start:
+        """Start of the nominal network."""
+        return self.build_network_start(self.driveline)
+
+    def build_network_start(self, driveline: Driveline) -> Start:
+        """Return the start of the network of a driveline, with the nominal speeds of the gear."""
         state = replace(self.build_start(), twist=self.build_start(driveline).twist)
         held = Signal(self.time[:2], np.full(2, self.point.engine_torque))
         return build_start(driveline.model, driveline.parts, state, held, 0.0)

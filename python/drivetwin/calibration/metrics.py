@@ -188,8 +188,8 @@ def compute_metrics(
 ) -> Outcome:
     """Compute the `wanted` metrics from `columns` (runs, outputs, n) as `list_outputs` orders them.
 
-    `last_lock` (runs,) [s] is that of the batch; `vehicle` (runs,) the inertia `maneuver.body`
-    [kg m^2] of each run. A run that failed has 1e6 in every metric.
+    `last_lock` (runs,) [s] is that of the batch; `vehicle` (runs,) the inertia of `maneuver.body`
+    [kg m^2] in each run. A run that failed has 1e6 in every metric.
     """
     failed = ~np.isfinite(columns).all(axis=(1, 2))
     signals = np.moveaxis(np.nan_to_num(columns) if failed.any() else columns, 1, 0)

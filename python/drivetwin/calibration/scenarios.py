@@ -7,7 +7,7 @@ of their metrics are differences of the profiles.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
@@ -64,11 +64,6 @@ class Scenarios:
         places = np.arange(self.count)[part]
         sets = {name: values[part] for name, values in self.sets.items()}
         return Scenarios(sets, places.size, [self.units[k] for k in places if self.units])
-
-    def get_values(self, maneuver: Maneuver, path: str) -> FloatArray:
-        """Return the values (runs,) of a number of the elements."""
-        drawn = self.sets.get(path)
-        return np.full(self.count, _flatten(maneuver.elements)[path]) if drawn is None else drawn
 
     def join(self, more: Scenarios) -> Scenarios:
         """Return these scenarios and `more` of the same driveline."""
@@ -131,24 +126,26 @@ def collect_scenarios(maneuver: Maneuver, drivelines: Sequence[Driveline]) -> Sc
 def _describe(maneuver: Maneuver, driveline: Driveline) -> dict[str, float]:
     """Return the numbers of elements and start that can differ between units, by path."""
     start = maneuver.build_network_start(driveline)
-    numbers = _flatten(build_driveline(driveline.model, driveline.parts))
-    own = {path: value for path, value in numbers.items() if not path.endswith(_DESIGN)}
+    own = {
+        path: value
+        for one in build_driveline(driveline.model, driveline.parts)
+        for path, value in _iterate_numbers(one["name"], one)
+        if not path.endswith(_DESIGN)
+    }
     return own | {f"start.{name}": one for name, one in {**start.speeds, **start.twists}.items()}
 
 
-def _flatten(described: object) -> dict[str, float]:
-    """Return the numbers of elements, a mapping or a list by path."""
+def _iterate_numbers(path: str, described: object) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a description with their paths."""
     if isinstance(described, int | float):
-        return {"": described}
-    if isinstance(described, list | tuple):
-        named = isinstance(described[0], dict)
-        described = {one["name"] if named else k: one for k, one in enumerate(described)}
-    pairs = described.items() if isinstance(described, dict) else ()
-    return {
-        f"{name}.{path}".removesuffix("."): value
-        for name, one in pairs
-        for path, value in _flatten(one).items()
-    }
+        yield path, described
+    elif isinstance(described, dict):
+        for key, one in described.items():
+            if not isinstance(one, str):
+                yield from _iterate_numbers(f"{path}.{key}", one)
+    elif isinstance(described, list | tuple):
+        for place, one in enumerate(described):
+            yield from _iterate_numbers(f"{path}.{place}", one)
 
 
 def is_possible(model: DualClutch) -> bool:

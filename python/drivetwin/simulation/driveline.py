@@ -58,21 +58,24 @@ class Driveline:
 
 @dataclass(frozen=True)
 class VehicleBody:
-    """Inertia that moves with the vehicle: path of the number, and the torque that drives it.
+    """Inertia that moves with the vehicle [kg m^2], path of the number, torque that drives it.
 
     The torque at the inertia [N m] is `factor` times the output `drive`.
     """
 
-    inertia: str
+    inertia: float
+    path: str
     drive: Output
     factor: float
 
 
 def find_body(driveline: Driveline) -> VehicleBody:
     """Find the inertia that moves with the vehicle: behind the tyre where there is one."""
-    if driveline.parts.tyre is None:
-        return VehicleBody("J_v.inertia", ("shaft_torque", SHAFT), driveline.model.i_f)
-    return VehicleBody("vehicle.inertia", ("torque", "tyre.b"), 1.0)
+    model, tyre = driveline.model, driveline.parts.tyre
+    if tyre is None:
+        return VehicleBody(model.J_v, "J_v.inertia", ("shaft_torque", SHAFT), model.i_f)
+    inertia = model.J_v - tyre.rim_inertia
+    return VehicleBody(inertia, "vehicle.inertia", ("torque", "tyre.b"), 1.0)
 
 
 def build_driveline(model: DualClutch, parts: VehicleParts = NO_PARTS) -> list[Element]:

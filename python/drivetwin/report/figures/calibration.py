@@ -9,7 +9,7 @@ import numpy as np
 
 from drivetwin._util.display_units import BAR, NM, Display, get_display_unit
 from drivetwin.calibration.calibrate import Assessment, Calibration
-from drivetwin.calibration.evaluate import Plant
+from drivetwin.calibration.evaluate import Plant, get_vehicle_inertias
 from drivetwin.calibration.metrics import METRICS, Metric, compute_acceleration
 from drivetwin.calibration.objective import Statistic
 from drivetwin.report.figure import Entry, Figure, make_subplots, make_trace
@@ -126,7 +126,7 @@ def _simulate_bands(found: Calibration, one: Assessment) -> tuple[_Band, _Band]:
     draws = found.fresh.select(slice(0, _DRAWN))
     outputs: tuple[Output, ...] = (shift.body.drive, ("slip", shift.oncoming.name))
     columns, _ = Plant(shift, found.task.settings.threads).simulate(one.control, draws, outputs)
-    vehicle = draws.get_values(shift, shift.body.inertia)
+    vehicle = get_vehicle_inertias(shift, draws)
     acceleration = compute_acceleration(shift, columns[:, 0], vehicle)
     return _compute_band(acceleration), _compute_band(columns[:, 1])
 
