@@ -160,7 +160,9 @@ def build_network_record(
             what = f"{name}: {np.count_nonzero(inside)} samples from {start:.3f} to {end:.3f} s"
             raise InputError(what, "record the outputs over the same time as the inputs")
         compared[name] = replace(one, time=one.time[inside], values=one.values[inside])
-    time = fill_grid(np.unique(np.concatenate([one.time for one in compared.values()])))
+    stamps = np.unique(np.concatenate([one.time for one in compared.values()]))
+    between = [float(np.median(np.diff(one.time))) for one in inputs.values()]
+    time = fill_grid(stamps, max(min(between, default=RECORD.grid_step), RECORD.grid_step))
     samples = tuple(
         Output(name, np.searchsorted(time, one.time), one.values, one.get_noise())
         for name, one in compared.items()
