@@ -88,7 +88,7 @@ def fit(
         print_line(f"wrote {file}")
 
 
-@dataclass
+@dataclass(eq=False)
 class _Answer:
     """Everything that the command found."""
 

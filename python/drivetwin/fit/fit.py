@@ -17,10 +17,10 @@ from drivetwin.fit.plant import Plant
 from drivetwin.fit.recording import Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
 from drivetwin.fit.search import Problem, search
-from drivetwin.fit.starts import guess_start
+from drivetwin.fit.starts import guess_start, list_starts
 from drivetwin.fit.term import NetworkTerm
-from drivetwin.fit.unknown import SoughtNumber, resolve_unknown
-from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
+from drivetwin.fit.unknown import SoughtNumber, require_known_places, resolve_unknown
+from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
 from drivetwin.simulation.input_value import make_input
 
 _DELAY_REACH = 5.0
@@ -88,6 +88,9 @@ def build_problem(
     plain = Plant(model.elements, {}, model.start, model.outputs, sought)
     parts = []
     for number, recording in enumerate(recordings, start=1):
+        _require_inputs(model, recording)
+        names = list_starts(model.start, model.elements)
+        require_known_places(sought, names, [*recording.inputs, *model.inputs])
         record = build_network_record(recording, list(model.outputs), _find_reach(sought))
         guess = guess_start(model.start, recording.start, model.elements, model.outputs, record)
         named = {path.partition(".")[2] for one in sought for path in one.factors}
@@ -108,6 +111,8 @@ def build_problem(
     prior = Prior.from_independent(len(found.names), found.priors)
     lower, upper = np.array(found.limits).T
     point = ParameterVector(tuple(found.names), np.array(found.values))
+    for part in parts:
+        part.simulate(point)  # raises InputError for a start or output that the network lacks
     return LikelihoodObjective(tuple(parts), prior, lower, upper), point, sought
 
 
@@ -135,3 +140,13 @@ def _require_consistent(model: NetworkModel, recordings: Sequence[Recording]) ->
     if model.start.speeds or model.start.locked:
         return
     raise InputError("the model has no start", "state speeds by node, as first guesses")
+
+
+def _require_inputs(model: NetworkModel, recording: Recording) -> None:
+    """Raise InputError where neither recording nor model gives an input of an element."""
+    used = dict.fromkeys(name for one in model.elements for name in list_inputs(one))
+    missing = [name for name in used if name not in recording.inputs and name not in model.inputs]
+    if missing:
+        what = f"the recording has no input {', '.join(map(repr, missing))}"
+        known = ", ".join(recording.inputs) or "none"
+        raise InputError(what, f"record it, or give a constant; inputs of the recording: {known}")

@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import (
+    Fault,
     StrictModel,
     format_key,
     format_text,
@@ -22,12 +25,14 @@ from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.errors import InputError
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output
-from drivetwin.fit.unknown import Unknown, resolve_unknown
+from drivetwin.fit.starts import list_starts
+from drivetwin.fit.unknown import Unknown, require_known_places, resolve_unknown
 from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
 from drivetwin.simulation.network import Start
 
 Positive = Annotated[float, Field(gt=0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Bound = Annotated[float, Field(allow_inf_nan=True)]
 _REMEDY = "correct the model file; 'drivetwin schema model' prints its JSON Schema"
 
 
@@ -90,22 +95,26 @@ class StartTable(StrictModel):
 
 
 class UnknownTable(StrictModel):
-    """`[unknowns."PATH"]`: first guess, prior, bounds; `paths` where several numbers share it."""
+    """`[unknowns."PATH"]`: first guess, prior, bounds; `paths` where several numbers share it.
+
+    A bound of `inf` or `-inf` leaves its side open.
+    """
 
     value: float
     std: Positive | None = None
-    bounds: Pair | None = None
+    bounds: Annotated[list[Bound], Field(min_length=2, max_length=2)] | None = None
     paths: dict[str, float] | list[str] | None = None
 
     @model_validator(mode="after")
     def _check_bounds(self) -> UnknownTable:
-        if self.bounds is not None and self.bounds[0] >= self.bounds[1]:
+        if self.bounds is not None and not self.bounds[0] < self.bounds[1]:
             raise ValueError("bounds are the least and the largest value")
         return self
 
     def to_unknown(self) -> Unknown:
         """Return the unknown."""
-        bounds = (None, None) if self.bounds is None else (self.bounds[0], self.bounds[1])
+        low, high = self.bounds or (-math.inf, math.inf)
+        bounds = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
         return Unknown(self.value, self.std, bounds, self.paths)
 
 
@@ -170,6 +179,7 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
     elements = [_to_plain(one) for one in file.elements]
     refuse_faults(find_element_faults(elements))
     used = [name for one in elements for name in list_inputs(one)]
+    _refuse_unused(file, used, str(path))
     needed = dict.fromkeys([*(name for name in file.inputs if name in used), *used])
     constant = {name: entry.value for name, entry in file.inputs.items() if entry.value is not None}
     start = file.start
@@ -181,8 +191,8 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         {name: to_output(one.quantity) for name, one in file.outputs.items()},
         {name: one.to_unknown() for name, one in file.unknowns.items()},
     )
-    for name, unknown in model.unknowns.items():
-        resolve_unknown(name, unknown, elements)
+    sought = [resolve_unknown(name, one, elements) for name, one in model.unknowns.items()]
+    require_known_places(sought, list_starts(model.start, elements), used)
     channels = ModelChannels(
         {
             name: file.inputs.get(name, InputEntry()).to_spec(name)
@@ -195,6 +205,20 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         file.run,
     )
     return model, channels
+
+
+def _refuse_unused(file: NetworkFile, used: Sequence[str], name: str) -> None:
+    """Raise ModelFileError for inputs that no element takes."""
+    unused = [one for one in file.inputs if one not in used]
+    of_run = [one for one in (file.run.inputs if file.run else {}) if one not in used]
+    faults = [
+        Fault(
+            f"{table}.{format_key(one)}", f"no element has this input{suggest_spelling(one, used)}"
+        )
+        for table, names in (("inputs", unused), ("run.inputs", of_run))
+        for one in names
+    ]
+    raise_faults(faults, ModelFileError, name, _REMEDY)
 
 
 def _collect_known(start: StartTable, file: str) -> dict[str, float]:
@@ -218,15 +242,14 @@ def _to_plain(value: Any) -> Any:
 
 
 def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> str:
-    """Write a model as the text of a model file."""
+    """Write a model as the text of a model file.
+
+    Raises InputError for an input that is neither a channel nor a constant.
+    """
     lines = ["[model]", f"name = {format_text(model.name)}"]
     for element in model.elements:
         lines += ["", "[[elements]]", *(_format_entry(*item) for item in dict(element).items())]
-    for name, value in model.inputs.items():
-        if isinstance(value, int | float):
-            lines += ["", f"[inputs.{format_key(name)}]", _format_entry("value", value)]
-    for name, spec in (channels.inputs if channels else {}).items():
-        lines += ["", f"[inputs.{format_key(name)}]", *_format_spec(spec)]
+    lines += _format_inputs(model, channels.inputs if channels else {})
     for name, output in model.outputs.items():
         lines += ["", f"[outputs.{format_key(name)}]", _format_entry("quantity", list(output))]
         if channels is not None:
@@ -239,15 +262,45 @@ def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> 
     lines.append(_format_entry("locked", list(start.locked)))
     lines.append(_format_entry("known", list(channels.known) if channels else []))
     for name, one in model.unknowns.items():
-        lines += ["", f"[unknowns.{format_key(name)}]", _format_entry("value", one.value)]
-        if one.std is not None:
-            lines.append(_format_entry("std", one.std))
-        low, high = one.bounds
-        if low is not None and high is not None:
-            lines.append(_format_entry("bounds", [low, high]))
-        if one.paths is not None:
-            lines.append(_format_entry("paths", one.get_factors(name)))
+        lines += ["", f"[unknowns.{format_key(name)}]", *_format_unknown(name, one)]
+    if channels is not None and channels.run is not None:
+        lines += _format_run(channels.run)
     return "\n".join(lines) + "\n"
+
+
+def _format_inputs(model: NetworkModel, recorded: Mapping[str, ChannelSpec]) -> list[str]:
+    lines = []
+    for name, value in model.inputs.items():
+        if name in recorded:
+            continue
+        if not isinstance(value, int | float):
+            what = f"the input {name!r} is no constant, which a model file cannot state"
+            raise InputError(what, "give the channel that records it")
+        lines += ["", f"[inputs.{format_key(name)}]", _format_entry("value", value)]
+    for name, spec in recorded.items():
+        lines += ["", f"[inputs.{format_key(name)}]", *_format_spec(spec)]
+    return lines
+
+
+def _format_unknown(name: str, one: Unknown) -> list[str]:
+    lines = [_format_entry("value", one.value)]
+    if one.std is not None:
+        lines.append(_format_entry("std", one.std))
+    low, high = one.bounds
+    if low is not None or high is not None:
+        ends = [-math.inf if low is None else low, math.inf if high is None else high]
+        lines.append(_format_entry("bounds", ends))
+    if one.paths is not None:
+        lines.append(_format_entry("paths", one.get_factors(name)))
+    return lines
+
+
+def _format_run(run: RunTable) -> list[str]:
+    lines = ["", "[run]", _format_entry("end_s", run.end_s), _format_entry("rate_Hz", run.rate_Hz)]
+    for name, one in run.inputs.items():
+        lines += ["", f"[run.inputs.{format_key(name)}]", _format_entry("points", one.points)]
+        lines.append(_format_entry("sigma", one.sigma))
+    return lines
 
 
 def _format_spec(spec: ChannelSpec) -> list[str]:

@@ -190,14 +190,16 @@ def build_network_record(
     """
     _require_channels(recording, outputs)
     inputs = recording.inputs
-    start = max(float(one.time[0]) + reach.get(name, 0.0) for name, one in inputs.items())
-    end = min(float(one.time[-1]) - reach.get(name, 0.0) for name, one in inputs.items())
+    late, early = -np.inf, np.inf
+    for name, signal in inputs.items():
+        late = max(late, float(signal.time[0]) + reach.get(name, 0.0))
+        early = min(early, float(signal.time[-1]) - reach.get(name, 0.0))
     compared = {}
     for name in outputs:
         one = recording.outputs[name]
-        inside = (one.time >= start) & (one.time <= end) & np.isfinite(one.values)
+        inside = (one.time >= late) & (one.time <= early) & np.isfinite(one.values)
         if np.count_nonzero(inside) < _MIN_SAMPLES:
-            what = f"{name}: {np.count_nonzero(inside)} samples from {start:.3f} to {end:.3f} s"
+            what = f"{name}: {np.count_nonzero(inside)} samples from {late:.3f} to {early:.3f} s"
             raise InputError(what, "record the outputs over the same time as the inputs")
         compared[name] = replace(one, time=one.time[inside], values=one.values[inside])
     stamps = np.unique(np.concatenate([one.time for one in compared.values()]))

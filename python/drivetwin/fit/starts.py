@@ -33,6 +33,12 @@ class StartGuess:
     priors: Mapping[str, PriorValue]
 
 
+def list_starts(stated: Start, elements: Sequence[Element]) -> list[str]:
+    """List the nodes and shafts whose start may be known or sought."""
+    springs = [str(one["name"]) for one in elements if "stiffness" in one]
+    return list(dict.fromkeys([*stated.speeds, *springs, *stated.twists]))
+
+
 def guess_start(
     stated: Start,
     known: Mapping[str, float],

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,9 +100,14 @@ def resolve_unknown(
     its bounds or the limits of the field, and for a prior that is no spread.
     """
     factors = unknown.get_factors(name)
-    fields = [one for path in factors if (one := _find_field(path, elements)) is not None]
+    if not factors:
+        raise InputError(f"{name}: there is no path", "name at least one path that it acts on")
+    if not all(math.isfinite(factor) and factor != 0.0 for factor in factors.values()):
+        raise InputError(f"{name}: a factor is zero or no number", "leave that path out")
+    found_fields = {path: _find_field(path, elements) for path in factors}
+    fields = [(one, factors[path]) for path, one in found_fields.items() if one is not None]
     low, high = (_bound(unknown.bounds[k], fields, k) for k in (0, 1))
-    first = fields[0] if fields else None
+    first = fields[0][0] if fields else None
     spec = ParameterSpec(
         stem=name,
         name=name,
@@ -128,13 +133,16 @@ def _require_sound(one: SoughtNumber) -> None:
         raise InputError(what, "give a positive number, or leave it out where nothing is known")
 
 
-def _bound(stated: float | None, fields: Sequence[Field], side: int) -> float:
-    """Return the bound of a value on one side: the stated one, or the limit of the fields."""
+def _bound(stated: float | None, fields: Sequence[tuple[Field, float]], side: int) -> float:
+    """Return the bound of a value on one side: the stated one, or a limit of the fields over the
+    factor there."""
     limits = [] if stated is None else [float(stated)]
-    for one in (field.limit for field in fields):
-        if one is not None:
-            ends = (one.least, one.above) if side == 0 else (one.most,)
-            limits += [end for end in ends if end is not None]
+    for field, factor in fields:
+        limit = field.limit
+        if limit is not None:
+            is_lower = (side == 0) == (factor > 0.0)
+            ends = (limit.least, limit.above) if is_lower else (limit.most,)
+            limits += [end / factor for end in ends if end is not None]
     if side == 0:
         return max(limits, default=-math.inf)
     return min(limits, default=math.inf)
@@ -167,7 +175,7 @@ def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> Field | Non
             place = place[int(name)] if name.isdecimal() and int(name) < len(place) else None
             continue
         known = _list_numbers(fields, place)
-        if name not in fields or name not in place:
+        if not isinstance(place, Mapping) or name not in fields or name not in place:
             hint = suggest_spelling(name, known)
             raise InputError(f"{path}: no field {name!r}{hint}", f"known are {', '.join(known)}")
         found, place = fields[name], place[name]
@@ -175,12 +183,29 @@ def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> Field | Non
             keys = set(place)
             fields = next((one for one in found.group if keys <= set(one)), found.group[0])
     if not isinstance(place, int | float) or found is None:
-        known = _list_numbers(fields, place) if isinstance(place, Mapping) else []
-        raise InputError(f"{path} is no number", f"known are {', '.join(known)}")
+        listed = ", ".join(_list_numbers(fields, place))
+        remedy = f"known are {listed}" if listed else "name a field with a number, or its place"
+        raise InputError(f"{path} is no number", remedy)
     return found
 
 
-def _list_numbers(fields: Mapping[str, Field], place: Mapping[str, Any]) -> list[str]:
+def require_known_places(
+    sought: Iterable[SoughtNumber], starts: Collection[str], inputs: Collection[str]
+) -> None:
+    """Raise InputError for an unknown start or delay of a name that the network does not have."""
+    known = {"start": ("node or shaft", starts), "delay": ("input", inputs)}
+    for path in (path for one in sought for path in one.factors):
+        head, _, name = path.partition(".")
+        what, names = known.get(head, ("", ()))
+        if what and name not in names:
+            hint = suggest_spelling(name, names)
+            listed = ", ".join(names)
+            raise InputError(f"{path}: the model has no {what} {name!r}{hint}", f"known: {listed}")
+
+
+def _list_numbers(fields: Mapping[str, Field], place: Any) -> list[str]:
     """List the fields of an element or group that hold numbers, or groups of them."""
+    if not isinstance(place, Mapping):
+        return []
     wanted = (FieldKind.NUMBER, FieldKind.NUMBERS, FieldKind.ROWS, FieldKind.GROUP)
     return [name for name, one in fields.items() if one.kind in wanted and name in place]

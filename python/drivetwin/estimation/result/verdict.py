@@ -145,8 +145,8 @@ def assess_with_prior(
     """Estimate of (id, value, standard deviation from noise) in which its own design value took
     part, with its verdict.
 
-    The card's where the log adds little. Never withheld for its width: without the log there would
-    be the card's value, which is known less.
+    The verdict is that of the design value where the log adds little. A value is never withheld
+    for its width: without the log there would be the design value, which is known less.
     """
     name, value, std = told
     spec = declared or get_parameter_spec(name)
@@ -154,7 +154,10 @@ def assess_with_prior(
         return from_prior(name, PriorValue(value), Code.FIXED_BY_CARD)
     if std >= VERDICT.prior_share * design.std:
         prior = PriorValue(value, std)
-        return replace(from_prior(name, prior, Code.CARD_DOMINATES, std_systematic), spec=declared)
+        if declared is None:
+            return from_prior(name, prior, Code.CARD_DOMINATES, std_systematic)
+        one = from_prior(name, prior, Code.PRIOR_DOMINATES, std_systematic)
+        return replace(one, method=method, spec=declared)
     one = assess(name, value, std, method, std_systematic, note, declared)
     if one.value is not None or not spec.lower <= value <= spec.upper:
         return one

@@ -37,7 +37,7 @@ class LinearResponse:
         """
         if not self.finite:
             return np.full((len(self.transition) + 1, self.states), np.nan)
-        push = np.zeros_like(next(iter(self.drive.values())))
+        push = np.zeros(self.transition.shape[:2])
         for name, values in disturbance.items():
             push += self.drive[name] * values[:, None]
         return self.propagate(push)
