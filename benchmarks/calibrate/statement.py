@@ -30,7 +30,7 @@ from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.slip_policy import build_slip_policy
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
-from drivetwin.simulation.dual_clutch import DualClutch
+from drivetwin.simulation.driveline import Driveline
 from tests.support.upshift.scenario import build_model
 from tests.support.upshift.statement import BAR, make_problem
 
@@ -109,14 +109,14 @@ def make_slip_task(settings: CalibrationSettings, seed: int) -> Task:
     actuator = IdentifiedActuator.from_design(ActuatorModel(0.020, lag, lag, 0.9))
     units = UnitDraws(actuator, actuator, 0.050, Spread())
     policy = build_slip_policy(maneuver, 10.0 * BAR, units.nominal, task=0.01)
-    draw = Draw(make_draw(maneuver).model, units)
+    draw = Draw(make_draw(maneuver).driveline, units)
     return Task(maneuver, policy, draw, list_limits(PolicyKind.SLIP), seed, settings)
 
 
 def make_draw(maneuver: Maneuver) -> Draw:
     """Return the draws of made units."""
 
-    def draw(random: np.random.Generator) -> DualClutch:
-        return scale_units(maneuver.model, Spread(), random)
+    def draw(random: np.random.Generator) -> Driveline:
+        return Driveline(scale_units(maneuver.model, Spread(), random))
 
     return Draw(draw)

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 PYTHON_WORDS = {
-    "--drop-part": "Twin.drop_part()",
     "(--channels": "(argument 'mapping'",
     "with --channels": "with the argument 'mapping'",
     "--method likelihood": "method='likelihood'",

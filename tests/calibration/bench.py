@@ -15,7 +15,9 @@ from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.dyno.sensor_effects import compute_torque_error
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.logs.write import convert_to_recorded_units, write_log
-from drivetwin.simulation.dual_clutch import DualClutch, simulate
+from drivetwin.simulation.driveline_run import DrivelineTask
+from drivetwin.simulation.dual_clutch import DualClutch
+from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 from tests.calibration.cases import SYSTEM, build_profiles
 
 _SPEED, _TORQUE, _PRESSURE = Quantity.SPEED, Quantity.TORQUE, Quantity.PRESSURE
@@ -30,8 +32,14 @@ SENSORS = (
 )
 
 
-def write_bench_log(path: Path, model: DualClutch, late: float = 0.0, seed: int = 1) -> None:
-    """Write the log of a power-on upshift of `model` with the starting values of the policy.
+def write_bench_log(
+    path: Path,
+    model: DualClutch,
+    late: float = 0.0,
+    seed: int = 1,
+    parts: VehicleParts = NO_PARTS,
+) -> None:
+    """Write the log of a power-on upshift of a driveline with the starting values of the policy.
 
     Pressures act `late` [s] behind the logged ones.
     """
@@ -43,13 +51,14 @@ def write_bench_log(path: Path, model: DualClutch, late: float = 0.0, seed: int 
     acting = given.delay_pressures(late).sample(
         1e-3 * np.arange(round(1e3 * shift.horizon) + 1, dtype=np.float64)
     )
-    run = simulate(
+    run = DrivelineTask(
         model,
+        parts,
         given.engine_torque,
         {"B2": acting.offgoing, "B3": acting.oncoming},
         shift.build_start(),
         seen,
-    )
+    ).simulate()
     inputs = {
         "engine_torque": given.engine_torque,
         **{f"pressure.{name}": one for name, one in pressures.items()},

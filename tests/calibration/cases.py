@@ -28,7 +28,8 @@ from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.slip_policy import SlipPolicy, build_slip_policy
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
-from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad
+from drivetwin.simulation.driveline import Driveline
+from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.simulation.shift_control import ControlledUnit
 from tests.support.upshift.scenario import build_model
 from tests.support.upshift.statement import BAR, make_problem
@@ -77,8 +78,8 @@ def make_draw(maneuver: Maneuver, spread: Spread | None = None) -> Draw:
     """Made units around the driveline of a shift."""
     given = spread or Spread()
 
-    def draw(random: np.random.Generator) -> DualClutch:
-        return scale_units(maneuver.model, given, random)
+    def draw(random: np.random.Generator) -> Driveline:
+        return Driveline(scale_units(maneuver.model, given, random))
 
     return Draw(draw)
 
@@ -115,7 +116,7 @@ def make_slip_task(limits: tuple[Limit, ...] = ()) -> Task:
     maneuver = make_upshift(step=2e-3)
     policy = make_slip_policy(maneuver)
     units = UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread())
-    draw = Draw(make_draw(maneuver).model, units)
+    draw = Draw(make_draw(maneuver).driveline, units)
     return Task(maneuver, policy, draw, limits, 1, QUICK)
 
 

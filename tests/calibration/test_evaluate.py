@@ -1,18 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""Runs over scenarios: independent of chunks, and of which metrics are asked for."""
+"""Runs over scenarios: independent of chunks and wanted metrics, with the parts of the vehicle."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration import evaluate
+from drivetwin.calibration.calibrate import Task, draw_for
+from drivetwin.calibration.closed_loop import ClosedLoop, compute_nominal_profiles
 from drivetwin.calibration.controller_policy import build_controller_policy
-from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.identified_range import simulate_nominal
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.metrics import Metric, Outcome, list_outputs
 from drivetwin.calibration.policy import Space
-from tests.calibration.cases import SYSTEM, make_draws, make_plant, make_upshift
+from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.scenarios import Purpose, collect_scenarios
+from drivetwin.calibration.twin_task import Request, build_task
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE
+from drivetwin.simulation.network import simulate
+from drivetwin.simulation.vehicle_parts import NO_PARTS
+from tests.calibration.cases import QUICK, SYSTEM, make_draws, make_plant, make_upshift
+from tests.calibration.twins import PARTS, add_part, assemble, make_hydraulic_twin
 
 
 def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -43,5 +56,85 @@ def test_late_pressures_move_the_shift_by_their_delay() -> None:
     locks = []
     for delay in (0.0, 0.01):
         plant, draws = make_plant(replace(shift, pressure_delay=delay)), make_draws(shift, 4)
-        locks.append(plant.simulate(control, draws, ("shaft_torque",))[1])
+        locks.append(plant.simulate(control, draws, (shift.body.drive,))[1])
     np.testing.assert_allclose(locks[1] - locks[0], 0.01, rtol=0.1)
+
+
+def make_task(values: Mapping[str, float], kind: PolicyKind = PolicyKind.CONTROLLER) -> Task:
+    """Task of a twin with the parameters of a part."""
+    twin = add_part(make_hydraulic_twin(), values)
+    return build_task(twin, Request(("2", "3"), 0.5, policy=kind, limits=(), settings=QUICK))
+
+
+@pytest.mark.parametrize("kind", [PolicyKind.CONTROLLER, PolicyKind.SLIP])
+@pytest.mark.parametrize("part", list(PARTS))
+def test_the_predicted_motion_is_that_of_the_whole_network(part: str, kind: PolicyKind) -> None:
+    task = make_task(PARTS[part], kind)
+    shift, space = task.maneuver, Space(task.policy)
+    control = space.build_control(space.start)
+    drawn = draw_for(task, 1, Purpose.SEARCH)
+    nominal = replace(collect_scenarios(shift, [shift.driveline]), units=drawn.units)
+    if isinstance(control, ClosedLoop):
+        nominal = replace(nominal, units=[control.unit])
+    columns, _ = make_plant(shift).simulate(control, nominal, list_outputs(shift))
+    profiles = compute_nominal_profiles(shift, control)
+    inputs = {
+        ENGINE_TORQUE: profiles.engine_torque,
+        "B2": profiles.offgoing,
+        "B3": profiles.oncoming,
+    }
+    elements, start = assemble(shift, PARTS[part]), shift.start
+    run = simulate(elements, inputs, start, shift.time, list_outputs(shift))
+    assert run.status == "completed"
+    for column, expected in zip(columns[0], run.columns.values(), strict=True):
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(column, expected, atol=2e-4 * size)
+    found = simulate_nominal(shift, profiles)
+    np.testing.assert_allclose(
+        found.shaft_torque, columns[0, 0], atol=2e-4 * np.abs(columns[0, 0]).max()
+    )
+
+
+def compare_with_reduced(
+    values: Mapping[str, float],
+) -> tuple[tuple[FloatArray, Outcome], tuple[FloatArray, Outcome]]:
+    """Shaft torque (n,) and metrics of the same control with and without a part."""
+    shift = make_task(values).maneuver
+    space = Space(build_controller_policy(shift, SYSTEM))
+    control = space.build_control(space.start)
+
+    def run(one: Maneuver) -> tuple[FloatArray, Outcome]:
+        plant, nominal = make_plant(one), collect_scenarios(one, [one.driveline])
+        columns, _ = plant.simulate(control, nominal, list_outputs(one))
+        return columns[0, 0], plant.evaluate(control, nominal)
+
+    return run(shift), run(replace(shift, parts=NO_PARTS))
+
+
+@pytest.mark.parametrize(
+    ("values", "rel"),
+    [
+        ({"mode_frequency": 400.0, "mode_share": 0.5, "mode_damping": 0.05}, 0.01),
+        ({"tyre_slip": 2e-4, "shaft_reference": 8000.0}, 0.01),
+        ({"shaft_progression": 1e-6, "shaft_reference": 8000.0}, 1e-4),
+    ],
+)
+def test_a_stiff_part_changes_nothing(values: dict[str, float], rel: float) -> None:
+    (_, whole), (_, reduced) = compare_with_reduced(values)
+    for metric in (Metric.PEAK_JERK, Metric.VIBRATION_DOSE, Metric.FRICTION_ENERGY):
+        assert whole.values[metric] == pytest.approx(reduced.values[metric], rel=rel)
+
+
+def test_a_soft_input_shaft_lowers_the_jerk_of_lockup() -> None:
+    """Half of J1 is behind the input shaft: less inertia stops at the lock-up."""
+    (_, whole), (_, reduced) = compare_with_reduced(PARTS["input shaft"])
+    assert whole.values[Metric.PEAK_JERK] < 0.8 * reduced.values[Metric.PEAK_JERK]
+
+
+def test_play_acts_from_the_reversal_of_the_torque_on() -> None:
+    (torque, whole), (reduced, other) = compare_with_reduced(PARTS["backlash"])
+    reversal = int(np.argmax(reduced < 0.0))
+    assert 0 < reversal < reduced.size
+    np.testing.assert_allclose(torque[:reversal], reduced[:reversal], atol=1e-3)
+    assert not torque[reversal : reversal + 4].any()
+    assert whole.values[Metric.PEAK_JERK] > other.values[Metric.PEAK_JERK]

@@ -20,7 +20,7 @@ from drivetwin.twin.nominal_shift import build_nominal_shift
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin
 from drivetwin.validation.logged_shift import LoggedShift
 from tests.calibration.bench import write_bench_log
-from tests.calibration.twins import STD, make_twin
+from tests.calibration.twins import PARTS, STD, add_part, make_twin
 
 STRONG, TORQUE = 1.05, 1.02
 """Friction of the on-coming clutch and η of the vehicle, over those of the twin."""
@@ -155,3 +155,22 @@ def test_a_second_log_narrows_the_values_of_a_distant_vehicle(twin: Twin, tmp_pa
     assert stds[0] is not None
     assert stds[1] is not None
     assert stds[1] < 0.9 * stds[0]
+
+
+def test_the_part_of_the_vehicle_is_corrected_too(twin: Twin, tmp_path: Path) -> None:
+    given = add_part(twin, PARTS["input shaft"])
+    model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
+    true = 1.02 * PARTS["input shaft"]["mode_frequency"]
+    path = tmp_path / "bench.csv"
+    parts = given.build_parts(model, {"mode_frequency": true})
+    write_bench_log(path, model, parts=parts)
+    log = read_log(path, twin.build_card())
+    logged = LoggedShift(log, require_shifts(log, twin.build_card()).shifts[0])
+    found = correct_twin(given, [logged], Spread())
+    frequency = found.twin.parameters["mode_frequency"]
+    assert found.twin.part_values.keys() == given.part_values.keys()
+    assert frequency.value is not None
+    assert frequency.std_total is not None
+    assert frequency.std_total < 0.9 * STD * PARTS["input shaft"]["mode_frequency"]
+    assert abs(frequency.value - true) < 3.0 * frequency.std_total
+    assert found.after["output_torque"] < 1.3 * 15.0

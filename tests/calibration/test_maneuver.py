@@ -9,9 +9,14 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
+from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import Signal, simulate
+from drivetwin.simulation.driveline import ENGINE, SHAFT
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal, simulate
+from drivetwin.simulation.network import Output
+from drivetwin.simulation.network import simulate as simulate_network
 from tests.calibration.cases import SYSTEM, make_downshift, make_upshift
+from tests.calibration.twins import PARTS, add_part, make_twin
 
 
 @pytest.mark.parametrize("shift", [make_upshift(), make_downshift()])
@@ -27,6 +32,23 @@ def test_start_accelerates_steadily(shift: Maneuver) -> None:
     slope = np.diff(run.output_speed) / shift.step
     expected = shift.compute_acceleration(shift.point.engine_torque, shift.ratios[0])
     assert slope == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("part", list(PARTS))
+def test_start_with_a_part_accelerates_steadily(part: str) -> None:
+    twin = add_part(make_twin(), PARTS[part])
+    shift = build_task(twin, Request(("2", "3"), 0.5, limits=())).maneuver
+    held = {"B2": SYSTEM, "B3": 0.0, ENGINE_TORQUE: shift.point.engine_torque}
+    time = shift.time[:300]
+    outputs: list[Output] = [("shaft_torque", SHAFT), ("acceleration", ENGINE)]
+    inputs = {name: Signal(time[[0, -1]], np.full(2, one)) for name, one in held.items()}
+    run = simulate_network(shift.elements, inputs, shift.start, time, outputs)
+    torque, rate = (run.columns[one] for one in outputs)
+    assert np.ptp(torque) < 1e-4 * np.abs(torque).max()
+    ratio = shift.ratios[0]
+    expected = ratio * shift.compute_acceleration(shift.point.engine_torque, ratio)
+    # A slipping tyre turns faster than the vehicle, and accelerates by as much more.
+    assert rate == pytest.approx(expected, rel=0.01 if part == "tyre" else 1e-6)
 
 
 def test_direction_is_that_of_the_engine_speed() -> None:

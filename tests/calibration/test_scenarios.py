@@ -21,6 +21,7 @@ from drivetwin.calibration.scenarios import (
 )
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
+from drivetwin.simulation.driveline import Driveline
 from drivetwin.simulation.dual_clutch import FrictionTable, Signal, simulate
 from drivetwin.twin.distribution import scale_friction
 from tests.calibration.cases import (
@@ -49,9 +50,9 @@ def test_draws_have_the_stated_spread() -> None:
     sets = make_draws(shift, 3000).sets
     gain = sets["3.gain"] / shift.oncoming.gain
     assert gain.std() == pytest.approx(0.025, rel=0.06)
-    assert sets["eta"].std() / shift.model.eta == pytest.approx(0.015, rel=0.06)
-    assert sets["2.P0"].std() == pytest.approx(5e3, rel=0.06)
-    assert (sets["2.P0"] - shift.offgoing.P0) == pytest.approx(sets["3.P0"] - shift.oncoming.P0)
+    assert sets["i_in.loss.eta"].std() / shift.model.eta == pytest.approx(0.015, rel=0.06)
+    assert sets["2.p0"].std() == pytest.approx(5e3, rel=0.06)
+    assert (sets["2.p0"] - shift.offgoing.P0) == pytest.approx(sets["3.p0"] - shift.oncoming.P0)
 
 
 def test_a_torque_scale_is_a_scale_of_the_torque() -> None:
@@ -64,8 +65,8 @@ def test_a_torque_scale_is_a_scale_of_the_torque() -> None:
     torque = Signal(profiles.engine_torque.time, scale * profiles.engine_torque.values)
     pressures = {"2": profiles.offgoing, "3": profiles.oncoming}
     exact = simulate(shift.model, torque, pressures, louder.build_start(), shift.time)
-    outputs = ("shaft_torque",)
-    columns, _ = make_plant(shift).simulate(profiles, collect_scenarios(shift, [unit]), outputs)
+    drawn = collect_scenarios(shift, [Driveline(unit)])
+    columns, _ = make_plant(shift).simulate(profiles, drawn, (shift.body.drive,))
     largest = np.abs(exact.shaft_torque).max()
     assert columns[0, 0] == pytest.approx(exact.shaft_torque, abs=1e-5 * largest)
 
@@ -78,8 +79,9 @@ def test_friction_of_a_table_is_scaled() -> None:
 def test_impossible_draws_are_not_run() -> None:
     shift = make_upshift()
     assert not is_possible(replace(shift.model, J_out=-1.0))
+    impossible = Driveline(replace(shift.model, k_o=-1.0))
     with pytest.raises(InputError, match="0 of 100 drawn drivelines"):
-        draw_scenarios(shift, Draw(lambda _: replace(shift.model, k_o=-1.0)), 5, 1, Purpose.SEARCH)
+        draw_scenarios(shift, Draw(lambda _: impossible), 5, 1, Purpose.SEARCH)
 
 
 @pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])

@@ -44,7 +44,7 @@ def test_start_makes_the_shift(shift: Maneuver, filling: bool) -> None:
 def test_the_slip_loop_holds_its_reference_over_the_spread() -> None:
     shift = make_upshift()
     policy = make_slip_policy(shift)
-    draw = Draw(make_draw(shift).model, UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread()))
+    draw = Draw(make_draw(shift).driveline, UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread()))
     draws = draw_scenarios(shift, draw, 12, 1, Purpose.SEARCH)
     spreads = []
     for share in (0.0, 1.0):

@@ -18,10 +18,13 @@ from drivetwin.calibration.twin_task import Hardware, Request, build_task
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.simulation.shift_control import ControlledUnit
+from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.calibration.cases import ACTUATOR, FILLING, QUICK
-from tests.calibration.twins import STD, make_hydraulic_twin, make_twin
+from tests.calibration.twins import PARTS, STD, add_part, make_hydraulic_twin, make_twin
 
 REQUEST = Request(("2", "3"), 0.5, settings=QUICK)
+_DRAWN = {"eta": "i_in.loss.eta", "k_o": "output shaft.stiffness", "J_vehicle": "J_v.inertia"}
+"""Paths of some numbers by the parameter that they are."""
 
 
 def test_operating_point_and_limits_come_from_the_twin() -> None:
@@ -39,13 +42,13 @@ def test_draws_have_the_covariance_of_the_twin() -> None:
     twin = make_twin()
     task = build_task(twin, replace(REQUEST, spread=Spread(0.0, 0.0, 0.0), limits=()))
     sets = draw_for(task, 1500, Purpose.SEARCH).sets
-    for name, parameter in (("eta", "eta"), ("k_o", "k_o"), ("J_v", "J_vehicle")):
+    for parameter, name in _DRAWN.items():
         value = twin.parameters[parameter].value
         assert value is not None
         assert sets[name].std() / value == pytest.approx(STD, rel=0.08)
     band = 0.02 / 1.959963984540054  # half width of the friction band in standard deviations
-    assert (sets["B3.mu_c"] / 0.12).std() == pytest.approx(band, rel=0.08)
-    assert (sets["B3.mu_c"] != sets["B2.mu_c"]).all()
+    assert (sets["B3.friction.mu_c"] / 0.12).std() == pytest.approx(band, rel=0.08)
+    assert (sets["B3.friction.mu_c"] != sets["B2.friction.mu_c"]).all()
 
 
 def test_draws_follow_correlations() -> None:
@@ -57,7 +60,36 @@ def test_draws_follow_correlations() -> None:
     covariance[a, b] = covariance[b, a] = 0.9 * np.sqrt(covariance[a, a] * covariance[b, b])
     task = build_task(replace(twin, covariance=covariance), replace(REQUEST, limits=()))
     sets = draw_for(task, 800, Purpose.SEARCH).sets
-    assert np.corrcoef(sets["k_o"], sets["J_v"])[0, 1] == pytest.approx(0.9, abs=0.03)
+    found = np.corrcoef(sets[_DRAWN["k_o"]], sets[_DRAWN["J_vehicle"]])
+    assert found[0, 1] == pytest.approx(0.9, abs=0.03)
+
+
+@pytest.mark.parametrize("part", list(PARTS))
+def test_draws_contain_the_part(part: str) -> None:
+    plain = replace(REQUEST, spread=Spread(0.0, 0.0, 0.0), limits=())
+    task = build_task(add_part(make_twin(), PARTS[part]), plain)
+    assert task.maneuver.parts != NO_PARTS
+    sets = draw_for(task, 600, Purpose.SEARCH).sets
+    relative = {
+        "input shaft": ("input shaft.stiffness", np.hypot(2.0 * STD, np.hypot(STD, 2**0.5 * STD))),
+        "backlash": ("output shaft.gap", STD),
+        "tyre": ("tyre.slip_stiffness", 2**0.5 * STD),
+        "progressive shaft": ("output shaft.torque.0", None),
+    }
+    path, std = relative[part]
+    if std is None:
+        assert np.unique(sets[path]).size == 600
+    else:
+        assert sets[path].std() / sets[path].mean() == pytest.approx(std, rel=0.08)
+
+
+def test_a_part_without_an_interval_is_held() -> None:
+    twin = add_part(make_twin(), PARTS["backlash"])
+    ids, covariance = make_twin().covariance_ids, make_twin().covariance
+    known = replace(twin, covariance_ids=ids, covariance=covariance)
+    task = build_task(known, replace(REQUEST, limits=()))
+    assert task.maneuver.parts.gap == 0.02
+    assert "output shaft.gap" not in draw_for(task, 20, Purpose.SEARCH).sets
 
 
 def test_a_twin_without_identified_values_is_refused() -> None:

@@ -3,13 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
+from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.simulation.network import Element, build_element
+from drivetwin.simulation.vehicle_parts import NO_PARTS, RIM_SHARE
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from tests.calibration.cases import ACTUATOR, FILLING
 from tests.support.upshift.statement import make_problem
@@ -74,3 +79,64 @@ def make_twin(verdict: Verdict = Verdict.IDENTIFIED) -> Twin:
 def make_hydraulic_twin() -> Twin:
     """Return the same twin with actuators."""
     return replace(make_twin(), actuators={"B2": ACTUATOR, "B3": FILLING})
+
+
+PARTS = {
+    "input shaft": {"mode_frequency": 12.0, "mode_share": 0.5, "mode_damping": 0.05},
+    "backlash": {"backlash": 0.02},
+    "tyre": {"tyre_slip": 0.03, "shaft_reference": 8000.0},
+    "progressive shaft": {"shaft_progression": 0.2, "shaft_reference": 8000.0},
+}
+"""Parameters of each part by id."""
+
+
+def add_part(twin: Twin, values: Mapping[str, float]) -> Twin:
+    """Return the twin with parameters of a part, by id, that it knows as well as the others."""
+    assert twin.covariance is not None
+    stds = [STD * value for value in values.values()]
+    own = {
+        name: Estimate(name, value, std, Verdict.IDENTIFIED, "likelihood")
+        for (name, value), std in zip(values.items(), stds, strict=True)
+    }
+    return replace(
+        twin,
+        parameters={**twin.parameters, **own},
+        covariance_ids=(*twin.covariance_ids, *values),
+        covariance=block_diag(twin.covariance, np.diag(np.square(stds))),
+    )
+
+
+def assemble(shift: Maneuver, values: Mapping[str, float]) -> list[Element]:
+    """Put a part by hand into the elements of the dual clutch."""
+    model = shift.model
+    elements = {str(one["name"]): dict(one) for one in replace(shift, parts=NO_PARTS).elements}
+    shaft, more = elements["output shaft"], []
+    if "mode_frequency" in values:
+        front, omega = values["mode_share"] * model.J1, 2.0 * np.pi * values["mode_frequency"]
+        damping = 2.0 * values["mode_damping"] * omega * front
+        fields = {"stiffness": front * omega**2, "damping": damping}
+        elements["J1"]["inertia"] -= front
+        elements["engine"]["node"] = "crankshaft"
+        more = [
+            build_element("inertia", "front", node="crankshaft", inertia=front),
+            build_element("spring_damper", "input shaft", a="crankshaft", b="engine", **fields),
+        ]
+    elif "tyre_slip" in values:
+        rim, torque = RIM_SHARE * model.J_v, values["shaft_reference"] * model.i_f
+        fields = {"slip_stiffness": torque / values["tyre_slip"], "least_speed": 0.5}
+        elements["J_v"]["inertia"] = rim
+        elements["load"]["node"] = "vehicle"
+        more = [
+            build_element("tyre", "tyre", a="wheel", b="vehicle", **fields),
+            build_element("inertia", "vehicle", node="vehicle", inertia=model.J_v - rim),
+        ]
+    elif "backlash" in values:
+        shaft |= {"type": "backlash", "gap": values["backlash"]}
+    else:
+        assert shift.parts.shaft_table is not None
+        linear = shaft.pop("stiffness") * np.array(shift.parts.shaft_table.twist)
+        share = linear / values["shaft_reference"]
+        torque = linear * (1.0 + values["shaft_progression"] * (share**2 - 0.5))
+        twist = list(shift.parts.shaft_table.twist)
+        shaft |= {"type": "spring_table", "twist": twist, "torque": torque.tolist()}
+    return [*elements.values(), *more]

@@ -9,16 +9,21 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from drivetwin.calibration.calibrate import polish_from
+from drivetwin.calibration.metrics import list_outputs
+from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.export.parameters.files import read_parameters
 from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_conversion import save_twin
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
+from drivetwin.simulation.network import simulate
 from tests.calibration.cases import QUICK
-from tests.calibration.twins import make_hydraulic_twin, make_twin
+from tests.calibration.twins import PARTS, add_part, assemble, make_hydraulic_twin, make_twin
 
 FILES = {
     "calibration.toml",
@@ -127,6 +132,41 @@ def test_a_slip_loop_is_calibrated_behind_actuators(
     assert "commands of the controller" in notes
     assert main(["calibrate", str(twin), *given, *SHORT]) == 2
     assert "no actuator of B2 and B3" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("part", ["input shaft", "backlash"])
+def test_a_twin_with_a_part_is_calibrated_with_it(part: str, tmp_path: Path) -> None:
+    """Without spread all draws are the nominal network, here put together by hand."""
+    source, limits, out = (tmp_path / name for name in ("twin.toml", "limits.toml", "out"))
+    friction = {
+        name: replace(one, mu_lo=one.mu, mu_hi=one.mu) for name, one in make_twin().friction.items()
+    }
+    exact = replace(make_twin(), covariance_ids=(), covariance=None, friction=friction)
+    twin = replace(exact, parameters=add_part(make_twin(), PARTS[part]).parameters)
+    save_twin(source, twin)
+    spread = "gain = 0.0\nengine_torque = 0.0\ncontact_pressure_Pa = 0.0\n"
+    limits.write_text(f"[limits]\nshift_time_s = 1.4\n[spread]\n{spread}")
+    given = ["--shift", "2-3", "--limits", str(limits), "-o", str(out)]
+    assert main(["calibrate", str(source), *given, *SHORT]) == 0
+    curves = read_parameters(out / "calibration.csv").curves
+    request = Request(("2", "3"), 0.5, engine_torque=1400.0, limits=())
+    shift = build_task(twin, request).maneuver
+    after = shift.time - shift.request
+    inputs = {
+        name: Signal(shift.time, np.interp(after, one.axis.points, one.values))
+        for name, one in zip((ENGINE_TORQUE, "B2", "B3"), curves, strict=True)
+    }
+    start, outputs = shift.start, list_outputs(shift)
+    run = simulate(assemble(shift, PARTS[part]), inputs, start, shift.time, outputs)
+    torque, old, old_slip, new, new_slip = run.columns.values()
+    jerk = np.gradient(0.5 * shift.model.i_f / shift.model.J_v * torque, shift.step)
+    lock = [one.time for one in run.events if one.kind == "lock"][-1] - shift.request
+    energy = shift.step * np.sum(np.abs(old * old_slip) + np.abs(new * new_slip))
+    certificate = json.loads((out / "certificate.json").read_text(encoding="utf-8"))["after"]
+    expected = {"peak_jerk": np.abs(jerk).max(), "shift_time": lock, "friction_energy": energy}
+    for metric, value in expected.items():
+        assert certificate["quantiles"][metric]["median"] == pytest.approx(value, rel=1e-3)
+        assert certificate["quantiles"][metric]["worst"] == pytest.approx(value, rel=1e-3)
 
 
 def test_with_limits_out_of_reach_the_best_calibration_is_written(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,20 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import InputError
-from drivetwin.simulation.driveline import build_driveline
 from drivetwin.simulation.dual_clutch import Signal, simulate
-from drivetwin.simulation.network import Output, Start, build_element
+from drivetwin.simulation.network import Output, build_element
 from drivetwin.simulation.network import simulate as simulate_network
 from drivetwin.simulation.shift_control import (
     INPUTS,
     ControlledBatch,
     ControlledNetwork,
-    ControlledPlant,
     ControlledUnit,
-    simulate_controlled,
     simulate_network_controlled,
 )
 from tests.calibration.cases import make_slip_policy, make_upshift
@@ -31,7 +30,7 @@ from tests.calibration.cases import make_slip_policy, make_upshift
 SHIFT = make_upshift()
 POLICY = make_slip_policy(SHIFT)
 CONTROLLER = POLICY.base
-OUTPUTS = ("shaft_torque", "slip.2", "slip.3")
+OUTPUTS: list[Output] = [("shaft_torque", "output shaft"), ("slip", "2"), ("slip", "3")]
 ACTUATORS = st.builds(
     ActuatorModel,
     dead_time=st.floats(0.0, 0.05),
@@ -44,11 +43,17 @@ ACTUATORS = st.builds(
 )
 
 
+def make_network(
+    units: Sequence[ControlledUnit], parameters: Mapping[str, FloatArray] | None = None
+) -> ControlledNetwork:
+    """The shift with numbers (units,) that change by path."""
+    return ControlledNetwork(SHIFT.elements, SHIFT.start, units, parameters or {})
+
+
 def run(unit: ControlledUnit, step: float = 1e-3) -> ControlledBatch:
     shift = SHIFT.set_step(step)
-    plant = ControlledPlant(shift.model, shift.build_start(), [unit], {})
-    return simulate_controlled(
-        plant, [CONTROLLER], shift.time, outputs=OUTPUTS, with_inputs=True, threads=1
+    return simulate_network_controlled(
+        make_network([unit]), [CONTROLLER], shift.time, OUTPUTS, with_inputs=True, threads=1
     )
 
 
@@ -87,64 +92,40 @@ def test_runs_do_not_depend_on_their_neighbours_and_threads() -> None:
     units = [replace(POLICY.unit, engine_lag=lag) for lag in (0.02, 0.05, 0.1)]
     gains = SHIFT.oncoming.gain * np.array([0.95, 1.0, 1.05])
     controllers = [CONTROLLER, replace(CONTROLLER, gain=2.0 * CONTROLLER.gain)]
-    whole = ControlledPlant(SHIFT.model, SHIFT.build_start(), units, {"3.gain": gains})
-    together = simulate_controlled(whole, controllers, SHIFT.time, outputs=OUTPUTS)
+    whole = make_network(units, {"3.gain": gains})
+    together = simulate_network_controlled(whole, controllers, SHIFT.time, OUTPUTS)
     for k, unit in enumerate(units):
         one = replace(whole, units=[unit], parameters={"3.gain": gains[k : k + 1]})
-        alone = simulate_controlled(one, controllers[1:], SHIFT.time, outputs=OUTPUTS, threads=1)
+        alone = simulate_network_controlled(one, controllers[1:], SHIFT.time, OUTPUTS, threads=1)
         assert np.array_equal(alone.values[0, 0], together.values[k, 1])
         assert alone.last_lock[0, 0] == together.last_lock[k, 1]
 
 
 def test_what_makes_no_batch_is_refused() -> None:
-    plant = ControlledPlant(SHIFT.model, SHIFT.build_start(), [POLICY.unit], {})
+    plant = make_network([POLICY.unit])
     with pytest.raises(InputError, match="make no batch"):
-        simulate_controlled(plant, [], SHIFT.time)
+        simulate_network_controlled(plant, [], SHIFT.time, OUTPUTS)
     other = replace(CONTROLLER, request=0.2)
     with pytest.raises(InputError, match="make no batch"):
-        simulate_controlled(plant, [CONTROLLER, other], SHIFT.time)
+        simulate_network_controlled(plant, [CONTROLLER, other], SHIFT.time, OUTPUTS)
+    wrong = replace(plant, parameters={"B9.gain": np.ones(1)})
     with pytest.raises(InputError, match="unknown"):
-        simulate_controlled(replace(plant, parameters={"B9.gain": np.ones(1)}), [CONTROLLER],
-                            SHIFT.time)  # fmt: skip
-    with pytest.raises(InputError, match='clutch "4" is unknown; known are 2, 3'):
-        simulate_controlled(plant, [replace(CONTROLLER, oncoming="4")], SHIFT.time)
-    with pytest.raises(InputError, match="not a finite number"):
-        simulate_controlled(plant, [replace(CONTROLLER, gain=float("nan"))], SHIFT.time)
+        simulate_network_controlled(wrong, [CONTROLLER], SHIFT.time, OUTPUTS)
+    for changed, text in (
+        (replace(CONTROLLER, oncoming="4"), 'clutch "4" is unknown; known are 2, 3'),
+        (replace(CONTROLLER, gain=float("nan")), "not a finite number"),
+    ):
+        with pytest.raises(InputError, match=text):
+            simulate_network_controlled(plant, [changed], SHIFT.time, OUTPUTS)
     with pytest.raises(InputError, match="controller task"):
         replace(CONTROLLER, task=0.0)
     with pytest.raises(InputError, match="engine lag"):
         replace(POLICY.unit, engine_lag=-1.0)
 
 
-def make_network() -> ControlledNetwork:
-    """The shift as a network whose numbers change by path."""
-    begin = SHIFT.build_start()
-    speeds = {"engine": begin.engine_speed, "output": begin.output_speed}
-    speeds["wheel"] = begin.wheel_speed
-    start = Start(speeds, {"output shaft": begin.twist}, begin.locked)
-    gains = {"3.gain": SHIFT.oncoming.gain * np.array([0.95, 1.05])}
-    return ControlledNetwork(build_driveline(SHIFT.model), start, [POLICY.unit] * 2, gains)
-
-
-NETWORK_OUTPUTS: list[Output] = [("shaft_torque", "output shaft"), ("slip", "2"), ("slip", "3")]
-
-
-def test_a_network_runs_as_the_dual_clutch_that_it_is() -> None:
-    network = make_network()
-    plant = ControlledPlant(
-        SHIFT.model, SHIFT.build_start(), network.units, {"3.gain": network.parameters["3.gain"]}
-    )
-    one = simulate_controlled(plant, [CONTROLLER], SHIFT.time, outputs=OUTPUTS, with_inputs=True)
-    other = simulate_network_controlled(
-        network, [CONTROLLER], SHIFT.time, NETWORK_OUTPUTS, with_inputs=True
-    )
-    np.testing.assert_array_equal(one.values, other.values)
-    np.testing.assert_array_equal(one.inputs, other.inputs)
-    np.testing.assert_array_equal(one.last_lock, other.last_lock)
-
-
 def test_other_inputs_act_as_given() -> None:
-    network = make_network()
+    gains = SHIFT.oncoming.gain * np.array([0.95, 1.05])
+    network = make_network([POLICY.unit] * 2, {"3.gain": gains})
     middle = 0.5 * (SHIFT.time[0] + SHIFT.time[-1])
     times = np.array([SHIFT.time[0], middle, middle + 0.01, SHIFT.time[-1]])
     brake = Signal(times, np.array([0.0, 0.0, -500.0, -500.0]))
@@ -153,11 +134,11 @@ def test_other_inputs_act_as_given() -> None:
     with pytest.raises(InputError, match="'M' jumps"):
         simulate_network_controlled(
             replace(network, elements=elements, inputs={"M": jump}),
-            [CONTROLLER], SHIFT.time, NETWORK_OUTPUTS,
+            [CONTROLLER], SHIFT.time, OUTPUTS,
         )  # fmt: skip
     network = replace(network, elements=elements, inputs={"M": brake})
     batch = simulate_network_controlled(
-        network, [CONTROLLER], SHIFT.time, NETWORK_OUTPUTS, with_inputs=True
+        network, [CONTROLLER], SHIFT.time, OUTPUTS, with_inputs=True
     )
     assert not batch.failed
     columns = dict(zip(INPUTS, batch.inputs[0, 0], strict=True))
@@ -167,21 +148,18 @@ def test_other_inputs_act_as_given() -> None:
         {**one, "gain": network.parameters["3.gain"][0]} if one["name"] == "3" else one
         for one in elements
     ]
-    run = simulate_network(
-        lighter, {**inputs, "M": brake}, network.start, SHIFT.time, NETWORK_OUTPUTS
-    )
-    torque = run.columns[NETWORK_OUTPUTS[0]]
+    run = simulate_network(lighter, {**inputs, "M": brake}, network.start, SHIFT.time, OUTPUTS)
+    torque = run.columns[OUTPUTS[0]]
     assert batch.values[0, 0, 0] == pytest.approx(torque, abs=1e-5 * np.abs(torque).max())
 
 
 def test_a_network_without_what_is_controlled_is_refused() -> None:
-    network = make_network()
+    gains = SHIFT.oncoming.gain * np.array([0.95, 1.05])
+    network = make_network([POLICY.unit] * 2, {"3.gain": gains})
     changed = replace(network, parameters={"3.gian": np.ones(2)})
     with pytest.raises(InputError, match="did you mean 'gain'"):
-        simulate_network_controlled(changed, [CONTROLLER], SHIFT.time, NETWORK_OUTPUTS)
+        simulate_network_controlled(changed, [CONTROLLER], SHIFT.time, OUTPUTS)
     other = replace(CONTROLLER, oncoming="load")
     inputs = {"3": Signal(SHIFT.time, np.zeros(SHIFT.time.size))}
     with pytest.raises(InputError, match='clutch "load" is unknown; known are 2, 3'):
-        simulate_network_controlled(
-            replace(network, inputs=inputs), [other], SHIFT.time, NETWORK_OUTPUTS
-        )
+        simulate_network_controlled(replace(network, inputs=inputs), [other], SHIFT.time, OUTPUTS)

@@ -21,6 +21,7 @@ from drivetwin.calibration.policy_kind import PolicyKind
 from drivetwin.calibration.scenarios import Draw, Scenarios, collect_scenarios
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
+from drivetwin.simulation.driveline import Driveline
 from tests.calibration.cases import (
     ACTUATOR,
     QUICK,
@@ -84,7 +85,7 @@ def build_task(case: Case) -> Task:
         policy = build_knot_policy(shift, start, SYSTEM)
     elif case.kind is PolicyKind.SLIP:
         policy = make_slip_policy(shift)
-        draw = Draw(draw.model, UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread()))
+        draw = Draw(draw.driveline, UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread()))
     return Task(shift, policy, draw, (Limit(Metric.SHIFT_TIME, 1.0),), 1, SHORT)
 
 
@@ -112,7 +113,7 @@ def solve(case: Case, control: Control, of: Problem) -> tuple[FloatArray, float]
 
 def simulate(case: Case, control: Control, of: Problem) -> Outcome:
     """Simulate a shift of a unit by the program."""
-    drawn = collect_scenarios(case.shift, [build_model(of)])
+    drawn = collect_scenarios(case.shift, [Driveline(build_model(of))])
     units = []
     if isinstance(control, ClosedLoop):
         units = [replace(control.unit, engine_lag=LAG)]

@@ -313,9 +313,3 @@ def test_the_part_of_the_plant_is_kept(
     found = load_twin(tmp_path / "twin.toml")
     assert found.part_values == kept
     assert found.drop_part().part_values == {}
-    found.drop_part().require_dual_clutch("the export")
-    if kept:
-        with pytest.raises(InputError, match=r"hold|also has") as error:
-            found.require_dual_clutch("the export")
-        assert "Twin.drop_part()" in str(error.value)
-        assert "--drop-part" in error.value.format_for_shell()

@@ -11,10 +11,10 @@ from drivetwin.errors import SimulationError
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.shift_control import (
     INPUTS,
-    ControlledPlant,
+    ControlledNetwork,
     ControlledUnit,
     ShiftController,
-    simulate_controlled,
+    simulate_network_controlled,
 )
 
 
@@ -37,8 +37,11 @@ def compute_nominal_profiles(maneuver: Maneuver, control: Control) -> Profiles:
     """
     if isinstance(control, Profiles):
         return control
-    plant = ControlledPlant(maneuver.model, maneuver.build_start(), [control.unit], {})
-    batch = simulate_controlled(plant, [control.controller], maneuver.time, with_inputs=True)
+    start = maneuver.start
+    plant = ControlledNetwork(maneuver.elements, start, [control.unit], {})
+    batch = simulate_network_controlled(
+        plant, [control.controller], maneuver.time, [maneuver.body.drive], with_inputs=True
+    )
     if batch.failed:
         raise SimulationError(
             f"the shift of the nominal driveline failed: {batch.failed[0]}",

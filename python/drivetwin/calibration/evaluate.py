@@ -13,8 +13,13 @@ from drivetwin.calibration.closed_loop import ClosedLoop, Control
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics, list_outputs
 from drivetwin.calibration.scenarios import Scenarios
-from drivetwin.simulation.batch import Scenario, simulate_batch
-from drivetwin.simulation.shift_control import ControlledPlant, simulate_controlled
+from drivetwin.simulation.batch import BatchRequest, Keep
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE
+from drivetwin.simulation.network import Output
+from drivetwin.simulation.network_batch import NetworkScenario, to_core_scenarios
+from drivetwin.simulation.network_output import to_native
+from drivetwin.simulation.serialize import as_json
+from drivetwin.simulation.shift_control import ControlledNetwork, simulate_network_controlled
 
 _CHUNK = 256
 """Runs of a batch whose columns are in memory at once."""
@@ -64,7 +69,7 @@ class Plant:
         return [_join(list(one)) for one in zip(*parts, strict=True)]
 
     def simulate(
-        self, control: Control, scenarios: Scenarios, outputs: tuple[str, ...]
+        self, control: Control, scenarios: Scenarios, outputs: tuple[Output, ...]
     ) -> tuple[FloatArray, FloatArray]:
         """Return outputs (runs, outputs, n) and times of the last lock-up (runs,) [s]."""
         if isinstance(control, ClosedLoop):
@@ -72,40 +77,44 @@ class Plant:
         self.count.runs += scenarios.count
         shift = self.maneuver
         sampled = control.delay_pressures(shift.pressure_delay).sample(shift.time)
-        pressures = {
+        inputs = {
+            ENGINE_TORQUE: sampled.engine_torque,
             shift.offgoing.name: sampled.offgoing,
             shift.oncoming.name: sampled.oncoming,
         }
-        given = Scenario(sampled.engine_torque, pressures, shift.build_start())
-        batch = simulate_batch(
-            shift.model,
-            [given],
-            shift.time,
-            scenarios.sets,
-            outputs=outputs,
-            threads=self.threads,
-        )
+        given = to_core_scenarios([NetworkScenario(inputs, shift.start)])
+        native = to_native(shift.elements, outputs)
+        # Checks of `simulate_network_batch` take a tenth of a run, and these elements are built.
+        asked = BatchRequest.build(given, shift.time, scenarios.sets, native, Keep.COLUMNS)
+        batch = asked.simulate(as_json(shift.elements), asked.sets, self.threads)
         return batch.values, batch.last_lock
 
     def _run_closed_loops(
-        self, controls: Sequence[ClosedLoop], scenarios: Scenarios, outputs: tuple[str, ...]
+        self, controls: Sequence[ClosedLoop], scenarios: Scenarios, outputs: tuple[Output, ...]
     ) -> list[tuple[FloatArray, FloatArray]]:
         """Simulate all controllers on all scenarios together; as `simulate` for each controller."""
         self.count.runs += len(controls) * scenarios.count
         shift = self.maneuver
-        plant = ControlledPlant(shift.model, shift.build_start(), scenarios.units, scenarios.sets)
-        batch = simulate_controlled(
+        start = shift.start
+        plant = ControlledNetwork(shift.elements, start, scenarios.units, scenarios.sets)
+        batch = simulate_network_controlled(
             plant,
             [one.controller for one in controls],
             shift.time,
-            outputs=outputs,
+            outputs,
             threads=self.threads,
         )
         return [(batch.values[:, k], batch.last_lock[:, k]) for k in range(len(controls))]
 
     def _measure(self, columns: FloatArray, last_lock: FloatArray, chosen: Scenarios) -> Outcome:
-        vehicle = chosen.sets.get("J_v", np.full(chosen.count, self.maneuver.model.J_v))
+        vehicle = get_vehicle_inertias(self.maneuver, chosen)
         return compute_metrics(self.maneuver, columns, last_lock, vehicle, self.metrics)
+
+
+def get_vehicle_inertias(maneuver: Maneuver, scenarios: Scenarios) -> FloatArray:
+    """Return the inertia (runs,) [kg m^2] that moves with the vehicle."""
+    body = maneuver.body
+    return scenarios.sets.get(body.path, np.full(scenarios.count, body.inertia))
 
 
 def _join(parts: list[Outcome]) -> Outcome:

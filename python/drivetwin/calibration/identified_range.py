@@ -10,7 +10,8 @@ from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.errors import Where
 from drivetwin.findings import Finding
-from drivetwin.simulation.dual_clutch import Trajectory, simulate
+from drivetwin.simulation.driveline_run import DrivelineTask
+from drivetwin.simulation.dual_clutch import Trajectory
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.identified_range import CARRIES, check_range
 
@@ -47,8 +48,8 @@ def simulate_nominal(maneuver: Maneuver, profiles: Profiles) -> Trajectory:
         maneuver.offgoing.name: profiles.offgoing,
         maneuver.oncoming.name: profiles.oncoming,
     }
-    start = maneuver.build_start()
-    return simulate(maneuver.model, profiles.engine_torque, pressures, start, maneuver.time)
+    inputs = (profiles.engine_torque, pressures, maneuver.build_start(), maneuver.time)
+    return DrivelineTask(maneuver.model, maneuver.parts, *inputs).simulate()
 
 
 def _collect_loaded_slip(run: Trajectory) -> list[tuple[FloatArray, FloatArray]]:

@@ -10,7 +10,11 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, State
+from drivetwin.simulation.driveline import Driveline, VehicleBody, build_driveline, find_body
+from drivetwin.simulation.driveline_start import build_start, compute_twist
+from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Signal, State
+from drivetwin.simulation.network import Element, Start
+from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,7 @@ class Maneuver:
 
     `wheel_radius` [m] converts the wheel's motion to the vehicle's. The gear is requested at
     `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s]. Pressures act
-    later than they are given by `pressure_delay` [s].
+    later than they are given by `pressure_delay` [s]. `parts` are those beside the dual clutch.
     """
 
     model: DualClutch
@@ -37,11 +41,27 @@ class Maneuver:
     horizon: float = 1.6
     step: float = 1e-3
     pressure_delay: float = 0.0
+    parts: VehicleParts = NO_PARTS
 
     @cached_property
     def time(self) -> FloatArray:
         """Samples (n,) [s] of a run."""
         return self.step * np.arange(round(self.horizon / self.step) + 1, dtype=np.float64)
+
+    @property
+    def driveline(self) -> Driveline:
+        """Nominal driveline."""
+        return Driveline(self.model, self.parts)
+
+    @cached_property
+    def elements(self) -> list[Element]:
+        """Network of the nominal driveline."""
+        return build_driveline(self.model, self.parts)
+
+    @cached_property
+    def body(self) -> VehicleBody:
+        """Inertia that moves with the vehicle."""
+        return find_body(self.driveline)
 
     @property
     def offgoing(self) -> ShiftElement:
@@ -65,15 +85,28 @@ class Maneuver:
         old, new = self.ratios
         return float(np.sign(abs(new) - abs(old)))
 
-    def build_start(self, model: DualClutch | None = None) -> State:
-        """Return steady acceleration in the old gear; `model` stands for another parameter set."""
-        model = model or self.model
+    def build_start(self, driveline: Driveline | None = None) -> State:
+        """Return steady acceleration in the old gear, of another `driveline` if given."""
+        driveline = driveline or self.driveline
+        model = driveline.model
         ratio = self.ratios[0]
         output = self.point.engine_speed / ratio
         wheel = output / model.i_f
         torque = model.compute_steady_torque(self.point.engine_torque, ratio, wheel)
         speed = self.point.engine_speed
-        return State(speed, output, wheel, torque / model.k_o, (self.offgoing.name,))
+        twist = compute_twist(model, driveline.parts, torque)
+        return State(speed, output, wheel, twist, (self.offgoing.name,))
+
+    @cached_property
+    def start(self) -> Start:
+        """Start of the nominal network."""
+        return self.build_network_start(self.driveline)
+
+    def build_network_start(self, driveline: Driveline) -> Start:
+        """Return the start of the network of a driveline, with the nominal speeds of the gear."""
+        state = replace(self.build_start(), twist=self.build_start(driveline).twist)
+        held = Signal(self.time[:2], np.full(2, self.point.engine_torque))
+        return build_start(driveline.model, driveline.parts, state, held, 0.0)
 
     def compute_acceleration(self, torque: float, ratio: float) -> float:
         """Steady acceleration of the output shaft [rad/s^2] at an engine torque [N m] in a gear."""

@@ -15,6 +15,8 @@ from scipy.signal import butter, sosfilt
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.shifts.metrics import compute_rates, compute_vibration_doses
+from drivetwin.simulation.driveline import SHAFT
+from drivetwin.simulation.network import Output
 
 LOW_PASS = 20.0
 """Corner frequency [Hz] of the low-passed jerk: above it a seat passes little on."""
@@ -58,8 +60,9 @@ METRICS: Mapping[Metric, MetricSpec] = {
     Metric.PEAK_JERK: MetricSpec(
         "peak jerk",
         "m/s^3",
-        "Largest magnitude of the rate of the vehicle's acceleration r_w·(i_f·T_o - T_v)/J_v, by "
-        "central differences on 1 ms; the load is constant within a shift.",
+        "Largest magnitude of the rate of the vehicle's acceleration r_w·(i_f·T_o - T_v)/J_v, "
+        "behind a tyre by its torque and the inertia behind it, by central differences on 1 ms; "
+        "the load is constant within a shift.",
         "definition of jerk",
     ),
     Metric.SMOOTH_JERK: MetricSpec(
@@ -134,10 +137,22 @@ class Outcome:
     relocked: NDArray[np.bool_]
 
 
-def list_outputs(maneuver: Maneuver) -> tuple[str, ...]:
+def list_outputs(maneuver: Maneuver) -> tuple[Output, ...]:
     """Return the outputs of a batch that `compute_metrics` takes, in its order."""
-    old, new = maneuver.offgoing.name, maneuver.oncoming.name
-    return ("shaft_torque", f"torque.{old}", f"slip.{old}", f"torque.{new}", f"slip.{new}")
+    outputs: list[Output] = [("shaft_torque", SHAFT)]
+    for one in (maneuver.offgoing, maneuver.oncoming):
+        outputs += [("friction_torque", one.name), ("slip", one.name)]
+    return tuple(dict.fromkeys([*outputs, maneuver.body.drive]))
+
+
+def compute_acceleration(maneuver: Maneuver, drive: FloatArray, vehicle: FloatArray) -> FloatArray:
+    """Compute the change of the vehicle's acceleration [m/s^2] from that before the request.
+
+    `drive` (runs, n) is the output `maneuver.body.drive`, `vehicle` (runs,) the inertia [kg m^2]
+    that it drives.
+    """
+    scale = (maneuver.wheel_radius * maneuver.body.factor / vehicle)[:, None]
+    return np.asarray(scale * (drive - drive[:, :1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,14 +166,7 @@ class _Runs:
     on: FloatArray
     on_slip: FloatArray
     last_lock: FloatArray
-    vehicle: FloatArray
-
-    @cached_property
-    def acceleration(self) -> FloatArray:
-        """Change of the vehicle's acceleration [m/s^2] from that before the request."""
-        radius, ratio = self.maneuver.wheel_radius, self.maneuver.model.i_f
-        scale = (radius * ratio / self.vehicle)[:, None]
-        return np.asarray(scale * (self.torque - self.torque[:, :1]))
+    acceleration: FloatArray
 
     @cached_property
     def jerk(self) -> FloatArray:
@@ -178,15 +186,17 @@ def compute_metrics(
     vehicle: FloatArray,
     wanted: Iterable[Metric] = tuple(Metric),
 ) -> Outcome:
-    """Compute the `wanted` metrics from `columns` (runs, 5, n) in the order of `list_outputs`.
+    """Compute the `wanted` metrics from `columns` (runs, outputs, n) as `list_outputs` orders them.
 
-    `last_lock` (runs,) [s] is that of the batch; `vehicle` (runs,) the wheel's inertia J_v
-    [kg m^2] of each run. A run that failed has 1e6 in every metric.
+    `last_lock` (runs,) [s] is that of the batch; `vehicle` (runs,) the inertia of `maneuver.body`
+    [kg m^2] in each run. A run that failed has 1e6 in every metric.
     """
     failed = ~np.isfinite(columns).all(axis=(1, 2))
     signals = np.moveaxis(np.nan_to_num(columns) if failed.any() else columns, 1, 0)
-    torque, off, off_slip, on, on_slip = signals
-    runs = _Runs(maneuver, torque, off, off_slip, on, on_slip, last_lock, vehicle)
+    torque, off, off_slip, on, on_slip, *_ = signals
+    drive = signals[list_outputs(maneuver).index(maneuver.body.drive)]
+    acceleration = compute_acceleration(maneuver, drive, vehicle)
+    runs = _Runs(maneuver, torque, off, off_slip, on, on_slip, last_lock, acceleration)
     values = {one: _COMPUTE[one](runs) for one in wanted}
     for one in values.values():
         one[failed] = _FAILED

@@ -7,7 +7,7 @@ of their metrics are differences of the profiles.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
@@ -22,13 +22,16 @@ from drivetwin.calibration.units import DrawUnit
 from drivetwin.errors import InputError
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
+from drivetwin.simulation.driveline import SHAFT, Driveline, build_driveline
+from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.simulation.shift_control import ControlledUnit
 from drivetwin.twin.distribution import ModelDistribution, describe_model
 from drivetwin.twin.twin import Twin
 
 _TRIES = 20
 """Draws per scenario after which a covariance counts as too wide."""
+_DESIGN = (".ratio", ".drum_inertia")
+"""Endings of numbers that all units share with the nominal driveline."""
 
 
 class Purpose(IntEnum):
@@ -41,13 +44,13 @@ class Purpose(IntEnum):
     CHECK = 5
 
 
-DrawModel = Callable[[np.random.Generator], DualClutch | None]
+DrawDriveline = Callable[[np.random.Generator], Driveline | None]
 """Draws a driveline; None where the draw is impossible."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scenarios:
-    """Drivelines as parameter sets of one batch: values (runs,) by the core's names.
+    """Drivelines as parameter sets of one batch: values (runs,) by path.
 
     `units` are the actuators of each; empty where the control is given at the clutches.
     """
@@ -72,7 +75,7 @@ class Scenarios:
 class Draw:
     """Draws of the driveline, and of its actuators where these are simulated."""
 
-    model: DrawModel
+    driveline: DrawDriveline
     unit: DrawUnit | None = None
 
 
@@ -84,56 +87,65 @@ def draw_scenarios(
     Raises InputError where most draws are impossible (an inertia below zero).
     """
     random = np.random.default_rng([seed, int(purpose)])
-    models: list[DualClutch] = []
+    drivelines: list[Driveline] = []
     for _ in range(_TRIES * count):
-        if len(models) == count:
+        if len(drivelines) == count:
             break
-        model = draw.model(random)
-        if model is not None and is_possible(model):
-            models.append(model)
-    if len(models) < count:
+        one = draw.driveline(random)
+        if one is not None and is_possible(one.model):
+            drivelines.append(one)
+    if len(drivelines) < count:
         raise InputError(
-            f"{len(models)} of {_TRIES * count} drawn drivelines are possible",
+            f"{len(drivelines)} of {_TRIES * count} drawn drivelines are possible",
             "identify from more logs, or fix weak parameters on the vehicle card: the intervals "
             "of the twin reach impossible values",
         )
-    drawn = collect_scenarios(maneuver, models)
+    drawn = collect_scenarios(maneuver, drivelines)
     if draw.unit is None:
         return drawn
     own = np.random.default_rng([seed, int(purpose), 1])
     return replace(drawn, units=[draw.unit(own) for _ in range(count)])
 
 
-def collect_scenarios(maneuver: Maneuver, models: Sequence[DualClutch]) -> Scenarios:
-    """Collect drivelines as parameter sets; names that are equal in all are left out.
+def collect_scenarios(maneuver: Maneuver, drivelines: Sequence[Driveline]) -> Scenarios:
+    """Collect drivelines as parameter sets; numbers that are equal in all are left out.
 
-    The start of each is its own steady acceleration: its shaft twist is a parameter too.
+    The start of each is its own steady acceleration: its shaft twist is a parameter too. Ratios,
+    drums and axes of tables are those of the maneuver.
     """
-    tables = [flatten_model(one) for one in models]
-    base = flatten_model(maneuver.model)
+    base = _describe(maneuver, maneuver.driveline)
+    tables = [_describe(maneuver, one.share_axes(maneuver.parts)) for one in drivelines]
     sets = {
-        name: np.array([table[name] for table in tables])
-        for name in base
-        if any(table[name] != base[name] for table in tables)
+        path: np.array([table[path] for table in tables])
+        for path, value in base.items()
+        if path == f"start.{SHAFT}" or any(table[path] != value for table in tables)
     }
-    sets["start.twist"] = np.array([maneuver.build_start(one).twist for one in models])
-    return Scenarios(sets, len(models))
+    return Scenarios(sets, len(drivelines))
 
 
-def flatten_model(model: DualClutch) -> dict[str, float]:
-    """Return the numbers of a driveline that can differ between units, by the core's names."""
-    table = {name: getattr(model, name) for name in ("J1", "eta", "J_out", "J_v", "k_o", "c_o")}
-    table |= {f"load.{name}": value for name, value in vars(model.load).items()}
-    for one in model.elements:
-        table |= {f"{one.name}.gain": one.gain, f"{one.name}.P0": one.P0}
-        law = one.friction
-        numbers = (
-            vars(law)
-            if isinstance(law, Stribeck)
-            else {f"mu.{k}": value for k, value in enumerate(law.mu)}
-        )
-        table |= {f"{one.name}.{name}": value for name, value in numbers.items()}
-    return table
+def _describe(maneuver: Maneuver, driveline: Driveline) -> dict[str, float]:
+    """Return the numbers of elements and start that can differ between units, by path."""
+    start = maneuver.build_network_start(driveline)
+    own = {
+        path: value
+        for one in build_driveline(driveline.model, driveline.parts)
+        for path, value in _iterate_numbers(one["name"], one)
+        if not path.endswith(_DESIGN)
+    }
+    return own | {f"start.{name}": one for name, one in {**start.speeds, **start.twists}.items()}
+
+
+def _iterate_numbers(path: str, described: object) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a description with their paths."""
+    if isinstance(described, int | float):
+        yield path, described
+    elif isinstance(described, dict):
+        for key, one in described.items():
+            if not isinstance(one, str):
+                yield from _iterate_numbers(f"{path}.{key}", one)
+    elif isinstance(described, list | tuple):
+        for place, one in enumerate(described):
+            yield from _iterate_numbers(f"{path}.{place}", one)
 
 
 def is_possible(model: DualClutch) -> bool:
@@ -168,6 +180,8 @@ def scale_units(model: DualClutch, spread: Spread, random: np.random.Generator) 
 class TwinDraws:
     """Draws of a twin: parameters and friction laws by their joint covariance, and made units.
 
+    Parts beside the dual clutch are drawn too; parameters without an interval keep their values.
+
     The covariance is the total one, with sensor tolerances and effects.
     """
 
@@ -175,11 +189,15 @@ class TwinDraws:
     shift: Shift
     spread: Spread
 
-    def __call__(self, random: np.random.Generator) -> DualClutch | None:
+    def __call__(self, random: np.random.Generator) -> Driveline | None:
         """Draw a driveline; None where it is impossible."""
         known = self._known
-        model = known.draw_model(known.draw(random, self._directions), random)
-        return None if model is None else scale_units(model, self.spread, random)
+        values = known.draw(random, self._directions)
+        model = known.draw_model(values, random)
+        if model is None:
+            return None
+        unit = scale_units(model, self.spread, random)
+        return Driveline(unit, self.twin.build_parts(unit, known.to_named(values)))
 
     @cached_property
     def _known(self) -> ModelDistribution:
@@ -191,8 +209,8 @@ class TwinDraws:
 
     @cached_property
     def drawn_ids(self) -> list[str]:
-        """Ids of the covariance that the model of the shift depends on."""
-        twin, used = self.twin, set(self.twin.list_model_ids(self.shift))
+        """Ids of the covariance that the driveline of the shift depends on."""
+        twin, used = self.twin, {*self.twin.list_model_ids(self.shift), *self.twin.part_values}
         gear = twin.select_inertia_gear(self.shift)
         used -= {name for name in used if name.startswith("J_prime_")}
         used.add(f"J_prime_{gear}")

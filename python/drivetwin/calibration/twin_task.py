@@ -71,16 +71,15 @@ def build_task(twin: Twin, request: Request) -> Task:
     """Build the problem of a request.
 
     Raises IdentificationError for a twin without an identified parameter, InputError for a shift
-    that has no such policy and for a plant with a part beside the dual clutch, and
-    MissingParameterError where the twin cannot be simulated.
+    that has no such policy, and MissingParameterError where the twin cannot be simulated.
     """
     require_identified(twin)
-    twin.require_dual_clutch("a calibration")
     shift = build_nominal_shift(twin, request.gears)
     model = twin.build_dual_clutch(shift)
     point = _choose_point(twin, request)
     delay = twin.get_value(PRESSURE_DELAY, 0.0)
-    maneuver = Maneuver(model, point, request.wheel_radius, pressure_delay=delay)
+    parts = twin.build_parts(model)
+    maneuver = Maneuver(model, point, request.wheel_radius, pressure_delay=delay, parts=parts)
     check_torque_phase_first(maneuver)
     units = None
     if request.policy is PolicyKind.SLIP:

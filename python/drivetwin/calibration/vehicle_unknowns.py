@@ -18,7 +18,7 @@ from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
-from drivetwin.twin.distribution import collect_covariance
+from drivetwin.twin.distribution import collect_covariance, has_possible_parts
 from drivetwin.twin.twin import PRESSURE_DELAY, SIMULATED, Twin
 
 METHOD = "logs of a calibration"
@@ -55,6 +55,7 @@ class VehicleUnknowns:
             for name, value in zip(self.ids, values, strict=False)
             if get_parameter_spec(name).lower >= 0.0
         )
+        above = above and has_possible_parts(dict(zip(self.ids, values.tolist(), strict=False)))
         return above and all(one.is_possible(values[part]) for one, part in self._pair_friction())
 
     def build_twin(self, z: FloatArray, covariance: FloatArray) -> Twin:

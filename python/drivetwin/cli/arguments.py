@@ -114,13 +114,6 @@ OptionalVehicleFile = Annotated[
         callback=require_card,
     ),
 ]
-DropPart = Annotated[
-    bool,
-    typer.Option(
-        "--drop-part",
-        help="Leave out the part that the twin's plant has beside the dual clutch.",
-    ),
-]
 ChannelsFile = Annotated[
     Path | None,
     typer.Option(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drivetwin.calibration.policy_kind import PolicyKind
-from drivetwin.cli.arguments import RESULT, TWIN, DropPart, TwinFile
+from drivetwin.cli.arguments import RESULT, TWIN, TwinFile
 from drivetwin.cli.calibrate_logs import (
     correct_by_logs,
     name_logs,
@@ -140,7 +140,6 @@ def calibrate(
             "corrects the twin. With --start the calibration is polished from there, not searched.",
         ),
     ] = None,
-    drop_part: DropPart = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Find shift profiles with a small peak jerk over the spread of made units.
@@ -158,7 +157,6 @@ def calibrate(
 
     given = Requirements(()) if limits is None else load_limits(limits)
     model = _load_valid_twin(twin)
-    model = model.drop_part() if drop_part else model
     gears, logs = parse_gears(shift), from_logs or []
     correction = correct_by_logs(model, logs, gears, given.spread) if logs else None
     model = model if correction is None else correction.twin
@@ -187,7 +185,6 @@ def calibrate(
         "policy": policy.value,
         "task": repr(task),
         "engine lag": repr(engine_lag),
-        "drop part": str(drop_part),
         "effort": repr(effort),
         "number of draws": str(draws),
         "seed": str(seed),

@@ -93,10 +93,10 @@ def examine(
     from drivetwin.estimation.result.method import Method
 
     asked = Asked(tuple(profile or ()), bootstrap, seed, friction, departures)
-    if (vehicle is None) == (model is None):
-        raise InputError("name what the log is of", "give --vehicle CARD or --model MODEL")
-    if model is not None:
+    if model is not None and vehicle is None:
         answers = list(examine_fit(log, model, asked))
+    elif vehicle is None or model is not None:
+        raise InputError("name what the log is of", "give --vehicle CARD or --model MODEL")
     else:
         for name in asked.profiles:
             get_parameter_spec(name)

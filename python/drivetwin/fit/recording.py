@@ -101,6 +101,32 @@ class NetworkRecord:
         """Sample quantities (N,) or (N, p) on the grid, by name; (size,) or (size, p)."""
         return np.concatenate([out.sample(self.time, columns[out.name]) for out in self.outputs])
 
+    def coarsen(self, points: int) -> NetworkRecord:
+        """Keep about so many `points` of the grid: every k-th sample of each output, and means of
+        the inputs over as many of theirs."""
+        every = max(self.time.size // points, 1)
+        if every == 1:
+            return self
+        stamps = [self.time[out.place[::every]] for out in self.outputs]
+        time = np.unique(np.concatenate([self.time[:1], *stamps]))
+        outputs = tuple(
+            replace(
+                out,
+                place=(place := np.searchsorted(time, own)),
+                centre=place,
+                values=out.values[::every],
+            )
+            for out, own in zip(self.outputs, stamps, strict=True)
+        )
+        inputs, sigma, held_back = {}, {}, {}
+        for name, signal in self.inputs.items():
+            step = float(np.median(np.diff(signal.time)))
+            size = max(round(float(np.median(np.diff(time))) / step), 1)
+            inputs[name] = _average_blocks(signal, size)
+            sigma[name] = self.input_sigma[name] / float(np.sqrt(size))
+            held_back[name] = np.zeros(inputs[name].values.size)
+        return NetworkRecord(time, outputs, inputs, sigma, held_back)
+
     def subtract_noise(
         self, noise: Mapping[str, FloatArray], delays: Mapping[str, float]
     ) -> NetworkRecord:
@@ -126,6 +152,20 @@ class NetworkRecord:
             name: np.interp(middle, self.inputs[name].time + delays[name], values)
             for name, values in self.held_back.items()
         }
+
+
+def _average_blocks(signal: Signal, size: int) -> Signal:
+    """Average a signal over blocks of `size` samples; its ends stay."""
+    count = signal.values.size // size
+    if size == 1 or count < 2:
+        return signal
+    blocks = [one[: count * size].reshape(count, size).mean(axis=1) for one in (
+        signal.time, signal.values
+    )]  # fmt: skip
+    first, last = ((float(signal.time[k]), float(signal.values[k])) for k in (0, -1))
+    time = np.concatenate([[first[0]], blocks[0], [last[0]]])
+    values = np.concatenate([[first[1]], blocks[1], [last[1]]])
+    return replace(signal, time=time, values=values)
 
 
 def build_network_record(
@@ -162,7 +202,9 @@ def build_network_record(
             what = f"{name}: {np.count_nonzero(inside)} samples from {late:.3f} to {early:.3f} s"
             raise InputError(what, "record the outputs over the same time as the inputs")
         compared[name] = replace(one, time=one.time[inside], values=one.values[inside])
-    time = fill_grid(np.unique(np.concatenate([one.time for one in compared.values()])))
+    stamps = np.unique(np.concatenate([one.time for one in compared.values()]))
+    between = [float(np.median(np.diff(one.time))) for one in inputs.values()]
+    time = fill_grid(stamps, max(min(between, default=RECORD.grid_step), RECORD.grid_step))
     samples = tuple(
         Output(name, np.searchsorted(time, one.time), one.values, one.get_noise())
         for name, one in compared.items()

@@ -9,7 +9,7 @@ draws from the priors side by side; only the best are refined.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +35,8 @@ Problem = LikelihoodObjective[NetworkTerm]
 class FitSearchSettings:
     """Settings of the search."""
 
+    points: int = 800
+    """Points of the grid on the way to the minimum, about [count]."""
     draws: int = 128
     """Draws of the screen, the first guess among them [count]."""
     usual_spread: float = 0.3
@@ -63,7 +65,7 @@ BENT = GaussNewtonSettings(bend_ratio=0.75)
 @dataclass(frozen=True, eq=False)
 class RefinedStart:
     """Minimum that a start led to: Q there as its expansion by the weighting of the best start
-    predicts it, and the iterations."""
+    predicts it, over the samples of the search, and the iterations."""
 
     point: ParameterVector
     cost: float
@@ -106,21 +108,32 @@ def search(
     IdentificationError
         Where no draw can be simulated, or no start leads to a minimum.
     """
+    coarse = _coarsen(problem)
     with scale_progress(0.0, 0.1):
-        candidates = _screen(problem, start, sought, np.random.default_rng(seed))
-    best = _Attempts(problem)
+        candidates = _screen(coarse, start, sought, np.random.default_rng(seed))
+    attempts = _Attempts(coarse)
     for number, candidate in enumerate(candidates[: FIT_SEARCH.max_starts]):
-        with scale_progress(0.1 + 0.08 * number, 0.18 + 0.08 * number):
-            best.refine(candidate)
-        if len(best.starts) >= FIT_SEARCH.min_starts and best.explains:
+        with scale_progress(0.1 + 0.06 * number, 0.16 + 0.06 * number):
+            attempts.refine(candidate)
+        if len(attempts.starts) >= FIT_SEARCH.min_starts and attempts.explains:
             break
-    if best.weighted is None:
+    if not attempts.starts:
         raise IdentificationError(
             "the simulation could not be brought onto the recordings from any start",
             "check first guesses, bounds and units against the recordings, and the start speeds",
         )
-    with scale_progress(0.74, 1.0):
-        return FoundMinimum(_expect_inputs(best.polish()), tuple(best.starts))
+    with scale_progress(0.58, 1.0):
+        best = _polish(problem, attempts.best.point)
+        return FoundMinimum(_expect_inputs(best), tuple(attempts.starts))
+
+
+def _coarsen(problem: Problem) -> Problem:
+    """Return the problem of fewer samples, for the way to the minimum."""
+    parts = [
+        NetworkTerm.from_sensor_noise(part.plant, part.record.coarsen(FIT_SEARCH.points))
+        for part in problem.parts
+    ]
+    return replace(problem, parts=tuple(parts))
 
 
 class _Attempts:
@@ -128,7 +141,7 @@ class _Attempts:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.weighted: Problem | None = None
+        self.weighted = problem
         self.starts: list[RefinedStart] = []
         self.rough = np.inf
 
@@ -141,7 +154,8 @@ class _Attempts:
     def explains(self) -> bool:
         """True if a minimum explains the recordings: Q per sample is about 1."""
         size = self.problem.size
-        return bool(self.best.cost / size < FIT_SEARCH.accept_chi2 + 3.0 * np.sqrt(2.0 / size))
+        limit = FIT_SEARCH.accept_chi2 + 3.0 * np.sqrt(2.0 / size)
+        return bool(self.best.cost / size < limit)
 
     def refine(self, start: ParameterVector) -> None:
         """Refine a start; one that fails is left out."""
@@ -149,7 +163,7 @@ class _Attempts:
         found = minimise(self.problem, start, rough=True, limit=limit, settings=BENT)
         if found is None:
             return
-        if self.weighted is None or found.normal.cost < self.rough:
+        if found.normal.cost < self.rough:
             self.rough = found.normal.cost
             self.weighted = self.problem.update_weighting(found.point)
             self.starts = [self._weigh(one.point, one.iterations) for one in self.starts]
@@ -157,24 +171,23 @@ class _Attempts:
 
     def _weigh(self, point: ParameterVector, iterations: int) -> RefinedStart:
         """Compute the minimum of Q that its expansion at a point predicts."""
-        assert self.weighted is not None
         normal = self.weighted.normal(point)
         if normal is None:
             return RefinedStart(point, np.inf, iterations)
         below = predict_decrease(self.weighted, point, normal.information, normal.gradient)
         return RefinedStart(point, normal.cost - below, iterations)
 
-    def polish(self) -> OptimizeResult[Problem]:
-        """Minimise from the best start, with the weighting formed anew at the minimum."""
-        assert self.weighted is not None
-        found = minimise(self.weighted, self.best.point, settings=BENT)
-        if found is None:
-            raise IdentificationError(
-                "the simulation fails beside its best start",
-                "state priors that keep the unknowns where the driveline can be simulated",
-            )
-        again = self.weighted.update_weighting(found.point)
-        return minimise(again, found.point, settings=BENT) or found
+
+def _polish(problem: Problem, point: ParameterVector) -> OptimizeResult[Problem]:
+    """Minimise from a point near the minimum, with the weighting formed anew there."""
+    found = minimise(problem.update_weighting(point), point, settings=BENT)
+    if found is None:
+        raise IdentificationError(
+            "the simulation fails beside its best start",
+            "state priors that keep the unknowns where the driveline can be simulated",
+        )
+    again = found.problem.update_weighting(found.point)
+    return minimise(again, found.point, settings=BENT) or found
 
 
 def _expect_inputs(found: OptimizeResult[Problem]) -> OptimizeResult[Problem]:

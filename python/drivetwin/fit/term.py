@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -28,6 +28,9 @@ from drivetwin.fit.recording import NetworkRecord
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import NetworkRun, simulate
 from drivetwin.simulation.network_response import NetworkResponse, compute_response
+
+_PROBES = 8
+"""Instants at which a state is disturbed to see which outputs show it [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +148,7 @@ class NetworkTerm:
         seen = [SeenOutput(rows[out.name], out.centre, out.sigma) for out in record.outputs]
         power = self._compute_power(response)
         try:
-            noise = InputNoise(seen, power, _compute_quiet_noise(seen))
+            noise = InputNoise(seen, power, _compute_quiet_noise(response, seen))
             weighting = add_input_noise(record.sigma, response, noise)
         except np.linalg.LinAlgError:
             return None
@@ -177,16 +180,22 @@ class NetworkTerm:
         return {name: float(one.delay) for name, one in inputs.items() if isinstance(one, Signal)}
 
 
-def _compute_quiet_noise(outputs: list[SeenOutput]) -> FloatArray:
-    """Compute the noise (S,) of a sensor of each state: the smallest change that one of the
-    outputs shows by its noise.
+def _compute_quiet_noise(response: LinearResponse, outputs: Sequence[SeenOutput]) -> FloatArray:
+    """Compute the change (S,) of each state that an output shows by the noise of its sensor.
 
-    A state that no output sees has the largest of the others.
+    Some time later, as a twist shows in no speed at once. A state that no output ever shows has no
+    unit to compare with: its change counts as 1.
     """
-    best = np.max(
-        [np.max(np.abs(np.atleast_2d(out.row)), axis=0) / out.sigma for out in outputs], 0
-    )
-    seen = best > 0.0
-    if not np.any(seen):
-        return np.ones_like(best)
-    return np.where(seen, 1.0 / np.where(seen, best, 1.0), np.max(1.0 / best[seen]))
+    steps, states = len(response.transition), response.states
+    places = np.unique(np.linspace(0, steps - 1, _PROBES).astype(int))
+    push = np.zeros((steps, states, places.size * states))
+    for k, place in enumerate(places):
+        push[place, :, k * states : (k + 1) * states] = np.eye(states)
+    z = response.propagate_columns(push)
+    shown = np.zeros((places.size, states))
+    for out in outputs:
+        effect = np.einsum("...s,...sq->...q", out.get_rows(), z[out.centre])
+        largest = np.max(np.abs(effect), axis=0) / out.sigma
+        shown = np.maximum(shown, largest.reshape(places.size, states))
+    usual = np.median(shown, axis=0)
+    return np.where(usual > 0.0, 1.0 / np.where(usual > 0.0, usual, 1.0), 1.0)

@@ -15,7 +15,7 @@ from typing import Any
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, RoadLoad, ShiftElement
 from drivetwin.simulation.element_schema import list_ports
-from drivetwin.simulation.network import Element, build_element
+from drivetwin.simulation.network import Element, Output, build_element
 from drivetwin.simulation.vehicle_parts import NO_PARTS, InputShaft, OpenConverter, VehicleParts
 
 CRANK, ENGINE, INPUT, OUTPUT, AXLE, WHEEL, VEHICLE = (
@@ -42,6 +42,40 @@ class OutputSide:
     def from_model(cls, model: DualClutch) -> OutputSide:
         """Select the output side of a model."""
         return cls(model.k_o, model.c_o, model.i_f, model.J_v, model.load)
+
+
+@dataclass(frozen=True, eq=False)
+class Driveline:
+    """Dual clutch with the parts beside it."""
+
+    model: DualClutch
+    parts: VehicleParts = NO_PARTS
+
+    def share_axes(self, other: VehicleParts) -> Driveline:
+        """Return the driveline with tables of its parts over the axes of those of `other`."""
+        return Driveline(self.model, self.parts.share_axes(other))
+
+
+@dataclass(frozen=True)
+class VehicleBody:
+    """Inertia that moves with the vehicle [kg m^2], path of the number, torque that drives it.
+
+    The torque at the inertia [N m] is `factor` times the output `drive`.
+    """
+
+    inertia: float
+    path: str
+    drive: Output
+    factor: float
+
+
+def find_body(driveline: Driveline) -> VehicleBody:
+    """Find the inertia that moves with the vehicle: behind the tyre where there is one."""
+    model, tyre = driveline.model, driveline.parts.tyre
+    if tyre is None:
+        return VehicleBody(model.J_v, "J_v.inertia", ("shaft_torque", SHAFT), model.i_f)
+    inertia = model.J_v - tyre.rim_inertia
+    return VehicleBody(inertia, "vehicle.inertia", ("torque", "tyre.b"), 1.0)
 
 
 def build_driveline(model: DualClutch, parts: VehicleParts = NO_PARTS) -> list[Element]:

@@ -35,10 +35,15 @@ def settle(
     the play of the shaft.
     """
     torque, _ = _solve_acceleration(model, parts, start, _interpolate(engine_torque, time))
+    return replace(start, twist=compute_twist(model, parts, torque))
+
+
+def compute_twist(model: DualClutch, parts: VehicleParts, torque: float) -> float:
+    """Compute the twist [rad] at which the output shaft has `torque` [N m], without its play."""
     table = parts.shaft_table
     if table is None:
-        return replace(start, twist=torque / model.k_o)
-    return replace(start, twist=float(np.interp(torque, table.torque, table.twist)))
+        return torque / model.k_o
+    return float(np.interp(torque, table.torque, table.twist))
 
 
 def build_start(

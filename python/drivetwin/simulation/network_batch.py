@@ -96,7 +96,7 @@ def simulate_network_batch(
         For a path that leads to no number, differing lengths or an inconsistent description.
     """
     native = resolve_native(elements, scenarios, outputs)
-    plain = _to_core_scenarios(scenarios)
+    plain = to_core_scenarios(scenarios)
     asked = BatchRequest.build(plain, time, parameters or {}, native, keep)
     require_numbers(elements, scenarios, asked.sets)
     return asked.simulate(as_json(list(elements)), asked.sets, threads)
@@ -136,7 +136,7 @@ def differentiate_network_batch(
     names, weights = list(unknowns), collect_weights(unknowns)
     native = resolve_native(elements, scenarios, outputs)
     require_unknowns((one.samples for one in scenarios), list(weights))
-    plain = _to_core_scenarios(scenarios)
+    plain = to_core_scenarios(scenarios)
     asked = BatchRequest.build(plain, time, parameters or {}, native, keep)
     require_numbers(elements, scenarios, asked.sets)
     require_derivatives(elements, scenarios, weights, asked.sets)
@@ -168,7 +168,8 @@ def resolve_native(
     return [request.native[0] for request in requests]
 
 
-def _to_core_scenarios(scenarios: Sequence[NetworkScenario]) -> list[CoreScenario]:
+def to_core_scenarios(scenarios: Sequence[NetworkScenario]) -> list[CoreScenario]:
+    """Return scenarios as the core takes them."""
     return [
         ((to_delayed_core_samples(one.samples), to_core_sines(one.inputs)), one.start.to_core())
         for one in scenarios

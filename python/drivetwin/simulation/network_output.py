@@ -66,6 +66,14 @@ def resolve_output(output: tuple[str, str], elements: Sequence[Mapping[str, Any]
     return Request(tuple(("torque", (element_name, node)) for node in others), -1.0)
 
 
+def to_native(
+    elements: Sequence[Mapping[str, Any]], outputs: Sequence[tuple[str, str]]
+) -> list[NativeOutput]:
+    """Return outputs without a fault, none of them at the ground, as the core takes them."""
+    requests = [resolve_output(one, elements) for one in outputs]
+    return [one.native[0] for one in requests if isinstance(one, Request)]
+
+
 def combine_columns(
     requests: Sequence[Request], columns: FloatArray | list[FloatArray]
 ) -> list[FloatArray]:

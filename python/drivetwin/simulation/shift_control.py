@@ -16,25 +16,21 @@ import numpy as np
 from drivetwin._native import simulate_controlled as native_simulate_controlled
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import InputError, Where
-from drivetwin.simulation.batch import parse_output, stack_sets
+from drivetwin.simulation.batch import stack_sets
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     CoreSamples,
     CoreStart,
-    DualClutch,
     FloatArray,
     Signal,
-    State,
     run_time,
-    to_core_start,
     to_delayed_core_samples,
 )
-from drivetwin.simulation.dual_clutch_paths import place_sets
 from drivetwin.simulation.network import Element, Output, Start
 from drivetwin.simulation.network_batch import NetworkScenario, resolve_native
 from drivetwin.simulation.network_output import NativeOutput
 from drivetwin.simulation.network_sensitivity import require_numbers
-from drivetwin.simulation.serialize import as_array, as_json, as_names
+from drivetwin.simulation.serialize import as_array, as_json
 
 INPUTS = (
     *("engine_torque", "pressure.offgoing", "pressure.oncoming"),
@@ -139,19 +135,6 @@ class ControlledBatch:
 
 
 @dataclass(frozen=True, eq=False)
-class ControlledPlant:
-    """Made units of a driveline: actuators, and values (units,) by the names of `parameters`.
-
-    `start` is the state at the first sample.
-    """
-
-    model: DualClutch
-    start: State
-    units: Sequence[ControlledUnit]
-    parameters: Mapping[str, FloatArray]
-
-
-@dataclass(frozen=True, eq=False)
 class ControlledNetwork:
     """Made units of a network: actuators, and values (units,) of numbers by path.
 
@@ -165,32 +148,6 @@ class ControlledNetwork:
     parameters: Mapping[str, FloatArray]
     inputs: Mapping[str, Signal] = field(default_factory=dict)
     engine_torque: str = ENGINE_TORQUE
-
-
-def simulate_controlled(
-    plant: ControlledPlant,
-    controllers: Sequence[ShiftController],
-    time: FloatArray,
-    *,
-    outputs: Sequence[str] = ("shaft_torque",),
-    with_inputs: bool = False,
-    threads: int = 0,
-) -> ControlledBatch:
-    """Simulate all controllers on all units on `time` (n,) [s].
-
-    Outputs are named as in `simulate_batch`. The controllers share elements, task and request.
-    `threads` 0 takes all cores. Raises InputError for an inconsistent description.
-    """
-    native = [parse_output(name) for name in as_names(outputs)]
-    sets = {name: as_array(values) for name, values in plant.parameters.items()}
-    _check(sets, len(plant.units), controllers, threads)
-    asked = _Asked(
-        as_json(plant.model),
-        to_core_start(plant.start),
-        plant.units,
-        place_sets(plant.model, sets),
-    )
-    return asked.simulate(controllers, time, native, with_inputs=with_inputs, threads=threads)
 
 
 def simulate_network_controlled(
@@ -231,12 +188,14 @@ def simulate_network_controlled(
     """
     sets = {name: as_array(values) for name, values in plant.parameters.items()}
     _check(sets, len(plant.units), controllers, threads)
+    clutches = {one.get("name"): one["pressure"] for one in plant.elements if "pressure" in one}
     commanded = (controllers[0].offgoing, controllers[0].oncoming)
-    pressures = [
-        one["pressure"]
-        for one in plant.elements
-        if one.get("name") in commanded and "pressure" in one
-    ]
+    for name in commanded:
+        if name not in clutches:
+            known = ", ".join(map(str, clutches))
+            what = f'clutch "{name}" is unknown; known are {known}'
+            raise InputError(what, "give a controller of clutches of the network")
+    pressures = [clutches[name] for name in commanded]
     held = Signal(np.array([0.0, 1.0]), np.zeros(2))
     inputs = {**dict.fromkeys([plant.engine_torque, *pressures], held), **plant.inputs}
     scenario = NetworkScenario(inputs, plant.start)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -85,6 +85,10 @@ class ShaftTable:
         torques = (one * (1.0 + factor * ((one / torque) ** 2 - 0.5)) for one in linear)
         return cls(tuple(twist.tolist()), tuple(torques))
 
+    def resample(self, twist: tuple[float, ...]) -> ShaftTable:
+        """Return the shaft with its torques at other twists (n,) [rad], 0 among them."""
+        return ShaftTable(twist, tuple(np.interp(twist, self.twist, self.torque).tolist()))
+
 
 @dataclass(frozen=True, eq=False)
 class VehicleParts:
@@ -104,6 +108,12 @@ class VehicleParts:
     brake_drag: float = 0.0
     tyre: TyreSlip | None = None
     walk: Signal | None = None
+
+    def share_axes(self, other: VehicleParts) -> VehicleParts:
+        """Return the parts with tables over the axes of those of `other`."""
+        if self.shaft_table is None or other.shaft_table is None:
+            return self
+        return replace(self, shaft_table=self.shaft_table.resample(other.shaft_table.twist))
 
 
 NO_PARTS = VehicleParts()

@@ -35,7 +35,6 @@ from drivetwin.simulation.dual_clutch import (
 from drivetwin.simulation.part_parameters import (
     PART_IDS,
     build_parts,
-    describe_parts,
     select_parts,
 )
 from drivetwin.simulation.vehicle_parts import VehicleParts
@@ -54,7 +53,10 @@ OF_ELEMENT = ("P0", "drum")
 """Stems of the element parameters that replace the design value if identified."""
 PRESSURE_DELAY = "p_delay"
 """Id of the delay of the acting pressures behind the logged ones."""
-SIMULATED = (*COMMON, "J_prime", *OF_ELEMENT, "ratio", FINAL_DRIVE, "te_delay", PRESSURE_DELAY)
+SIMULATED = (
+    *(*COMMON, "J_prime", *OF_ELEMENT, "ratio", FINAL_DRIVE, "te_delay", PRESSURE_DELAY),
+    *PART_IDS,
+)
 """Stems of the parameters that a simulation depends on; the others follow from them."""
 
 
@@ -191,23 +193,21 @@ class Twin(DisplayMixin):
         known = {name: self._is_known(name) for name in PART_IDS}
         return select_parts({name: value for name, value in known.items() if value is not None})
 
-    def build_parts(self, model: DualClutch) -> VehicleParts:
-        """Build the parts beside the `model` of a shift."""
-        return build_parts(self.part_values, model)
+    def build_parts(
+        self, model: DualClutch, overrides: Mapping[str, float] | None = None
+    ) -> VehicleParts:
+        """Build the parts beside the `model` of a shift.
+
+        `overrides` sets parameters of the twin's parts by id; other ids have no effect.
+        """
+        given = overrides or {}
+        own = {name: given.get(name, value) for name, value in self.part_values.items()}
+        return build_parts(own, model)
 
     def drop_part(self) -> Twin:
         """Return the twin with the dual clutch alone as its plant."""
         kept = {name: one for name, one in self.parameters.items() if name not in PART_IDS}
         return replace(self, parameters=kept)
-
-    def require_dual_clutch(self, purpose: str) -> None:
-        """Raise InputError for a plant with a part that `purpose` would leave out."""
-        if self.part_values:
-            raise InputError(
-                f"{purpose} holds the dual clutch alone, and the twin {self.name!r} also has "
-                f"{describe_parts(self.part_values)}",
-                "use --drop-part to leave that out",
-            )
 
     def list_model_ids(self, shift: Shift) -> tuple[str, ...]:
         """Ids of the parameters that the model of a shift is made from."""

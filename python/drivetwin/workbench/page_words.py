@@ -57,10 +57,6 @@ _PHRASES = (
     ),
     (r" \('drivetwin inspect LOG --write-mapping[^']*' begins one\)", ""),
     (r" \('drivetwin examine --friction free'\)", ""),
-    (
-        "use --drop-part to leave that out",
-        "export twin.toml; the command line exports models from it without that",
-    ),
     (r"state them by these options, or run .*", "answer them in the form"),
     (
         r"name (?P<thing>it|one) in a channel mapping",

@@ -44,7 +44,7 @@ class ObjectiveSettings:
 OBJECTIVE = ObjectiveSettings()
 
 
-class Record(Protocol):
+class ComparedSamples(Protocol):
     """Compared samples of a term."""
 
     @property
@@ -68,7 +68,7 @@ class Term(Protocol):
     """One recording: what was compared, its simulation, the weighting of its residuals."""
 
     @property
-    def record(self) -> Record:
+    def record(self) -> ComparedSamples:
         """Compared samples."""
 
     @property

@@ -9,13 +9,14 @@ import numpy as np
 
 from drivetwin._util.display_units import BAR, NM, Display, get_display_unit
 from drivetwin.calibration.calibrate import Assessment, Calibration
-from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.metrics import METRICS, Metric
+from drivetwin.calibration.evaluate import Plant, get_vehicle_inertias
+from drivetwin.calibration.metrics import METRICS, Metric, compute_acceleration
 from drivetwin.calibration.objective import Statistic
 from drivetwin.report.figure import Entry, Figure, make_subplots, make_trace
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import ACCENT, MEASURED, MUTED, SIMULATED, make_axis, make_layout
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.network import Output
 
 _DRAWN = 200
 """Runs behind a band."""
@@ -123,12 +124,11 @@ def _simulate_bands(found: Calibration, one: Assessment) -> tuple[_Band, _Band]:
     """Bands of the vehicle's acceleration change and of the on-coming element's slip."""
     shift = found.task.maneuver
     draws = found.fresh.select(slice(0, _DRAWN))
-    outputs = ("shaft_torque", f"slip.{shift.oncoming.name}")
+    outputs: tuple[Output, ...] = (shift.body.drive, ("slip", shift.oncoming.name))
     columns, _ = Plant(shift, found.task.settings.threads).simulate(one.control, draws, outputs)
-    vehicle = draws.sets.get("J_v", np.full(draws.count, shift.model.J_v))
-    scale = (shift.wheel_radius * shift.model.i_f / vehicle)[:, None]
-    torque = columns[:, 0]
-    return _compute_band(scale * (torque - torque[:, :1])), _compute_band(columns[:, 1])
+    vehicle = get_vehicle_inertias(shift, draws)
+    acceleration = compute_acceleration(shift, columns[:, 0], vehicle)
+    return _compute_band(acceleration), _compute_band(columns[:, 1])
 
 
 def _compute_band(values: FloatArray) -> _Band:

@@ -44,8 +44,8 @@ class RecordSettings:
     """Largest delay of the engine torque [s]; the end of a log has no input for as long."""
     grid_step: float = 1e-3
     """Step of the simulation grid where outputs are sampled more slowly [s]."""
-    max_grid_gap: float = 1.5 * grid_step
-    """Distance of output stamps above which grid points lie between them [s]."""
+    max_grid_gap: float = 1.5
+    """Distance of output stamps, over that step, above which grid points lie between them [-]."""
     min_output: float = 0.1
     """Time of a shift that an output must cover to be compared [s]."""
     min_noise: float = 2e-5
@@ -328,15 +328,10 @@ def _bound_noise(of_input: MeasuredSignal) -> float:
     return max(of_input.sigma, RECORD.min_noise * float(np.max(np.abs(of_input.values))))
 
 
-def fill_grid(time: FloatArray) -> FloatArray:
-    """Insert grid points between output stamps that are further apart than SLOW."""
-    wide = np.flatnonzero(np.diff(time) > RECORD.max_grid_gap)
-    steps = [
-        np.arange(
-            time[k] + RECORD.grid_step, time[k + 1] - 0.5 * RECORD.grid_step, RECORD.grid_step
-        )
-        for k in wide
-    ]
+def fill_grid(time: FloatArray, step: float = RECORD.grid_step) -> FloatArray:
+    """Insert grid points, `step` [s] apart, between output stamps that are further apart."""
+    wide = np.flatnonzero(np.diff(time) > RECORD.max_grid_gap * step)
+    steps = [np.arange(time[k] + step, time[k + 1] - 0.5 * step, step) for k in wide]
     return np.sort(np.concatenate([time, *steps]))
 
 
