@@ -51,7 +51,8 @@ def main() -> int:
         from benchmarks.fit.peers import compare
 
         for name in given.problem:
-            _print(compare(name, given.seed))
+            for line in compare(name, given.seed):
+                _print(line)
     elif given.coupled:
         from benchmarks.fit.coupled_clutches import run
 

@@ -8,7 +8,7 @@ the prior means. Neither has a model of the noise of the inputs.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -109,7 +109,7 @@ class Squares:
         return dict(zip(self.problem.unknowns, values, strict=False)), runs
 
 
-def compare(name: str, seed: int) -> str:
+def compare(name: str, seed: int) -> Iterator[str]:
     """Compare the programs on three realisations of a problem.
 
     Parameters
@@ -119,10 +119,11 @@ def compare(name: str, seed: int) -> str:
     seed
         Seed of the first realisation.
 
-    Returns
-    -------
+    Yields
+    ------
     str
-        Table: error over bound (root mean square over the unknowns, and largest) and CPU time.
+        Lines of a table: error over bound (root mean square over the unknowns, and largest) and
+        CPU time.
     """
     problem = build_problem(name)
     bounds = compute_bound(problem).std
@@ -131,17 +132,14 @@ def compare(name: str, seed: int) -> str:
         "SciPy, simulator, differences": partial(_run_scipy, problem),
         "CasADi, smooth model": partial(_run_smooth, problem),
     }
-    lines = [
-        f"## {problem.text}",
-        "",
-        format_header("program", "realisation", "error/bound", "largest", "CPU time [s]"),
-    ]
+    yield f"## {problem.text}\n"
+    yield format_header("program", "realisation", "error/bound", "largest", "CPU time [s]")
     for at in range(seed, seed + COUNT):
         drawn = draw(problem, at)
         for program, run in programs.items():
             cells = _measure(problem, bounds, partial(run, drawn))
-            lines.append(format_row(program, f"{at}", *cells))
-    return "\n".join([*lines, ""])
+            yield format_row(program, f"{at}", *cells)
+    yield ""
 
 
 def _measure(
