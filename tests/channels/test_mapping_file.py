@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.extra_roles import EXTRA_ROLES, PLACED_ROLES
 from drivetwin.channels.mapping_file import ByRole, ChannelTable, read_mapping
 from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
@@ -46,7 +47,8 @@ def test_the_time_column_can_be_mapped(tmp_path: Path) -> None:
 
 
 def test_every_role_has_its_table() -> None:
-    assert set(ByRole[ChannelTable].model_fields) == {*ROLES, "pressure", "pressure_command"}
+    fields = {*ROLES, *EXTRA_ROLES, *PLACED_ROLES, "pressure", "pressure_command"}
+    assert set(ByRole[ChannelTable].model_fields) == fields
 
 
 def test_all_faults_are_told_with_their_keys(tmp_path: Path) -> None:

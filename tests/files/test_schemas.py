@@ -17,13 +17,17 @@ from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.export.parameters.json_file import format_json
 from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.files.fit_file import build_fit_file, format_fit_file
 from drivetwin.files.result_file import ResultFile
 from drivetwin.files.schemas import FileKind, build_json_schema
 from drivetwin.files.twin_conversion import save_twin
+from drivetwin.fit.model_file import format_model
+from drivetwin.fit.synthesize import ModelName, read_builtin
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind, Limit
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report import sample
+from tests.support.fits import fit_log
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "drivetwin"
@@ -56,6 +60,10 @@ def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
             yield json.loads(ResultFile.from_result(sample.identification()).to_json())
         case FileKind.PARAMETERS:
             yield json.loads(format_json(collect_parameters(twin())))
+        case FileKind.FIT:
+            yield json.loads(
+                format_fit_file(build_fit_file(fit_log(ModelName.TIP_IN), ["a.csv"], {}))
+            )
         case _:
             yield from (tomllib.loads(text) for text in _toml(kind, folder))
 
@@ -71,6 +79,10 @@ def _toml(kind: FileKind, folder: Path) -> list[str]:
         case FileKind.CHANNEL_MAPPING:
             written = format_mapping({"pressure.B2": ChannelSpec("p2", unit="bar", sign=-1)})
             return [written, *fenced(REFERENCE / "channel-mapping.md", "toml")]
+        case FileKind.MODEL:
+            page = fenced(REFERENCE / "model-file.md", "toml")
+            made = [format_model(*read_builtin(name)) for name in ModelName]
+            return [*toml_files(PACKAGE / "fit" / "examples"), *made, *page]
         case FileKind.FLEET_RULES:
             return fenced(ROOT / "docs" / "howto" / "fleet.md", "toml")[:1]
         case _:

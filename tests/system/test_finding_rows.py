@@ -12,7 +12,6 @@ from drivetwin.files.records import FindingRecord
 from drivetwin.findings import Code, make_row, report
 from drivetwin.report.sections.blocks import TableBlock
 from drivetwin.report.sections.parameters import build_findings_section
-from tests.report.sample import identification
 
 ROWS = (
     make_row(shift="2-3", channel="output torque", source="engine torque", size=7.4),

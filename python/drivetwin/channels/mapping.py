@@ -9,6 +9,7 @@ from pathlib import Path
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
+from drivetwin.channels.extra_roles import is_extra
 from drivetwin.channels.pressure_roles import (
     get_element,
     make_command_role,
@@ -101,6 +102,7 @@ def resolve_roles(
     _refuse_double_use(channels, {*stated, *recalled}, file)
     _refuse_absent(needed, channels, columns, file, absent)
     order = [*ROLES, *map(make_pressure_role, elements), *map(make_command_role, elements)]
+    order += [role for role in channels if is_extra(role)]
     without = [element for element in elements if make_pressure_role(element) not in channels]
     if without:
         findings.append(report(Code.NO_PRESSURE, elements=", ".join(without)))

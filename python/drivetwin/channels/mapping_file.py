@@ -12,6 +12,7 @@ from pydantic import Field
 
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.extra_roles import EXTRA_ROLES, PLACED_ROLES
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.name_table import normalise_name
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
@@ -26,7 +27,8 @@ Entry = TypeVar("Entry")
 
 
 class ByRole(StrictModel, Generic[Entry]):
-    """A table with one entry for each channel role; pressures stand under their element."""
+    """A table with one entry for each channel role; pressures are listed by element, torques of
+    shafts and temperatures by place."""
 
     engine_torque: Entry | None = None
     output_torque: Entry | None = None
@@ -39,12 +41,16 @@ class ByRole(StrictModel, Generic[Entry]):
     requested_gear: Entry | None = None
     shift_in_process: Entry | None = None
     lockup_engaged: Entry | None = None
+    motor_torque: Entry | None = None
+    motor_speed: Entry | None = None
     pressure: dict[str, Entry] = Field(default_factory=dict)
     pressure_command: dict[str, Entry] = Field(default_factory=dict)
+    shaft_torque: dict[str, Entry] = Field(default_factory=dict)
+    temperature: dict[str, Entry] = Field(default_factory=dict)
 
     def iterate_roles(self) -> Iterator[tuple[str, Entry]]:
         """Yield role and entry of all that are given."""
-        for role in ROLES:
+        for role in (*ROLES, *EXTRA_ROLES):
             entry = getattr(self, role)
             if entry is not None:
                 yield role, entry
@@ -52,6 +58,9 @@ class ByRole(StrictModel, Generic[Entry]):
             yield make_pressure_role(element), entry
         for element, entry in self.pressure_command.items():
             yield make_command_role(element), entry
+        for kind in PLACED_ROLES:
+            for place, entry in getattr(self, kind).items():
+                yield f"{kind}.{place}", entry
 
 
 class ChannelTable(StrictModel):

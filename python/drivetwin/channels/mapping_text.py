@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from drivetwin._util.toml import format_key, format_text
 from drivetwin._util.visible_text import escape_line
 from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.extra_roles import get_place
 from drivetwin.channels.pressure_roles import get_element
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.roles import get_quantity
@@ -119,7 +120,7 @@ def _comment(text: str) -> str:
 
 
 def _format_path(role: str) -> str:
-    element = get_element(role)
+    element = get_place(role) or get_element(role)
     return role if element is None else role.removesuffix(element) + format_key(element)
 
 

@@ -7,9 +7,16 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from itertools import chain
 
+from drivetwin.channels.extra_recognition import add_extra_candidates, find_extra, has_unit_of
+from drivetwin.channels.extra_roles import is_extra
 from drivetwin.channels.name_table import NameTable, load_name_table, normalise_name
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
+from drivetwin.channels.pressure_roles import (
+    get_element,
+    make_command_role,
+    make_pressure_role,
+)
 from drivetwin.channels.read_options import Column
+from drivetwin.channels.roles import get_quantity
 
 WHOLE_WORD = 3
 """Fewest letters of a word that is no abbreviation."""
@@ -29,7 +36,11 @@ def infer_candidates(
     columns = [column for column in columns if not column.silent]
     table = load_name_table()
     forms = {
-        **{role: _list_forms(pattern, table) for role, pattern in table.patterns.items()},
+        **{
+            role: _list_forms(pattern, table)
+            for role, pattern in table.patterns.items()
+            if not is_extra(role)
+        },
         **{
             make_pressure_role(element): _list_pressure_forms(element, kind, table)
             for element, kind in elements.items()
@@ -53,11 +64,30 @@ def infer_candidates(
         role: _select_first_match(spelled, filter(None, (added.get(role), *some)))
         for role, some in forms.items()
     }
-    return {
+    chosen = {
         role: _drop_secondary(prefer_filled(candidates))
         for role, candidates in found.items()
         if candidates
     }
+    return add_extra_candidates(chosen, wholes, own)
+
+
+def find_candidates(columns: Sequence[Column], role: str) -> list[Column]:
+    """Return the columns whose name fits a role that is wanted, whatever other roles they fit.
+
+    A pressure is that of a clutch or a brake. Raises KeyError for a role that does not exist.
+    """
+    quantity = get_quantity(role)
+    columns = [one for one in columns if not one.silent and has_unit_of(one, quantity)]
+    if is_extra(role):
+        wholes = [(column, normalise_name(column.name)) for column in columns]
+        return prefer_filled(find_extra(wholes).get(role, []))
+    element = get_element(role)
+    kinds = [{}] if element is None else [{element: "clutch"}, {element: "brake"}]
+    for elements in kinds:
+        if found := infer_candidates(columns, elements).get(role):
+            return found
+    return []
 
 
 def find_hints(columns: Iterable[Column], role: str) -> dict[str, str]:

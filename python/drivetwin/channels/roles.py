@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from drivetwin.channels.extra_roles import get_extra_quantity
 from drivetwin.channels.pressure_roles import get_element
 from drivetwin.channels.shiftlog import Quantity
 
@@ -19,7 +20,8 @@ ROLES: dict[str, Quantity] = {
     "shift_in_process": Quantity.STATE,
     "lockup_engaged": Quantity.STATE,
 }
-"""Roles that exist once; beside them stand a pressure and a command for each shift element."""
+"""Roles that exist once; each shift element also has a pressure and a command, and
+`drivetwin.channels.extra_roles` has those of other sensors."""
 
 NEEDED = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
 """Roles without which a log cannot be identified in absolute terms (pressures come on top)."""
@@ -39,4 +41,7 @@ MEASURED = frozenset(role for role in ROLES if ROLES[role] in (Quantity.TORQUE, 
 
 def get_quantity(role: str) -> Quantity:
     """Return the quantity of a role; raises KeyError for a role that does not exist."""
+    extra = get_extra_quantity(role)
+    if extra is not None:
+        return extra
     return ROLES[role] if get_element(role) is None else Quantity.PRESSURE

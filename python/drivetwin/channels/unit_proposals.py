@@ -79,7 +79,10 @@ def propose_units(role: str, span: Range | None) -> tuple[Proposal, ...]:
     both_signs = low < 0.0 < high and smallest > _MOST_REVERSED * largest
     if both_signs and quantity is not Quantity.TORQUE:
         return ()
-    least, most = _USUAL_PRESSURE if quantity is Quantity.PRESSURE else _USUAL[role]
+    usual = _USUAL_PRESSURE if quantity is Quantity.PRESSURE else _USUAL.get(role)
+    if usual is None:
+        return ()
+    least, most = usual
     factors = {unit: _get_factor(unit) for unit in _UNITS[quantity]}
     fitting = [unit for unit, factor in factors.items() if least <= factor * largest <= most]
     if quantity is Quantity.FRACTION:

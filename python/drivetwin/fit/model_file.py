@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,6 +22,8 @@ from drivetwin._util.toml import (
     validate_schema,
 )
 from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.extra_roles import EXTRA_ROLES, PLACED_ROLES
+from drivetwin.channels.roles import ROLES, get_quantity
 from drivetwin.errors import InputError
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output
@@ -41,9 +43,14 @@ class ModelFileError(InputError):
 
 
 class ChannelEntry(StrictModel):
-    """Column of the log that an input or output stands in: see the channel mapping."""
+    """Column of the log with an input or output: see the channel mapping.
+
+    `source` is its name. With `role` in its place, such as `motor_torque`, the column is recognised
+    by its name.
+    """
 
     source: str | None = None
+    role: str | None = None
     group: str | None = None
     unit: str | None = None
     sign: Literal[1, -1] = 1
@@ -51,10 +58,24 @@ class ChannelEntry(StrictModel):
     offset: float = 0.0
     time_shift_s: float = 0.0
 
+    @model_validator(mode="after")
+    def _check_role(self) -> ChannelEntry:
+        if self.role is None:
+            return self
+        if self.source is not None:
+            raise ValueError("state source or role, not both")
+        try:
+            get_quantity(self.role)
+        except KeyError:
+            known = ", ".join((*ROLES, *EXTRA_ROLES, *(f"{one}.NAME" for one in PLACED_ROLES)))
+            hint = suggest_spelling(self.role, (*ROLES, *EXTRA_ROLES))
+            raise ValueError(f"{self.role!r} is no role{hint}; known are {known}") from None
+        return self
+
     def to_spec(self, name: str) -> ChannelSpec:
         """Return the spec of the channel; without `source` the column has the `name` itself."""
         return ChannelSpec(
-            self.source or name,
+            self.source or self.role or name,
             self.unit,
             self.sign,
             self.scale,
@@ -154,13 +175,17 @@ class NetworkFile(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class ModelChannels:
-    """Columns of the logs by the names of inputs and outputs, noise by output, known starts."""
+    """Columns of the logs by the names of inputs and outputs, noise by output, known starts.
+
+    `roles` are those of columns that are recognised by name; the source of their spec is the role.
+    """
 
     inputs: Mapping[str, ChannelSpec]
     outputs: Mapping[str, ChannelSpec]
     sigma: Mapping[str, float]
     known: Mapping[str, float]
     run: RunTable | None = None
+    roles: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
@@ -203,6 +228,11 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         {name: one.sigma for name, one in file.outputs.items() if one.sigma is not None},
         _collect_known(start, str(path)),
         file.run,
+        {
+            name: one.role
+            for name, one in (*file.inputs.items(), *file.outputs.items())
+            if one.role is not None
+        },
     )
     return model, channels
 
@@ -249,11 +279,12 @@ def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> 
     lines = ["[model]", f"name = {format_text(model.name)}"]
     for element in model.elements:
         lines += ["", "[[elements]]", *(_format_entry(*item) for item in dict(element).items())]
-    lines += _format_inputs(model, channels.inputs if channels else {})
+    roles = channels.roles if channels else {}
+    lines += _format_inputs(model, channels.inputs if channels else {}, roles)
     for name, output in model.outputs.items():
         lines += ["", f"[outputs.{format_key(name)}]", _format_entry("quantity", list(output))]
         if channels is not None:
-            lines += _format_spec(channels.outputs[name])
+            lines += _format_spec(channels.outputs[name], roles.get(name))
             if name in channels.sigma:
                 lines.append(_format_entry("sigma", channels.sigma[name]))
     start = model.start
@@ -268,7 +299,9 @@ def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> 
     return "\n".join(lines) + "\n"
 
 
-def _format_inputs(model: NetworkModel, recorded: Mapping[str, ChannelSpec]) -> list[str]:
+def _format_inputs(
+    model: NetworkModel, recorded: Mapping[str, ChannelSpec], roles: Mapping[str, str]
+) -> list[str]:
     lines = []
     for name, value in model.inputs.items():
         if name in recorded:
@@ -278,7 +311,7 @@ def _format_inputs(model: NetworkModel, recorded: Mapping[str, ChannelSpec]) -> 
             raise InputError(what, "give the channel that records it")
         lines += ["", f"[inputs.{format_key(name)}]", _format_entry("value", value)]
     for name, spec in recorded.items():
-        lines += ["", f"[inputs.{format_key(name)}]", *_format_spec(spec)]
+        lines += ["", f"[inputs.{format_key(name)}]", *_format_spec(spec, roles.get(name))]
     return lines
 
 
@@ -303,8 +336,8 @@ def _format_run(run: RunTable) -> list[str]:
     return lines
 
 
-def _format_spec(spec: ChannelSpec) -> list[str]:
-    entries: dict[str, Any] = {"source": spec.source}
+def _format_spec(spec: ChannelSpec, role: str | None) -> list[str]:
+    entries: dict[str, Any] = {"source": spec.source} if role is None else {"role": role}
     usual = ChannelSpec(spec.source)
     for key in ("group", "unit", "sign", "scale", "offset"):
         if getattr(spec, key) != getattr(usual, key):

@@ -3,8 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.mapping import make_spec
+from drivetwin.channels.read_options import Column
+from drivetwin.channels.recognition import find_candidates
+from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.findings import Finding
@@ -12,6 +19,7 @@ from drivetwin.fit.model_file import ModelChannels
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.recording import Measured, Recording
+from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.read import read_channels
 from drivetwin.simulation.dual_clutch import Signal
 
@@ -26,7 +34,7 @@ def read_recording(
     quantities = {name: find_input_quantity(name, model.elements) for name in channels.inputs}
     for name, output in model.outputs.items():
         quantities[name] = get_output_quantity(output)
-    specs = {**channels.inputs, **channels.outputs}
+    specs = _find_columns(path, {**channels.inputs, **channels.outputs}, channels.roles)
     found, findings = read_channels(path, specs, quantities)
     signals = {name: prepare_signal(channel) for name, channel in found.items()}
     inputs = {name: _to_signal(signals[name]) for name in channels.inputs}
@@ -36,6 +44,38 @@ def read_recording(
         for one in [signals[name]]
     }
     return Recording(inputs, outputs, channels.known), findings
+
+
+def _find_columns(
+    path: Path, specs: Mapping[str, ChannelSpec], roles: Mapping[str, str]
+) -> dict[str, ChannelSpec]:
+    """Return the specs with the columns that are recognised by role.
+
+    Raises MissingChannelError where no column has a name of the role, MappingError for several.
+    """
+    if not roles:
+        return dict(specs)
+    with open_recording(path) as recording:
+        columns = recording.columns
+    return {
+        name: _pick_column(path, one, roles[name], columns) if name in roles else one
+        for name, one in specs.items()
+    }
+
+
+def _pick_column(
+    path: Path, stated: ChannelSpec, role: str, columns: Sequence[Column]
+) -> ChannelSpec:
+    found, where = find_candidates(columns, role), Where(file=str(path))
+    if not found:
+        known = ", ".join(dict.fromkeys(one.name for one in columns))
+        what = f"no column has a name of {role!r}; the log has {known}"
+        raise MissingChannelError(what, "name the column: source in place of role", where)
+    if len(found) > 1:
+        what = f"{role!r} has several candidates: the columns {', '.join(map(str, found))}"
+        raise MappingError(what, "name the column: source in place of role", where)
+    spec = make_spec(found[0], columns)
+    return replace(stated, source=spec.source, group=spec.group)
 
 
 def _to_signal(one: MeasuredSignal) -> Signal:

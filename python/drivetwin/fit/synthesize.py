@@ -131,7 +131,8 @@ def _read_truth(model: NetworkModel) -> dict[str, float]:
 
 def _guess(model: NetworkModel) -> NetworkModel:
     """Return the model with the first guesses in its elements."""
-    sought = [resolve_unknown(name, one, model.elements) for name, one in model.unknowns.items()]
+    resolved = [resolve_unknown(name, one, model.elements) for name, one in model.unknowns.items()]
+    sought = [replace(one, is_positive=False) for one in resolved]  # as written: no logarithm
     names = tuple(one.name for one in sought)
     point = ParameterVector(names, np.array([one.start for one in sought]))
     plant = Plant(model.elements, {}, model.start, model.outputs, sought)

@@ -15,6 +15,7 @@ from drivetwin._util.progress import notify_progress
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
+from drivetwin.channels.extra_roles import is_extra
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
@@ -177,6 +178,8 @@ def assemble_log(
         findings += checked.findings
     gearing = card if demands.gearing else None
     channels, dropped = _drop_inconsistent(channels, strict, gearing, source)
+    extras = {role: one for role, one in channels.items() if is_extra(role)}
+    channels = {role: one for role, one in channels.items() if role not in extras}
     findings += [*dropped, *check_coverage(channels)]
     if card is not None:
         findings += [*check_torque_balance(channels, card), *check_final_drive(channels, card)]
@@ -186,7 +189,7 @@ def assemble_log(
         channels, late = mark_late_samples(channels)
         findings += late
     return ShiftLog(
-        channels,
+        {**channels, **extras},
         source,
         "",
         tuple(dict.fromkeys(findings)),
@@ -213,7 +216,7 @@ def _select_strict_roles(
         return frozenset(mapped).intersection(strict | frozenset(sound))
     has_converter = card is not None and card.converter is not None
     spare = {"engine_speed"} if "input_speed" in mapped and not has_converter else set()
-    spare |= {role for role in mapped if get_command_element(role) is not None}
+    spare |= {role for role in mapped if get_command_element(role) is not None or is_extra(role)}
     usual = {role for role in mapped if role in specs or get_quantity(role) not in AUXILIARY}
     return frozenset(mapped).intersection(strict | (usual - spare))
 

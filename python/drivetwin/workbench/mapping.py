@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.extra_roles import EXTRA_ROLES, is_extra
 from drivetwin.channels.mapping import make_spec
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
@@ -59,9 +60,11 @@ class Corrections:
 
 
 def list_roles(survey: Survey) -> tuple[str, ...]:
-    """List the roles that a column may have, pressures and commands of the elements last."""
+    """List the roles that a column may have: those of shifts, pressures, extra ones."""
     elements = survey.elements or ()
-    return (*ROLES, *map(make_pressure_role, elements), *map(make_command_role, elements))
+    pressures = (*map(make_pressure_role, elements), *map(make_command_role, elements))
+    found = [role for role in survey.mapping if is_extra(role)]
+    return tuple(dict.fromkeys((*ROLES, *pressures, *EXTRA_ROLES, *found)))
 
 
 def list_unit_names() -> list[str]:

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""`fit.json`: content, round trip, refusal of what is not of its schema."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from pydantic import ValidationError
+
+from drivetwin.files.fit_file import FitFile, build_fit_file, format_fit_file
+from drivetwin.findings import Code, report
+from drivetwin.fit.holdout import predict
+from drivetwin.fit.synthesize import ModelName
+from tests.support.fits import fit_log, make_log
+
+
+def build() -> FitFile:
+    found = fit_log(ModelName.ENGINE_START)
+    held = predict(found, [make_log(ModelName.ENGINE_START, 1).recording])
+    remarks = (report(Code.RECORDING, text="a remark"),)
+    return build_fit_file(found, ["k0.csv"], {"other.csv": held[0]}, remarks)
+
+
+def test_the_file_has_the_numbers_of_the_fit() -> None:
+    found, file = fit_log(ModelName.ENGINE_START), build()
+    assert file.model == "K0 engagement"
+    assert file.status is found.status
+    assert (file.chi2, file.cost) == (found.chi2, found.cost)
+    assert list(file.unknowns) == list(found.values)
+    for name, one in file.unknowns.items():
+        assert one.minimum == found.values[name]
+        assert one.interval == pytest.approx(found.intervals[name])
+        assert file.correlation[name][name] == pytest.approx(1.0)
+    assert len(file.starts) == len(found.starts)
+    assert file.findings[0].code == Code.RECORDING
+    assert [one.log for one in file.held_out] == ["other.csv"]
+
+
+def test_the_text_reads_back_equal_and_is_the_same_each_time() -> None:
+    text = format_fit_file(build())
+    assert text == format_fit_file(build())
+    assert FitFile.model_validate_json(text) == build()
+    assert "NaN" not in text
+
+
+def test_a_wrong_key_or_type_is_refused() -> None:
+    content = json.loads(format_fit_file(build()))
+    with pytest.raises(ValidationError, match="nonsense"):
+        FitFile.model_validate({**content, "nonsense": 1})
+    with pytest.raises(ValidationError, match="chi2"):
+        FitFile.model_validate({**content, "chi2": "small"})

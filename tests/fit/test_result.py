@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""Result of a fit: values, covariance, fitted model, findings."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.fit.result import WITH_PRIOR
+from drivetwin.fit.synthesize import ModelName
+from drivetwin.simulation.network import simulate
+from drivetwin.simulation.network_sensitivity import get_number
+from tests.support.fits import fit_log, make_log
+
+FOUND = ModelName.ENGINE_START
+
+
+def test_the_fitted_model_has_the_values_in_its_elements_and_as_first_guesses() -> None:
+    found = fit_log(FOUND)
+    for name, value in found.values.items():
+        assert get_number(found.fitted.elements, name) == pytest.approx(value)
+        assert found.fitted.unknowns[name].value == pytest.approx(value)
+        assert found.fitted.unknowns[name].std == found.model.unknowns[name].std
+        assert get_number(found.model.elements, name) == make_log(FOUND).model.unknowns[name].value
+
+
+def test_the_runs_are_those_of_the_fitted_model() -> None:
+    found = fit_log(FOUND)
+    (run,) = found.simulate()
+    (part,) = found.problem.parts
+    model = found.fitted
+    again = simulate(
+        list(model.elements), part.record.inputs, model.start, run.time, list(run.columns)
+    )
+    for output, column in run.columns.items():
+        assert again.columns[output] == pytest.approx(column, abs=1e-6)
+
+
+def test_q_is_that_of_the_samples_and_of_the_priors() -> None:
+    found = fit_log(FOUND)
+    prior = found.problem.prior.compute_prior_cost(found.minimum.point.values)
+    assert found.cost == pytest.approx(found.chi2 * found.problem.size + prior)
+    assert prior > 0.0
+
+
+def test_intervals_are_symmetric_by_the_logarithm_and_agree_with_the_deviations() -> None:
+    found = fit_log(FOUND)
+    for one in found.sought:
+        low, high = found.intervals[one.name]
+        value, std = found.values[one.name], found.std[one.name]
+        assert sqrt(low * high) == pytest.approx(value)
+        assert np.log(high / low) / 2.0 == pytest.approx(Z95 * std / value)
+        estimate = found.estimates[one.name]
+        assert estimate.value == pytest.approx(value)
+        assert estimate.std_noise == pytest.approx(std)
+        assert estimate.method == WITH_PRIOR
+        assert std < float(one.unknown.std or np.inf)
+
+
+def test_the_correlation_has_a_unit_diagonal() -> None:
+    correlation = fit_log(FOUND).correlation
+    assert np.diag(correlation) == pytest.approx(1.0)
+    assert correlation == pytest.approx(correlation.T)
+    assert np.max(np.abs(correlation)) <= 1.0 + 1e-12
+
+
+def test_the_starts_are_compared_and_the_best_is_counted() -> None:
+    found = fit_log(FOUND)
+    assert 1 <= found.agreeing <= len(found.starts)
+    assert min(one.cost for one in found.starts) < np.inf
