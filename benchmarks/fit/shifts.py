@@ -39,7 +39,7 @@ def build_shift() -> Problem:
             "k_in": Sought(320e3, ("input shaft.stiffness",)),
             "c_in": Sought(60.0, ("input shaft.damping",)),
             "J1b": Sought(8.0, ("J1b.inertia",)),
-            "ratio_3": Sought(1.31, ("third.ratio",), 0.1),
+            "ratio_3": Sought(1.31, ("third.ratio",)),
             "k_o": Sought(176e3, ("output shaft.stiffness",)),
             "c_o": Sought(280.0, ("output shaft.damping",)),
             "Jv": Sought(6000.0, ("Jv.inertia",)),

@@ -119,5 +119,5 @@ def _draw_part(part: NetworkTerm, found: ModelFit, rng: np.random.Generator) -> 
         driving = smooth_pressure(MeasuredSignal(signal.time, read, sigma))
         inputs[name] = replace(signal, values=driving)
         held_back[name] = read - driving
-    made = replace(record, outputs=outputs, inputs=inputs, held_back=held_back)
+    made = replace(record, outputs=outputs, inputs=inputs, held_back=held_back, fast=held_back)
     return NetworkTerm.from_sensor_noise(part.plant, made)

@@ -72,8 +72,8 @@ class NetworkRecord:
     """Recording made ready for a fit.
 
     `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
-    `inputs` drive the simulation: the values as read less `held_back`; `input_sigma` is the white
-    noise of their samples.
+    `inputs` drive the simulation: the values as read less `held_back`, of which `fast` lies above
+    the band of the actuators; `input_sigma` is the white noise of their samples.
     """
 
     time: FloatArray
@@ -81,6 +81,7 @@ class NetworkRecord:
     inputs: Mapping[str, Signal]
     input_sigma: Mapping[str, float]
     held_back: Mapping[str, FloatArray]
+    fast: Mapping[str, FloatArray]
 
     @property
     def size(self) -> int:
@@ -125,24 +126,25 @@ class NetworkRecord:
             inputs[name] = _average_blocks(signal, size)
             sigma[name] = self.input_sigma[name] / float(np.sqrt(size))
             held_back[name] = np.zeros(inputs[name].values.size)
-        return NetworkRecord(time, outputs, inputs, sigma, held_back)
+        return NetworkRecord(time, outputs, inputs, sigma, held_back, held_back)
 
     def subtract_noise(
         self, noise: Mapping[str, FloatArray], delays: Mapping[str, float]
     ) -> NetworkRecord:
-        """Subtract the expected `noise` (N-1,) per step of the grid from the inputs, which act by
-        their `delays` [s] later."""
+        """Subtract the expected `noise` (N-1,) per step of the grid from the inputs as read, which
+        act by their `delays` [s] later. It takes the place of what was expected before."""
         middle = 0.5 * (self.time[1:] + self.time[:-1])
         inputs, held_back = dict(self.inputs), dict(self.held_back)
         for name, steps in noise.items():
             signal = self.inputs[name]
             at = signal.time + delays[name]
-            own = np.where(
-                (at >= middle[0]) & (at <= middle[-1]), np.interp(at, middle, steps), 0.0
+            inside = (at >= middle[0]) & (at <= middle[-1])
+            own = smooth_local_cubic(
+                signal.time, np.where(inside, np.interp(at, middle, steps), 0.0)
             )
-            own = smooth_local_cubic(signal.time, own)
-            inputs[name] = replace(signal, values=signal.values - own)
-            held_back[name] = self.held_back[name] + own
+            read = signal.values + self.held_back[name]
+            held_back[name] = self.fast[name] + own
+            inputs[name] = replace(signal, values=read - held_back[name])
         return replace(self, inputs=inputs, held_back=held_back)
 
     def interpolate_held_back(self, delays: Mapping[str, float]) -> dict[str, FloatArray]:
@@ -214,12 +216,14 @@ def build_network_record(
         name: smooth_pressure(MeasuredSignal(one.time, one.values, sigma[name]))
         for name, one in inputs.items()
     }
+    fast = {name: one.values - smooth[name] for name, one in inputs.items()}
     return NetworkRecord(
         time,
         samples,
         {name: replace(one, values=smooth[name]) for name, one in inputs.items()},
         sigma,
-        {name: one.values - smooth[name] for name, one in inputs.items()},
+        fast,
+        fast,
     )
 
 

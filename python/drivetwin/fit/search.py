@@ -38,13 +38,17 @@ class FitSearchSettings:
     points: int = 800
     """Points of the grid on the way to the minimum, about [count]."""
     draws: int = 128
-    """Draws of the screen, the first guess among them [count]."""
+    """Draws of a round of the screen, of the first one the first guess among them [count]."""
+    rounds: int = 4
+    """Rounds of the screen while no minimum explains the recordings [count]."""
+    round_starts: int = 2
+    """Draws of a round that are refined, the best [count]."""
+    parents: int = 8
+    """Best draws so far about which the next round draws [count]."""
+    shrinkage: float = 0.5
+    """Spread of the draws of a round over that of the round before [ratio]."""
     usual_spread: float = 0.3
     """Relative spread of the draws of a number without prior or bounds [ratio]."""
-    min_starts: int = 2
-    """Starts that are always refined [count]."""
-    max_starts: int = 8
-    """Starts that are refined while no minimum explains the recordings [count]."""
     accept_chi2: float = 1.05
     """Q per sample, beyond its own scatter, up to which a minimum explains the recordings [-]."""
     far_ratio: float = 4.0
@@ -109,13 +113,13 @@ def search(
         Where no draw can be simulated, or no start leads to a minimum.
     """
     coarse = _coarsen(problem)
-    with scale_progress(0.0, 0.1):
-        candidates = _screen(coarse, start, sought, np.random.default_rng(seed))
     attempts = _Attempts(coarse)
-    for number, candidate in enumerate(candidates[: FIT_SEARCH.max_starts]):
-        with scale_progress(0.1 + 0.06 * number, 0.16 + 0.06 * number):
-            attempts.refine(candidate)
-        if len(attempts.starts) >= FIT_SEARCH.min_starts and attempts.explains:
+    screen = _Screen(coarse, start, sought, np.random.default_rng(seed))
+    for number in range(FIT_SEARCH.rounds):
+        with scale_progress(0.14 * number, 0.14 * (number + 1)):
+            for candidate in screen.draw(number):
+                attempts.refine(candidate)
+        if attempts.starts and attempts.explains:
             break
     if not attempts.starts:
         raise IdentificationError(
@@ -204,35 +208,72 @@ def _expect_inputs(found: OptimizeResult[Problem]) -> OptimizeResult[Problem]:
     return found
 
 
-def _screen(
-    problem: Problem,
-    start: ParameterVector,
-    sought: Sequence[SoughtNumber],
-    rng: np.random.Generator,
-) -> list[ParameterVector]:
-    """Return draws from the priors that can be simulated, the best first."""
-    draws = np.array([_draw(one, rng) for one in sought]).T
-    score = np.zeros(FIT_SEARCH.draws)
-    for part in problem.parts:
-        score += _compute_scores(part, start, sought, draws)
-    order = [int(k) for k in np.argsort(score, kind="stable") if np.isfinite(score[k])]
-    count = len(sought)
-    return [start.replace_values(np.concatenate([draws[k], start.values[count:]])) for k in order]
+class _Screen:
+    """Draws of the unknowns of the network, simulated side by side; starts stay at their guess."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        start: ParameterVector,
+        sought: Sequence[SoughtNumber],
+        rng: np.random.Generator,
+    ) -> None:
+        self.problem = problem
+        self.start = start
+        self.sought = sought
+        self.rng = rng
+        self.draws = np.empty((0, len(sought)))
+        self.scores = np.empty(0)
+
+    def draw(self, number: int) -> list[ParameterVector]:
+        """Return the best draws of a round that can be simulated: of the first from the priors, of
+        later ones about the best so far."""
+        if number == 0:
+            draws = np.array([self._draw_prior(one) for one in self.sought]).T
+        else:
+            draws = self._draw_about_best(number)
+        scores = np.zeros(len(draws))
+        for part in self.problem.parts:
+            scores += _compute_scores(part, self.start, self.sought, draws)
+        self.draws = np.concatenate([self.draws, draws])
+        self.scores = np.concatenate([self.scores, scores])
+        order = np.argsort(scores, kind="stable")[: FIT_SEARCH.round_starts]
+        rest = self.start.values[len(self.sought) :]
+        return [
+            self.start.replace_values(np.concatenate([draws[k], rest]))
+            for k in order
+            if np.isfinite(scores[k])
+        ]
+
+    def _draw_prior(self, one: SoughtNumber) -> FloatArray:
+        """Draw coordinates of an unknown from its prior or bounds, the first guess as the first."""
+        low, high = one.limits
+        if one.spread is None and None not in one.unknown.bounds:
+            values = self.rng.uniform(low, high, FIT_SEARCH.draws)
+        else:
+            values = one.start + _get_spread(one) * self.rng.standard_normal(FIT_SEARCH.draws)
+        values[0] = one.start
+        return np.clip(values, low, high)
+
+    def _draw_about_best(self, number: int) -> FloatArray:
+        best = self.draws[np.argsort(self.scores, kind="stable")[: FIT_SEARCH.parents]]
+        parents = best[self.rng.integers(len(best), size=FIT_SEARCH.draws)]
+        spread = np.array([_get_spread(one) for one in self.sought])
+        spread = spread * FIT_SEARCH.shrinkage**number
+        limits = np.array([one.limits for one in self.sought])
+        draws = parents + spread * self.rng.standard_normal(parents.shape)
+        return np.clip(draws, limits[:, 0], limits[:, 1])
 
 
-def _draw(one: SoughtNumber, rng: np.random.Generator) -> FloatArray:
-    """Draw coordinates of an unknown from its prior or bounds, the first guess as the first."""
+def _get_spread(one: SoughtNumber) -> float:
+    """Return the standard deviation of the draws of an unknown: of its prior, of even bounds, or
+    the usual one."""
+    if one.spread is not None:
+        return one.spread
     low, high = one.limits
-    spread = one.spread
-    if spread is None and all(bound is not None for bound in one.unknown.bounds):
-        values = rng.uniform(low, high, FIT_SEARCH.draws)
-    else:
-        usual = FIT_SEARCH.usual_spread * (1.0 if one.is_positive else abs(one.start))
-        values = one.start + (usual if spread is None else spread) * rng.standard_normal(
-            FIT_SEARCH.draws
-        )
-    values[0] = one.start
-    return np.clip(values, low, high)
+    if None not in one.unknown.bounds:
+        return float((high - low) / np.sqrt(12.0))
+    return FIT_SEARCH.usual_spread * (1.0 if one.is_positive else abs(one.start))
 
 
 def _compute_scores(

@@ -144,6 +144,7 @@ def _add_noise(
         engine_torque=Signal(torque.time, torque.values + jitter),
         pressures=pressures,
         held_back=held_back,
+        fast=held_back,
     )
 
 

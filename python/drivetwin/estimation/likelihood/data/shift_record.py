@@ -79,6 +79,8 @@ class ShiftRecord:
     held_back: Mapping[str, FloatArray] = field(default_factory=dict)
     """Difference between an input as read and as simulated, by name; an input without an entry is
     used as read."""
+    fast: Mapping[str, FloatArray] = field(default_factory=dict)
+    """Part of it above the band of the actuators, by name."""
     fills: Mapping[str, PriorValue] = field(default_factory=dict)
     """P0 [Pa] of the elements as the card has it: about it more noise is taken off a pressure."""
     curved: bool = False
@@ -145,21 +147,24 @@ class ShiftRecord:
         return np.interp(middle, self.engine_torque.time - age, self.bend)
 
     def subtract_noise(self, noise: Mapping[str, FloatArray], age: float) -> ShiftRecord:
-        """Subtract the expected `noise` (N-1,) per step of the grid from the inputs.
+        """Subtract the expected `noise` (N-1,) per step of the grid from the inputs as read.
 
-        Of a pressure's noise only the part that passes the local cubic still drives the run.
+        It takes the place of what was expected before. Of a pressure's noise only the part that
+        passes the local cubic still drives the run.
         """
         torque = self.engine_torque
-        held = {TORQUE: _average_at_samples(self.time, noise[TORQUE], torque.time - age)}
-        pressures = {}
+        own = {TORQUE: _average_at_samples(self.time, noise[TORQUE], torque.time - age)}
         for name, p in self.pressures.items():
-            held[name] = smooth_local_cubic(
+            own[name] = smooth_local_cubic(
                 p.time, _average_at_samples(self.time, noise[name], p.time)
             )
-            pressures[name] = Signal(p.time, p.values - held[name])
-        torque = Signal(torque.time, torque.values - held[TORQUE])
-        held = {name: self.held_back.get(name, 0.0) + values for name, values in held.items()}
-        return replace(self, engine_torque=torque, pressures=pressures, held_back=held)
+        held = {name: self.fast.get(name, 0.0) + values for name, values in own.items()}
+        driving = {
+            name: Signal(one.time, one.values + self.held_back.get(name, 0.0) - held[name])
+            for name, one in {TORQUE: torque, **self.pressures}.items()
+        }
+        torque = driving.pop(TORQUE)
+        return replace(self, engine_torque=torque, pressures=driving, held_back=held)
 
     def interpolate_held_back(self, age: float) -> dict[str, FloatArray]:
         """Compute the held-back part of each input (N-1,) in the middle of each step of the
@@ -295,6 +300,7 @@ def build_record(
     noise = replace(torque, sigma=sigma)
     fills = fills or {}
     smooth = {n: smooth_pressure(p, fills.get(n)) for n, p in signals.pressures.items()}
+    fast = {name: p.values - smooth[name] for name, p in signals.pressures.items()}
     return ShiftRecord(
         time,
         _extend_ends(torque),
@@ -303,7 +309,8 @@ def build_record(
         _extend_ends(replace(torque, values=smooth_adaptive(torque))),
         np.pad(compute_bend(torque.time, torque.values), 1),
         {TORQUE: _bound_noise(noise)} | {n: _bound_noise(p) for n, p in signals.pressures.items()},
-        {name: p.values - smooth[name] for name, p in signals.pressures.items()},
+        fast,
+        fast,
         fills,
         of_speeds=of_speeds,
         rounding=_collect_quantization(signals),
