@@ -88,7 +88,6 @@ def test_two_recordings_share_the_unknowns_and_have_starts_of_their_own() -> Non
     assert ratio == pytest.approx(1.0 / np.sqrt(2.0), rel=0.02)
 
 
-@pytest.mark.xfail(reason="each round of expected inputs moves the values of several recordings")
 def test_the_intervals_of_two_recordings_contain_the_truth() -> None:
     made, second = make_log(ModelName.TIP_IN), make_log(ModelName.TIP_IN, 1)
     found = fit_network(made.model, [made.recording, second.recording])
