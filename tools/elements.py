@@ -32,11 +32,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drivetwin.modeling.element_help import document_methods
-from drivetwin.simulation.input_value import InputValue
 from drivetwin.modeling.model_parts import ModelParts, Place
 from drivetwin.modeling.part import Part
 from drivetwin.modeling.plates import Plates
 from drivetwin.simulation.converter_map import Converter
+from drivetwin.simulation.input_value import InputValue
 
 
 @document_methods

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Draw the pictures of the documents from the demo's shift.
+"""Draw the pictures of the documents from the demo's shift and a tip-in.
 
-`python -m tools.picture` writes docs/img/validation.png (simulation over measurement) and
-docs/img/report.png (first page of the report); needs Chromium on the PATH.
+`python -m tools.picture` writes docs/img/validation.png (simulation over measurement),
+docs/img/report.png (first page of the report) and docs/img/fit.png (report of the fit of a
+tip-in); needs Chromium on the PATH.
 """
 
 from __future__ import annotations
@@ -20,7 +21,12 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.result.method import DEFAULT_METHOD
+from drivetwin.fit.fit import fit_network
+from drivetwin.fit.model_file import read_model
+from drivetwin.fit.read import read_recording
+from drivetwin.fit.synthesize import ModelName, read_builtin, synthesize_log
 from drivetwin.report.figures.validation import plot_validation
+from drivetwin.report.fit import render_fit
 from drivetwin.report.html import save_report
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "img"
@@ -58,6 +64,20 @@ def write_report(outcome: Outcome, folder: Path) -> Path:
     return path
 
 
+def write_fit(folder: Path) -> Path:
+    """Write the report of the fit of a tip-in."""
+    made = synthesize_log(*read_builtin(ModelName.TIP_IN), seed=0)
+    log, model = folder / "tip_in.csv", folder / "tip_in.model.toml"
+    log.write_text(made.log, encoding="utf-8")
+    model.write_text(made.model, encoding="utf-8")
+    network, channels = read_model(model)
+    recording, _ = read_recording(log, network, channels)
+    page = render_fit(fit_network(network, [recording]), [log.name], {})
+    path = folder / "fit.html"
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
 def main() -> int:
     """Write the pictures; return 1 if no browser is found."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -70,6 +90,7 @@ def main() -> int:
         outcome = identify_demo(folder)
         for picture, page in (("validation.png", write_figure), ("report.png", write_report)):
             draw_page(browser, page(outcome, folder), PICTURES / picture)
+        draw_page(browser, write_fit(folder), PICTURES / "fit.png")
     return 0
 
 

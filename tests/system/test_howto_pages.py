@@ -43,6 +43,7 @@ LONG = {
     "drive.md": (),
     "examine.md": SHIFT,
     "export.md": OUT,
+    "identify-your-own-driveline.md": (),
     "first-log.md": (*SHIFT, "synth --seed 2 -o other.csv"),
     "fleet.md": (*SHIFT, *(f"synth --seed {one} -o logs/unit_{one}/a.csv" for one in (1, 2))),
     "observe.md": (*OUT, "copy out/twin.toml twin.toml", "synth --seed 2 -o drive.csv"),

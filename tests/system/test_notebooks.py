@@ -14,6 +14,7 @@ LEAVES = {
     "identify_a_shift": {"report.html", "result.json", "twin.toml"},
     "compare_two_logs": {"comparison.html"},
     "what_if": {"shift.csv"},
+    "fit_a_driveline": {"report.html", "tip_in.csv"},
 }
 
 
