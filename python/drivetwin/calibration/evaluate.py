@@ -32,7 +32,7 @@ class RunCount:
     runs: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plant:
     """The driveline that a control is tried on, and the metrics to compute.
 

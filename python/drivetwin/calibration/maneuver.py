@@ -25,7 +25,7 @@ class OperatingPoint:
     engine_speed: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Maneuver:
     """A shift of `model` from its first shift element to its second at an operating point.
 

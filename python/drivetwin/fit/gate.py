@@ -49,13 +49,16 @@ def find_failures(
 
 
 def find_doubts(
-    parts: Sequence[NetworkTerm], fits: Sequence[Mapping[str, SignalFit]]
+    parts: Sequence[NetworkTerm],
+    fits: Sequence[Mapping[str, SignalFit]],
+    failures: Sequence[Finding],
 ) -> Iterator[Finding]:
-    """Find outputs of which the simulation explains less than half."""
+    """Find outputs of which the simulation explains less than half, beside the `failures`."""
+    failed = {one.names["channel"] for one in failures if one.code is Code.SIMULATION_MISSES}
     for part, fit in zip(parts, fits, strict=True):
         where = f" of {part.label}" if part.label else ""
         for name, one in fit.items():
-            if one.fit_percent < FIT_GATE.least_fit:
+            if one.fit_percent < FIT_GATE.least_fit and name + where not in failed:
                 code = Code.SIMULATION_NOISY
                 yield report(code, channel=name + where, fit=one.fit_percent)
 

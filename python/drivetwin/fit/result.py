@@ -17,10 +17,11 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
 )
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
-from drivetwin.estimation.optimize.objective import NormalEquations
+from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.verdict import (
+    VERDICT,
     apply_errors,
     assess,
     assess_with_prior,
@@ -129,7 +130,7 @@ def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMi
         intervals[one.name] = (one.to_value(float(ends[0])), one.to_value(float(ends[1])))
     agreement = tuple(part.compare(minimum.point) for part in problem.parts)
     failures = tuple(find_failures(problem.parts, minimum.normal.residuals, agreement, chi2))
-    doubts = find_doubts(problem.parts, agreement)
+    doubts = find_doubts(problem.parts, agreement, failures)
     findings = (*failures, *doubts, *_collect_findings(minimum, sought))
     estimates = apply_errors(estimates, findings)
     return ModelFit(
@@ -158,7 +159,9 @@ def _judge(one: SoughtNumber, coordinate: float, std: float) -> Estimate:
     told = one.name, value, value * std if one.is_positive else std
     if one.unknown.std is None:
         return assess(*told, METHOD, spec=one.spec)
-    prior = PriorValue(one.unknown.value, one.unknown.std)
+    # The prior of a positive number is relative: its spread at the estimate.
+    scale = value / one.unknown.value if one.is_positive else 1.0
+    prior = PriorValue(one.unknown.value, one.unknown.std * scale)
     return assess_with_prior(told, prior, WITH_PRIOR, declared=one.spec)
 
 
@@ -168,16 +171,23 @@ def _collect_findings(
     """Test the residuals, and name the directions that the recordings do not identify."""
     state = _State(minimum.problem, minimum.normal)
     labels = [part.label for part in minimum.problem.parts]
-    sizes = np.abs(minimum.point.values)
-    for k, one in enumerate(sought):
-        if one.is_positive:
-            sizes[k] = 1.0
+    sizes = np.ones(len(minimum.point.names))
+    sizes[: len(sought)] = [_get_size(one, minimum.point) for one in sought]
     shown = {k: one.name for k, one in enumerate(sought)}
     return (
         *check_residuals(state, labels),
         *check_weighting(state, labels),
         *report_null_directions(minimum.normal.data, sizes, shown, "their priors"),
     )
+
+
+def _get_size(one: SoughtNumber, point: ParameterVector) -> float:
+    """Return the size to which the spread of a coordinate is compared: of a delay absolute."""
+    if one.is_positive:
+        return 1.0
+    if one.spec.unit == "s":
+        return 4.0 * VERDICT.delay_identified
+    return max(abs(point[one.name]), one.spread or 0.0)
 
 
 @dataclass(frozen=True, eq=False)
