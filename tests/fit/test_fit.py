@@ -12,7 +12,7 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Code
-from drivetwin.fit.fit import fit_network
+from drivetwin.fit.fit import build_problem, fit_network
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.synthesize import ModelName
@@ -236,3 +236,13 @@ def test_a_recorded_input_takes_the_place_of_that_of_the_model() -> None:
     signal = found.problem.parts[0].record.inputs["torque"]
     assert np.ptp(signal.values) > 100.0
     assert found.status is ModelStatus.VALID
+
+
+def test_speeds_that_follow_from_others_are_left_out_of_the_start() -> None:
+    """A stated speed behind a gear would contradict the measured one before it."""
+    made = make_log(ModelName.CONVERTER_LOCK_UP)
+    start = made.model.start
+    behind = {"out": start.speeds["turbine"] / 2.1, "axle": start.speeds["turbine"] / 7.35}
+    more = replace(start, speeds={**start.speeds, **behind})
+    problem, _, _ = build_problem(replace(made.model, start=more), [made.recording])
+    assert problem.parts[0].plant.own == ["engine", "turbine", "wheel", "half shafts"]

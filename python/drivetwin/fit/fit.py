@@ -8,16 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin._util.spelling import suggest_spelling
 from drivetwin.errors import InputError
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.plant import Plant
-from drivetwin.fit.recording import Recording, build_network_record
+from drivetwin.fit.recording import NetworkRecord, Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
 from drivetwin.fit.search import Problem, search
-from drivetwin.fit.starts import guess_start, list_starts
+from drivetwin.fit.starts import drop_redundant_speeds, guess_start, list_starts
 from drivetwin.fit.term import NetworkTerm
 from drivetwin.fit.unknown import SoughtNumber, require_known_places, resolve_unknown
 from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
@@ -91,18 +92,14 @@ def build_problem(
         _require_inputs(model, recording)
         names = list_starts(model.start, model.elements)
         require_known_places(sought, names, [*recording.inputs, *model.inputs])
+        _require_known_starts(recording, names)
         record = build_network_record(recording, list(model.outputs), _find_reach(sought))
-        guess = guess_start(model.start, recording.start, model.elements, model.outputs, record)
+        plant = _build_plant(plain, model, recording, record)
+        guess = guess_start(plant.start, recording.start, model.elements, model.outputs, record)
         named = {path.partition(".")[2] for one in sought for path in one.factors}
         own = [name for name in guess.priors if name not in named]
         label = f"log{number}" if len(recordings) > 1 else ""
-        span = (float(record.time[0]), float(record.time[-1]))
-        inputs = {
-            name: make_input(name, value, span)
-            for name, value in model.inputs.items()
-            if name not in recording.inputs
-        }
-        plant = replace(plain, inputs=inputs, start=guess.start, own=own, label=label)
+        plant = replace(plant, start=guess.start, own=own, label=label)
         for name in own:
             known = guess.priors[name]
             limits = (-np.inf, np.inf)
@@ -116,6 +113,22 @@ def build_problem(
     return LikelihoodObjective(tuple(parts), prior, lower, upper), point, sought
 
 
+def _build_plant(
+    plain: Plant, model: NetworkModel, recording: Recording, record: NetworkRecord
+) -> Plant:
+    """Build the network of a recording, with the inputs that it has not, and a start of which no
+    speed follows from the others."""
+    span = (float(record.time[0]), float(record.time[-1]))
+    inputs = {
+        name: make_input(name, value, span)
+        for name, value in model.inputs.items()
+        if name not in recording.inputs
+    }
+    every = {**inputs, **record.inputs}
+    start = drop_redundant_speeds(model.start, model.elements, every, record.time[:2])
+    return replace(plain, inputs=inputs, start=start)
+
+
 def _find_reach(sought: Sequence[SoughtNumber]) -> dict[str, float]:
     """Find the time [s] by which each input with an unknown delay may act early or late."""
     reach = {}
@@ -126,6 +139,15 @@ def _find_reach(sought: Sequence[SoughtNumber]) -> dict[str, float]:
                 spread = _USUAL_DELAY if one.spread is None else _DELAY_REACH * one.spread
                 reach[name] = abs(one.unknown.value) + spread
     return reach
+
+
+def _require_known_starts(recording: Recording, names: Sequence[str]) -> None:
+    """Raise InputError for a known start of a node or shaft that the model does not start."""
+    for name in recording.start:
+        if name not in names:
+            hint = suggest_spelling(name, names)
+            what = f"the start of the recording has {name!r}, the model has not{hint}"
+            raise InputError(what, f"known are {', '.join(names)}")
 
 
 def _require_consistent(model: NetworkModel, recordings: Sequence[Recording]) -> None:

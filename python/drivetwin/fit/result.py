@@ -32,7 +32,7 @@ from drivetwin.fit.gate import find_doubts, find_failures, judge_status
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.search import FoundMinimum, Problem, RefinedStart
 from drivetwin.fit.unknown import SoughtNumber
-from drivetwin.simulation.network import NetworkRun
+from drivetwin.simulation.network import NetworkRun, Output, simulate
 from drivetwin.vehicle.spec import PriorValue
 
 METHOD = "maximum likelihood"
@@ -106,11 +106,20 @@ class ModelFit:
     @cached_property
     def fitted(self) -> NetworkModel:
         """Model with the values at the minimum in place of the first guesses."""
-        task = self.problem.parts[0].plant.build_task(self.minimum.point, {}, np.zeros(0))
+        part = self.problem.parts[0]
+        task = part.plant.build_task(self.minimum.point, part.record.inputs, part.record.time[:2])
+        outputs: list[Output] = [("speed", name) for name in self.model.start.speeds]
+        run = simulate(task.elements, task.inputs, task.start, task.time, outputs)
+        speeds = {output[1]: float(run.columns[output][0]) for output in outputs}
         unknowns = {
             one.name: replace(one.unknown, value=self.values[one.name]) for one in self.sought
         }
-        return replace(self.model, elements=task.elements, start=task.start, unknowns=unknowns)
+        return replace(
+            self.model,
+            elements=task.elements,
+            start=replace(task.start, speeds=speeds),
+            unknowns=unknowns,
+        )
 
     def simulate(self) -> tuple[NetworkRun, ...]:
         """Simulate every recording at the minimum, on its grid."""

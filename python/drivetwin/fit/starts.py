@@ -11,7 +11,9 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.fit.recording import NetworkRecord
-from drivetwin.simulation.network import Element, Output, Start
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import Element, Output, Sine, Start
+from drivetwin.simulation.network_sensitivity import differentiate
 from drivetwin.vehicle.spec import PriorValue
 
 _GUESS_SAMPLES = 20
@@ -72,6 +74,7 @@ def guess_start(
         torque = first.get(("shaft_torque", name))
         if torque is not None:
             twists[name] = torque / float(one["stiffness"])
+    known = {name: value for name, value in known.items() if name in (*speeds, *twists)}
     for name, value in known.items():
         (speeds if name in speeds else twists)[name] = value
     fastest = max([1.0, *map(abs, speeds.values()), *map(abs, first.values())])
@@ -87,6 +90,42 @@ def guess_start(
             usual = largest / stiffness if stiffness > 0.0 and largest > 0.0 else _USUAL_TWIST
             priors[name] = PriorValue(value, _TWIST_FACTOR * max(abs(value), usual))
     return StartGuess(Start(speeds, twists, stated.locked), priors)
+
+
+def drop_redundant_speeds(
+    start: Start,
+    elements: Sequence[Element],
+    inputs: Mapping[str, Signal | Sine],
+    time: FloatArray,
+) -> Start:
+    """Return a start without the speeds that the others determine.
+
+    Measured in place of exact they would contradict each other.
+
+    Parameters
+    ----------
+    start
+        Start of the model.
+    elements, inputs
+        Network.
+    time
+        First instants (2,) of the recording [s].
+
+    Raises
+    ------
+    InputError
+        Where the stated speeds contradict each other, or leave some undetermined.
+    """
+    names = list(start.speeds)
+    outputs: list[Output] = [("speed", name) for name in names]
+    unknowns = [f"start.{name}" for name in names]
+    found = differentiate(elements, inputs, start, time, outputs, unknowns)
+    kept = {
+        name: start.speeds[name]
+        for k, (name, output) in enumerate(zip(names, outputs, strict=True))
+        if found.derivatives[output][0, k] != 0.0
+    }
+    return Start(kept, start.twists, start.locked)
 
 
 def _read_first_values(outputs: Mapping[str, Output], record: NetworkRecord) -> dict[Output, float]:
