@@ -96,8 +96,8 @@ def build_problem(
         record = build_network_record(recording, list(model.outputs), _find_reach(sought))
         plant = _build_plant(plain, model, recording, record)
         guess = guess_start(plant.start, recording.start, model.elements, model.outputs, record)
-        named = {path.partition(".")[2] for one in sought for path in one.factors}
-        own = [name for name in guess.priors if name not in named]
+        paths = {path for one in sought for path in one.factors}
+        own = [name for name in guess.priors if f"start.{name}" not in paths]
         label = f"log{number}" if len(recordings) > 1 else ""
         plant = replace(plant, start=guess.start, own=own, label=label)
         for name in own:

@@ -17,7 +17,7 @@ from drivetwin.estimation.likelihood.data.input_smoothing import (
     smooth_local_cubic,
     smooth_pressure,
 )
-from drivetwin.estimation.likelihood.data.output import Output
+from drivetwin.estimation.likelihood.data.output import ComparedOutputs, Output
 from drivetwin.estimation.likelihood.data.shift_record import RECORD, fill_grid
 from drivetwin.simulation.dual_clutch import Signal
 
@@ -68,7 +68,7 @@ class Recording:
 
 
 @dataclass(frozen=True, eq=False)
-class NetworkRecord:
+class NetworkRecord(ComparedOutputs):
     """Recording made ready for a fit.
 
     `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
@@ -82,21 +82,6 @@ class NetworkRecord:
     input_sigma: Mapping[str, float]
     held_back: Mapping[str, FloatArray]
     fast: Mapping[str, FloatArray]
-
-    @property
-    def size(self) -> int:
-        """Number of compared samples."""
-        return sum(out.values.size for out in self.outputs)
-
-    @property
-    def sigma(self) -> FloatArray:
-        """Standard deviation of each compared sample (size,)."""
-        return np.concatenate([np.full(out.values.size, out.sigma) for out in self.outputs])
-
-    @property
-    def measured(self) -> FloatArray:
-        """Compared samples, stacked (size,)."""
-        return np.concatenate([out.values for out in self.outputs])
 
     def sample(self, columns: Mapping[str, FloatArray]) -> FloatArray:
         """Sample quantities (N,) or (N, p) on the grid, by name; (size,) or (size, p)."""

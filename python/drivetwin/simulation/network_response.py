@@ -27,6 +27,9 @@ from drivetwin.simulation.network import (
 )
 from drivetwin.simulation.serialize import as_json
 
+_INTEGRALS = ("angle", "work", "heat")
+"""Kinds of outputs that a disturbance of the state changes through all later instants."""
+
 
 @dataclass(frozen=True, eq=False)
 class NetworkResponse:
@@ -70,9 +73,13 @@ def compute_response(
     Raises
     ------
     InputError
-        Where the description is inconsistent.
+        Where the description is inconsistent, or for an output that is an integral over the run.
     """
     accuracy = accuracy or Accuracy()
+    integrals = [output for output in outputs if output[0] in _INTEGRALS]
+    if integrals:
+        what = f"{integrals[0]!r} is an integral over the run, no function of the state"
+        raise InputError(what, "leave it out of the outputs of a response")
     requests = resolve_outputs(elements, inputs, outputs)
     sampled = {name: one for name, one in inputs.items() if isinstance(one, Signal)}
     scenario = ((to_delayed_core_samples(sampled), to_core_sines(inputs)), start.to_core())

@@ -85,3 +85,24 @@ class Output:
         share = share.reshape(-1, *[1] * (column.ndim - 1))
         before = total[after - 1] + share * (total[after] - total[after - 1])
         return np.asarray((total[self.place] - before) / window)
+
+
+class ComparedOutputs:
+    """Samples of the outputs of a record, stacked in their order."""
+
+    outputs: tuple[Output, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of compared samples."""
+        return sum(out.values.size for out in self.outputs)
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviation of each compared sample (size,)."""
+        return np.concatenate([np.full(out.values.size, out.sigma) for out in self.outputs])
+
+    @property
+    def measured(self) -> FloatArray:
+        """Compared samples, stacked (size,)."""
+        return np.concatenate([out.values for out in self.outputs])

@@ -19,7 +19,7 @@ from drivetwin.estimation.likelihood.data.input_smoothing import (
     smooth_local_cubic,
     smooth_pressure,
 )
-from drivetwin.estimation.likelihood.data.output import Output
+from drivetwin.estimation.likelihood.data.output import ComparedOutputs, Output
 from drivetwin.estimation.likelihood.data.quantization import Quantization, estimate_quantization
 from drivetwin.simulation import network
 from drivetwin.simulation.driveline_run import COMPARED
@@ -57,7 +57,7 @@ RECORD = RecordSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class ShiftRecord:
+class ShiftRecord(ComparedOutputs):
     """One shift's span of a log.
 
     `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
@@ -88,21 +88,6 @@ class ShiftRecord:
     """Source of an engine torque computed from speeds; it shares noise with the compared speed."""
     rounding: Mapping[str, Quantization] = field(default_factory=dict)
     """Quantisation of an input's samples, by name; no entry where noise exceeds the step."""
-
-    @property
-    def size(self) -> int:
-        """Number of compared samples."""
-        return sum(out.values.size for out in self.outputs)
-
-    @property
-    def sigma(self) -> FloatArray:
-        """Standard deviation of each compared sample (size,)."""
-        return np.concatenate([np.full(out.values.size, out.sigma) for out in self.outputs])
-
-    @property
-    def measured(self) -> FloatArray:
-        """Compared samples, stacked (size,)."""
-        return np.concatenate([out.values for out in self.outputs])
 
     def sample_run(self, run: Trajectory) -> FloatArray:
         """Sample a trajectory at the measured stamps; shape (size,)."""
