@@ -246,3 +246,14 @@ def test_speeds_that_follow_from_others_are_left_out_of_the_start() -> None:
     more = replace(start, speeds={**start.speeds, **behind})
     problem, _, _ = build_problem(replace(made.model, start=more), [made.recording])
     assert problem.parts[0].plant.own == ["engine", "turbine", "wheel", "half shafts"]
+
+
+def test_the_delay_of_an_input_leaves_the_start_of_a_node_of_its_name_unknown() -> None:
+    model, recording = make_small({"delay.motor": Unknown(0.0, 0.01)})
+    named = replace(
+        model,
+        elements=[{**one, "input": "motor"} if "input" in one else one for one in model.elements],
+    )
+    inputs = {"motor": recording.inputs["torque"]}
+    problem, _, _ = build_problem(named, [replace(recording, inputs=inputs)])
+    assert "motor" in problem.parts[0].plant.own

@@ -87,3 +87,8 @@ def test_an_input_without_effect_drives_nothing_while_the_brake_holds() -> None:
 def test_a_wrong_description_is_refused() -> None:
     with pytest.raises(InputError, match="rotor"):
         compute_response(ELEMENTS, INPUTS, START, TIME, [("speed", "rotor")])
+
+
+def test_an_integral_over_the_run_has_no_response() -> None:
+    with pytest.raises(InputError, match=r"'angle'.* is an integral"):
+        compute_response(ELEMENTS, INPUTS, START, TIME, [("angle", "a")])
