@@ -20,6 +20,7 @@ from benchmarks.fit.report import format_header, format_row
 from drivetwin._util.arrays import FloatArray
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.likelihood.data.shift_record import RECORD
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
@@ -159,7 +160,12 @@ def _build_unknowns(bench: Bench, dual: DualClutch, start: ParameterVector) -> d
         "load": Unknown(dual.load.constant, paths=("load.constant",)),
         "k_o": Unknown(dual.k_o, paths=(f"{SHAFT}.stiffness",)),
         "c_o": Unknown(dual.c_o, paths=(f"{SHAFT}.damping",)),
-        "te_delay": Unknown(-start["te_delay"], DELAY_STD, paths=(f"delay.{ENGINE_TORQUE}",)),
+        "te_delay": Unknown(
+            -start["te_delay"],
+            DELAY_STD,
+            (-RECORD.max_delay, RECORD.max_delay),
+            (f"delay.{ENGINE_TORQUE}",),
+        ),
         "mu_c": Unknown(guess["mu_c"], MU_STD, paths=share("mu_c")),
         "mu_s": Unknown(guess["mu_s"], MU_STD, paths=(f"{on}.friction.mu_s",)),
         "v_s": Unknown(guess["v_s"], guess["v_s"], paths=share("v_s")),

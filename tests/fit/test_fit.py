@@ -257,3 +257,12 @@ def test_the_delay_of_an_input_leaves_the_start_of_a_node_of_its_name_unknown() 
     inputs = {"motor": recording.inputs["torque"]}
     problem, _, _ = build_problem(named, [replace(recording, inputs=inputs)])
     assert "motor" in problem.parts[0].plant.own
+
+
+def test_a_bounded_delay_costs_no_more_of_the_recording_than_its_bounds() -> None:
+    spans = []
+    for bounds in ((None, None), (-0.02, 0.02)):
+        model, recording = make_small({"delay.torque": Unknown(0.0, 0.03, bounds)})
+        problem, _, _ = build_problem(model, [recording])
+        spans.append(float(np.ptp(problem.parts[0].record.time)))
+    assert spans[1] - spans[0] == pytest.approx(2.0 * (0.15 - 0.02), abs=0.02)

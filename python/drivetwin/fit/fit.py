@@ -130,14 +130,16 @@ def _build_plant(
 
 
 def _find_reach(sought: Sequence[SoughtNumber]) -> dict[str, float]:
-    """Find the time [s] by which each input with an unknown delay may act early or late."""
+    """Find the time [s] by which each input with an unknown delay may act early or late: by its
+    prior, within its bounds."""
     reach = {}
     for one in sought:
         for path in one.factors:
             head, _, name = path.partition(".")
             if head == "delay":
                 spread = _USUAL_DELAY if one.spread is None else _DELAY_REACH * one.spread
-                reach[name] = abs(one.unknown.value) + spread
+                usual = abs(one.unknown.value) + spread
+                reach[name] = min(usual, max(abs(one.spec.lower), abs(one.spec.upper)))
     return reach
 
 
