@@ -30,7 +30,7 @@ from drivetwin.calibration.calibrate import Task as CalibrationTask
 from drivetwin.calibration.front import trace_front
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import Grid, calibrate_map
-from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli.identify_run import Request as ReadingRequest
 from drivetwin.cli.identify_run import read_shifts

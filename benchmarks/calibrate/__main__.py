@@ -42,7 +42,7 @@ from benchmarks.calibrate.statement import (
 )
 from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.scenarios import Purpose, draw_scenarios
 from drivetwin.calibration.settings import CalibrationSettings
 

@@ -20,14 +20,14 @@ import numpy as np
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.calibration.calibrate import Task
-from drivetwin.calibration.knot_policy import KnotPolicy, KnotProfile
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
-from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.policies.knots import KnotPolicy, KnotProfile, join_profiles
+from drivetwin.calibration.policies.slip import build_slip_policy
 from drivetwin.calibration.scenarios import Draw, scale_units
 from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.calibration.slip_policy import build_slip_policy
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.simulation.driveline import Driveline
@@ -66,7 +66,7 @@ def make_policy() -> KnotPolicy:
     on = (0.9, 1.2, 3.5, 6.0, 6.2, 6.3, 6.6, 9.0)
     off = (8.0, 5.5, 3.0, 0.4)
     held, gone = 10.0 * BAR, 0.0
-    return KnotPolicy(
+    return join_profiles(
         oncoming=KnotProfile(
             ((0.0, 0.0), (REQUEST, 0.0)),
             (0.45, 0.55, 0.65, 0.75, 0.85, 0.95, 1.05, 1.15),

@@ -25,7 +25,7 @@ from benchmarks.estimation.vehicles import SHIFT
 from drivetwin.calibration.calibrate import Assessment, calibrate
 from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import DrivetwinError

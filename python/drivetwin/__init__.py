@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.analysis.experiment_design import rank_experiments
     from drivetwin.estimation.result.method import Method
     from drivetwin.files.result_file import save_result
-    from drivetwin.files.twin_conversion import load_twin, save_twin
+    from drivetwin.files.twin_file import load_twin, save_twin
     from drivetwin.logs.arrays import read_arrays
     from drivetwin.logs.read import read_log
     from drivetwin.modeling.model import Model

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
+from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels

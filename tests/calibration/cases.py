@@ -11,10 +11,11 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.calibration.calibrate import Task
-from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.objective import Limit
+from drivetwin.calibration.policies.controller import build_controller_policy
+from drivetwin.calibration.policies.slip import SlipPolicy, build_slip_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import (
@@ -25,7 +26,6 @@ from drivetwin.calibration.scenarios import (
     scale_units,
 )
 from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.calibration.slip_policy import SlipPolicy, build_slip_policy
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.simulation.driveline import Driveline

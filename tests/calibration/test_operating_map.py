@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.calibrate import Task
-from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit
 from drivetwin.calibration.operating_map import Grid, OperatingMap, calibrate_map
+from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.errors import InputError
 from tests.calibration.cases import SYSTEM, make_task
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from drivetwin.calibration.controller_policy import build_controller_policy
-from drivetwin.calibration.knot_policy import build_knot_policy
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
+from drivetwin.calibration.policies.controller import build_controller_policy
+from drivetwin.calibration.policies.knots import build_knot_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import Linear, assemble_program, polish
 from drivetwin.simulation.dual_clutch import FloatArray

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.calibrate import draw_for
-from drivetwin.calibration.controller_policy import build_controller_policy
+from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import (
     Draw,

@@ -10,9 +10,9 @@ import pytest
 
 from drivetwin.calibration.calibrate import draw_for
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.policies.slip import SlipPolicy
 from drivetwin.calibration.scenarios import Purpose
-from drivetwin.calibration.slip_policy import SlipPolicy
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Hardware, Request, build_task
 from drivetwin.errors import IdentificationError, InputError

@@ -9,9 +9,8 @@ import unicodedata
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.extra_roles import EXTRA_ROLES
 from drivetwin.channels.name_table import load_name_table, normalise_name
-from drivetwin.channels.roles import ROLES
+from drivetwin.channels.roles import EXTRA_ROLES, ROLES
 
 
 def test_every_role_has_names_and_every_word_its_own_form() -> None:

@@ -19,7 +19,7 @@ from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.export.parameters.files import read_parameters
 from drivetwin.files.calibration_file import read_calibration_file
-from drivetwin.files.twin_conversion import save_twin
+from drivetwin.files.twin_file import save_twin
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
 from drivetwin.simulation.network import simulate
 from tests.calibration.cases import QUICK

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.files.twin_conversion import load_twin
+from drivetwin.files.twin_file import load_twin
 from tests.cli.conftest import Files
 
 

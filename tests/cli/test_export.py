@@ -11,7 +11,7 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.export.parameters.content import Scalar
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
-from drivetwin.files.twin_conversion import save_twin
+from drivetwin.files.twin_file import save_twin
 from tests.export.parameters.sample import twin
 
 

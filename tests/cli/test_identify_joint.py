@@ -16,7 +16,7 @@ from drivetwin.cli import main
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.files.result_file import load_result
-from drivetwin.files.twin_conversion import load_twin
+from drivetwin.files.twin_file import load_twin
 from tests.estimation.multi_log.fixtures import LEVEL, LOADS, scenario
 
 

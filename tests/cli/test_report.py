@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.files.result_file import save_result
-from drivetwin.files.twin_conversion import save_twin
+from drivetwin.files.twin_file import save_twin
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_fit
 from tests.cli.conftest import Files

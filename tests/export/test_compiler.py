@@ -15,7 +15,7 @@ import pytest
 from drivetwin.errors import CompilerError, MissingExtraError
 from drivetwin.export import compiler
 from drivetwin.export.compiler import compile_library
-from drivetwin.export.platforms import Platform
+from drivetwin.export.targets import Platform
 
 
 @pytest.fixture

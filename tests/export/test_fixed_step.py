@@ -8,7 +8,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.export.fixed_step import Stepping, run_fixed_step, sample_signals
-from drivetwin.export.input_kind import InputKind
+from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import Signal, simulate
 from tests.export.cases import CASES
 

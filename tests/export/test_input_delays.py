@@ -17,11 +17,10 @@ from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.build import BuildOptions, build_fmu
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.fmu.variables import list_variables
-from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
-from drivetwin.export.input_kind import InputKind
 from drivetwin.export.modelica.dual_clutch import format_modelica
 from drivetwin.export.subject import Subject, build_note
+from drivetwin.export.targets import FmiVersion, InputKind
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray, Signal
 from tests.export.cases import CASES, STEP, Case
 from tests.export.fmu.test_build import Instance

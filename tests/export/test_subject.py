@@ -13,9 +13,9 @@ from drivetwin.export.c.write import generate_twin_source
 from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.variables import Role, list_variables
 from drivetwin.export.input_delays import InputDelays
-from drivetwin.export.input_kind import InputKind
 from drivetwin.export.modelica.dual_clutch import format_modelica
 from drivetwin.export.subject import build_note, build_subject, compute_steady_start
+from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.simulation.vehicle_parts import VehicleParts
 from tests.export.cases import paper_model

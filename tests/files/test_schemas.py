@@ -20,7 +20,7 @@ from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.files.fit_file import build_fit_file, format_fit_file
 from drivetwin.files.result_file import ResultFile
 from drivetwin.files.schemas import FileKind, build_json_schema
-from drivetwin.files.twin_conversion import save_twin
+from drivetwin.files.twin_file import save_twin
 from drivetwin.fit.model_file import format_model
 from drivetwin.fit.synthesize import ModelName, read_builtin
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind, Limit

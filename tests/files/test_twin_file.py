@@ -18,7 +18,7 @@ from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
 from drivetwin.channels.read_options import BusOptions, ReadOptions
 from drivetwin.errors import ResultFileError
-from drivetwin.files.twin_conversion import load_twin, save_twin
+from drivetwin.files.twin_file import load_twin, save_twin
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report.sample import card, identification

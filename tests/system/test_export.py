@@ -15,7 +15,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from drivetwin.cli import main
 from drivetwin.export.compiler import detect_platform
-from drivetwin.files.twin_conversion import load_twin
+from drivetwin.files.twin_file import load_twin
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.card import load_card
 

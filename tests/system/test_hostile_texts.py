@@ -29,11 +29,11 @@ from drivetwin.errors import InputError, Where
 from drivetwin.export.c.write import generate_twin_source
 from drivetwin.export.fmu.describe import Header, build_description
 from drivetwin.export.fmu.variables import list_variables
-from drivetwin.export.fmu.version import FmiVersion
 from drivetwin.export.modelica.text import format_string, make_identifier
 from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.export.subject import Subject
+from drivetwin.export.targets import FmiVersion
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 from drivetwin.logs.write import write_log

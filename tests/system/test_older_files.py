@@ -11,7 +11,7 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.errors import ResultFileError
 from drivetwin.files.result_file import load_result
-from drivetwin.files.twin_conversion import load_twin
+from drivetwin.files.twin_file import load_twin
 from drivetwin.report.model_verdict import explain_result
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.spec import PriorValue

@@ -13,7 +13,7 @@ from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, Reme
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
-from drivetwin.files.twin_conversion import load_twin, save_twin
+from drivetwin.files.twin_file import load_twin, save_twin
 from drivetwin.parameters import OVER_ETA
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from drivetwin.twin.build import build_twin

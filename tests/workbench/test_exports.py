@@ -16,7 +16,7 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import Method
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
 from drivetwin.export.targets import Target
-from drivetwin.files.twin_conversion import load_twin
+from drivetwin.files.twin_file import load_twin
 from drivetwin.workbench.exports import Record, make_product
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.session import Session

@@ -15,9 +15,9 @@ from drivetwin.findings import Code, render
 from drivetwin.logs.formats import parser_limits
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
-from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.phases import Boundary, get_boundary_times
 from drivetwin.workbench.session import MOST_UPLOADS, Session
+from drivetwin.workbench.session_state import Source
 from tests.workbench.conftest import CARD, LOG, finish
 
 

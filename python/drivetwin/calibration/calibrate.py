@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Calibration of a shift: search, polish, and certificate on fresh draws."""
+"""Calibration of a shift: search, polish, and certificate on fresh draws.
+
+Units that slip again after lock-up join the draws of a further polish.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,6 @@ from drivetwin.calibration.polish import Run, polish
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import Draw, Purpose, Scenarios, draw_scenarios
 from drivetwin.calibration.search import Candidate, search_minima
-from drivetwin.calibration.second_slips import Exchange
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 
@@ -236,3 +238,46 @@ def _make_run(task: Task, plant: Plant, draws: Scenarios) -> Run:
         return plant.evaluate_all([space.build_control(one) for one in candidates], draws)
 
     return run
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Coordinates (q,), and the draws of the check (n,) that joined those of the polish."""
+
+    coordinates: FloatArray
+    joined: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """Polish with the draws of a check that slip again after their lock-up.
+
+    A second slip is so rare that the draws of a polish miss it. `assess` returns the outcome of
+    coordinates (q,) over the draws of the check, `improve` the coordinates after a polish in which
+    the marked draws (n,) of the check take part. Rounds end when no unit slips again, or one gains
+    nothing.
+
+    Source: exchange method of J. Blankenship and J. Falk, Infinitely constrained optimization
+    problems, J. Optimization Theory and Applications 19 (1976).
+    """
+
+    assess: Callable[[FloatArray], Outcome]
+    improve: Callable[[FloatArray, NDArray[np.bool_]], FloatArray]
+    rounds: int
+
+    def hold_lockup(self, start: FloatArray, objective: Objective) -> Held:
+        """Return the coordinates of the least objective over the draws of the check."""
+        outcome = self.assess(start)
+        best = Held(start, np.zeros(outcome.relocked.size, np.bool_))
+        least = objective.evaluate(outcome)
+        for _ in range(self.rounds):
+            if not outcome.relocked.any():
+                break
+            joined = best.joined | outcome.relocked
+            tried = self.improve(best.coordinates, joined)
+            outcome = self.assess(tried)
+            value = objective.evaluate(outcome)
+            if value >= least:
+                break
+            best, least = Held(tried, joined), value
+        return best

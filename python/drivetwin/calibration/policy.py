@@ -3,25 +3,76 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.closed_loop import Control
-from drivetwin.calibration.profiles import PolicyParameter
+from drivetwin.errors import InputError
 
 
-class Policy(Protocol):
-    """Policy: parameters, and the control of a shift that follows from their values."""
+@dataclass(frozen=True)
+class PolicyParameter:
+    """A number of the policy: SI `unit`, bounds, starting value, and its meaning.
 
-    @property
-    def parameters(self) -> tuple[PolicyParameter, ...]:
-        """Parameters in the order of the values."""
+    A parameter that is not `free` keeps its starting value.
+    """
 
+    name: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    text: str
+    free: bool = True
+
+
+@dataclass(frozen=True)
+class Policy:
+    """Policy: parameters, and the control of a shift that follows from their values.
+
+    Raises InputError where a parameter has no room between its bounds or starts outside them.
+    """
+
+    parameters: tuple[PolicyParameter, ...]
+
+    def __post_init__(self) -> None:
+        for one in self.parameters:
+            if not one.low < one.high or not one.low <= one.start <= one.high:
+                raise InputError(
+                    f"{one.name} starts at {one.start:g} {one.unit} with bounds {one.low:g} to "
+                    f"{one.high:g}",
+                    "give bounds that increase and contain the start",
+                )
+
+    @abstractmethod
     def build_control(self, values: FloatArray) -> Control:
-        """Return the control of values (p,) in SI."""
+        """Return the control of values (p,) in SI, in the order of the parameters."""
+
+    def set_start(self, values: Mapping[str, float]) -> Self:
+        """Return the policy with other starting values by name, moved onto the bounds.
+
+        Raises InputError for an unknown name.
+        """
+        names = [one.name for one in self.parameters]
+        if unknown := [name for name in values if name not in names]:
+            raise InputError(
+                f"the policy has no parameter {', '.join(unknown)}", f"use {', '.join(names)}"
+            )
+        moved = tuple(
+            replace(one, start=min(max(values.get(one.name, one.start), one.low), one.high))
+            for one in self.parameters
+        )
+        return replace(self, parameters=moved)
+
+    def name_values(self, values: FloatArray) -> dict[str, float]:
+        """Return values (p,) by the names of the parameters."""
+        names = (one.name for one in self.parameters)
+        return dict(zip(names, values.tolist(), strict=True))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import Signal
 
 
@@ -47,48 +45,3 @@ class Profiles:
                 for one in (self.engine_torque, self.offgoing, self.oncoming)
             )
         )
-
-
-@dataclass(frozen=True)
-class PolicyParameter:
-    """A number of the policy: SI `unit`, bounds, starting value, and its meaning.
-
-    A parameter that is not `free` keeps its starting value.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    start: float
-    text: str
-    free: bool = True
-
-
-def check_parameters(parameters: tuple[PolicyParameter, ...]) -> None:
-    """Raise InputError where a parameter has no room between its bounds or starts outside them."""
-    for one in parameters:
-        if not one.low < one.high or not one.low <= one.start <= one.high:
-            raise InputError(
-                f"{one.name} starts at {one.start:g} {one.unit} with bounds {one.low:g} to "
-                f"{one.high:g}",
-                "give bounds that increase and contain the start",
-            )
-
-
-def move_start(
-    parameters: tuple[PolicyParameter, ...], values: Mapping[str, float]
-) -> tuple[PolicyParameter, ...]:
-    """Return parameters with other starting values by name, moved onto the bounds.
-
-    Raises InputError for an unknown name.
-    """
-    names = [one.name for one in parameters]
-    if unknown := [name for name in values if name not in names]:
-        raise InputError(
-            f"the policy has no parameter {', '.join(unknown)}", f"use {', '.join(names)}"
-        )
-    return tuple(
-        replace(one, start=min(max(values.get(one.name, one.start), one.low), one.high))
-        for one in parameters
-    )

@@ -9,17 +9,15 @@ from dataclasses import dataclass, field
 
 from drivetwin.calibration.calibrate import Task, draw_for
 from drivetwin.calibration.certificate import compute_quantiles
-from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.knot_policy import build_knot_policy
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
-from drivetwin.calibration.policy import Policy, Space
-from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.policies.table import POLICIES, PolicySetup
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws
 from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.calibration.slip_policy import build_slip_policy
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.errors import IdentificationError, InputError, Where
@@ -82,9 +80,11 @@ def build_task(twin: Twin, request: Request) -> Task:
     maneuver = Maneuver(model, point, request.wheel_radius, pressure_delay=delay, parts=parts)
     check_torque_phase_first(maneuver)
     units = None
-    if request.policy is PolicyKind.SLIP:
+    if request.policy.commands_actuators:
         units = _build_unit_draws(twin, maneuver, request)
-    policy = _build_policy(twin, maneuver, request, units)
+    unit = None if units is None else units.nominal
+    setup = PolicySetup(maneuver, _choose_pressure(twin, request), unit, request.hardware.task)
+    policy = POLICIES[request.policy](setup).set_start(request.start)
     draw = Draw(TwinDraws(twin, shift, request.spread), units)
     task = Task(maneuver, policy, draw, request.limits or (), request.seed, request.settings)
     if request.limits is None:
@@ -148,26 +148,16 @@ def _choose_point(twin: Twin, request: Request) -> OperatingPoint:
     return OperatingPoint(torque, speed)
 
 
-def _build_policy(
-    twin: Twin, maneuver: Maneuver, request: Request, units: UnitDraws | None
-) -> Policy:
-    pressure = request.system_pressure
-    if pressure is None and "pressure" not in twin.validity:
+def _choose_pressure(twin: Twin, request: Request) -> float:
+    """Pressure [Pa] of a held element: as requested, else the largest that the log has."""
+    if request.system_pressure is not None:
+        return request.system_pressure
+    if "pressure" not in twin.validity:
         raise InputError(
             f"the twin {twin.name!r} does not say which pressures its log had",
             "give --system-pressure",
         )
-    if pressure is None:
-        pressure = twin.validity["pressure"][1]
-    if units is not None:
-        policy = build_slip_policy(maneuver, pressure, units.nominal, request.hardware.task)
-        return policy.set_start(request.start)
-    controller = build_controller_policy(maneuver, pressure)
-    if request.policy is PolicyKind.CONTROLLER:
-        return controller.set_start(request.start)
-    start = controller.build_control(Space(controller).to_values(Space(controller).start))
-    knots = build_knot_policy(maneuver, start, pressure)
-    return knots.set_start(request.start)
+    return twin.validity["pressure"][1]
 
 
 def _build_unit_draws(twin: Twin, maneuver: Maneuver, request: Request) -> UnitDraws:

@@ -10,16 +10,96 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.friction_unknowns import FrictionUnknowns, build_friction_unknowns
 from drivetwin.calibration.scenarios import TwinDraws
 from drivetwin.calibration.spread import Spread
 from drivetwin.estimation.likelihood.effects.pressure_delay import EFFECT as DELAY
-from drivetwin.estimation.result.estimate import Estimate
+from drivetwin.estimation.linear.friction_points import build_law_derivatives
+from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
 from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.distribution import collect_covariance, has_possible_parts
+from drivetwin.twin.friction_law import (
+    build_partner_spread,
+    compute_friction_std,
+    compute_law_covariance,
+    to_law,
+    to_values,
+)
 from drivetwin.twin.twin import PRESSURE_DELAY, SIMULATED, Twin
+from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionUnknowns:
+    """Values (k,) of the friction of an element, `mean` and `covariance` (k, k) before the logs.
+
+    They are μ_c, μ_s - μ_c, μ_v and ln v_s of the law of `curve`; one scale of it without a law.
+    """
+
+    element: str
+    curve: FrictionCurve
+    mean: FloatArray
+    covariance: FloatArray
+
+    def is_possible(self, values: FloatArray) -> bool:
+        """Return whether values (k,) make a friction above zero at rest and in slip."""
+        return bool(values[0] > 0.0 and (values.size == 1 or values[0] + values[1] > 0.0))
+
+    def build_curve(self, values: FloatArray, covariance: FloatArray, method: str) -> FrictionCurve:
+        """Build the curve of values (k,) with their covariance (k, k)."""
+        curve, law, law_covariance = self.curve, None, None
+        if curve.stribeck is None:
+            scale, slopes = values[0] * np.ones_like(curve.mu), curve.mu[None]
+        else:
+            law = to_law(values)
+            scale = law.evaluate(curve.slip) / curve.stribeck.evaluate(curve.slip)
+            slopes = law.compute_slopes(curve.slip)
+            back = build_law_derivatives(law.v_s)
+            law_covariance = back @ covariance @ back.T
+        half = Z95 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, covariance, slopes))
+        mu = scale * curve.mu
+        place = np.interp(curve.points_slip, curve.slip, scale)
+        return replace(
+            curve,
+            mu=mu,
+            mu_lo=mu - half,
+            mu_hi=mu + half,
+            points_mu=place * curve.points_mu,
+            stribeck=law,
+            stribeck_covariance=law_covariance,
+            method=method,
+        )
+
+
+def build_friction_unknowns(
+    element: str, partner: str, curves: Mapping[str, FrictionCurve], gain: float
+) -> FrictionUnknowns:
+    """Build the friction of an element of a made unit, whose gain has the spread `gain`.
+
+    An element without a curve has that of its partner, from which it departs as in an
+    identification of a clutch that only disengages.
+    """
+    own = curves.get(element)
+    curve = curves[partner] if own is None else own
+    law, known = curve.stribeck, None if own is None else compute_law_covariance(own)
+    mean = np.ones(1) if law is None else to_values(law)
+    scaled = np.ones(1) if law is None else mean * np.array([1.0, 1.0, 1.0, 0.0])
+    if own is None:
+        covariance = _build_other_clutch(curve)
+    elif known is not None:
+        covariance = known
+    else:
+        covariance = compute_friction_std(curve) ** 2 * np.outer(scaled, scaled)
+    return FrictionUnknowns(element, curve, mean, covariance + gain**2 * np.outer(scaled, scaled))
+
+
+def _build_other_clutch(curve: FrictionCurve) -> FloatArray:
+    """Covariance (k, k) of the friction of a clutch about that of another one."""
+    if curve.stribeck is None:
+        return np.array([[PARTNER_LEVEL_STD**2]])
+    return build_partner_spread(curve.stribeck)
+
 
 METHOD = "logs of a calibration"
 """Name of the method in the estimates of a corrected twin."""

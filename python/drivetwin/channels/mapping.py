@@ -9,16 +9,11 @@ from pathlib import Path
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
-from drivetwin.channels.extra_roles import is_extra
-from drivetwin.channels.pressure_roles import (
-    get_element,
-    make_command_role,
-    make_pressure_role,
-)
+from drivetwin.channels.pressure_roles import get_element, make_command_role, make_pressure_role
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.recall import recall_channels
 from drivetwin.channels.recognition import infer_candidates, prefer_filled
-from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS
+from drivetwin.channels.roles import MEASURED, ROLES, STAND_INS, is_extra
 from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.findings import Code, Finding, report
 

@@ -1,11 +1,39 @@
 # SPDX-License-Identifier: MIT
-"""The closed set of channel roles: what a channel is to the driveline, and its quantity."""
+"""The closed set of channel roles: what a channel is to the driveline, and its quantity.
+
+Extra roles (electric motor, torques of shafts, temperatures) are optional: no command requires
+them, and a damaged one is left out with a finding.
+"""
 
 from __future__ import annotations
 
-from drivetwin.channels.extra_roles import get_extra_quantity
 from drivetwin.channels.pressure_roles import get_element
 from drivetwin.channels.shiftlog import Quantity
+
+EXTRA_ROLES = {"motor_torque": Quantity.TORQUE, "motor_speed": Quantity.SPEED}
+"""Roles that exist once."""
+
+PLACED_ROLES = {"shaft_torque": Quantity.TORQUE, "temperature": Quantity.TEMPERATURE}
+"""Roles that exist once for each shaft or place: `shaft_torque.halfshaft`, `temperature.oil`."""
+
+
+def get_place(role: str) -> str | None:
+    """Return the shaft or place of a role such as `temperature.oil`; None for another role."""
+    kind, _, place = role.partition(".")
+    return place if kind in PLACED_ROLES and place else None
+
+
+def get_extra_quantity(role: str) -> Quantity | None:
+    """Return the quantity of an extra role; None for a role that is none."""
+    if get_place(role) is not None:
+        return PLACED_ROLES[role.partition(".")[0]]
+    return EXTRA_ROLES.get(role)
+
+
+def is_extra(role: str) -> bool:
+    """Return True for an extra role."""
+    return get_extra_quantity(role) is not None
+
 
 ROLES: dict[str, Quantity] = {
     "engine_torque": Quantity.TORQUE,
@@ -21,7 +49,7 @@ ROLES: dict[str, Quantity] = {
     "lockup_engaged": Quantity.STATE,
 }
 """Roles that exist once; each shift element also has a pressure and a command, and
-`drivetwin.channels.extra_roles` has those of other sensors."""
+`drivetwin.channels.roles` has those of other sensors."""
 
 NEEDED = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
 """Roles without which a log cannot be identified in absolute terms (pressures come on top)."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.cli.arguments import RESULT, TWIN, TwinFile
 from drivetwin.cli.calibrate_logs import (
     correct_by_logs,
@@ -89,8 +89,7 @@ def calibrate(
         PolicyKind,
         typer.Option(
             "--policy",
-            help="Unknowns: controller parameters, knots of the profiles, or commands with a "
-            "closed slip loop behind the actuators.",
+            help=f"Unknowns: {PolicyKind.describe_all()}.",
         ),
     ] = PolicyKind.CONTROLLER,
     task: Annotated[
@@ -323,7 +322,7 @@ def _load_valid_twin(source: Path) -> Twin:
     """Load a twin; raises IdentificationError where its result says that it is not valid."""
     from drivetwin.estimation.result.status import ModelStatus
     from drivetwin.files.result_file import load_result
-    from drivetwin.files.twin_conversion import load_twin
+    from drivetwin.files.twin_file import load_twin
     from drivetwin.report.model_verdict import explain_result
 
     model = load_twin(source)
@@ -369,7 +368,7 @@ def _write_results(
         hash_file,
         write_calibration_file,
     )
-    from drivetwin.files.twin_conversion import save_twin
+    from drivetwin.files.twin_file import save_twin
     from drivetwin.report.calibration import render_calibration
 
     (found, front, mapped), (twin, request, sources) = results, origin
@@ -442,18 +441,20 @@ def _print_around(front: Front | None, mapped: OperatingMap | None) -> None:
 
 
 def _to_document(results: Results, findings: tuple[Finding, ...], output: Path) -> dict[str, Any]:
-    from drivetwin.files.calibration_file import build_certificate_document
-    from drivetwin.files.calibration_points import build_front_records, build_map_records
+    from drivetwin.files.calibration_file import (
+        build_certificate_document,
+        build_front_records,
+        build_map_records,
+    )
     from drivetwin.files.records import dump_findings
 
     found, front, mapped = results
-    listed = found.task.policy.parameters
-    parameters = zip(listed, found.after.values.tolist(), strict=True)
+    policy = found.task.policy
     return {
         "folder": str(output),
-        "parameters": {one.name: value for one, value in parameters},
+        "parameters": policy.name_values(found.after.values),
         "certificate": build_certificate_document(found),
-        "front": [one.model_dump(mode="json") for one in build_front_records(front, listed)],
+        "front": [one.model_dump(mode="json") for one in build_front_records(front, policy)],
         "map": [one.model_dump(mode="json") for one in build_map_records(mapped)],
         "findings": dump_findings(findings),
     }

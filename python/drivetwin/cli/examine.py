@@ -202,7 +202,7 @@ def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     """Write all files or none."""
     from drivetwin.cli.arguments import TWIN
     from drivetwin.cli.atomic_outputs import write_atomically
-    from drivetwin.files.twin_conversion import save_twin
+    from drivetwin.files.twin_file import save_twin
 
     names: list[str] = []
     with write_atomically(folder) as beside:

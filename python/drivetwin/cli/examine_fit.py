@@ -28,10 +28,9 @@ if TYPE_CHECKING:
 def examine_fit(log: Path, model: Path, asked: Asked) -> Iterator[Answer]:
     """Fit a model to a log, and yield every answer in the order in which they are printed."""
     from drivetwin.files import analysis_files
-    from drivetwin.fit.examine import bootstrap, rank_improvements
+    from drivetwin.fit.examine import bootstrap, compute_profile, rank_improvements
     from drivetwin.fit.fit import fit_network
     from drivetwin.fit.model_file import read_model
-    from drivetwin.fit.profile import compute_profile
     from drivetwin.fit.read import read_recording
 
     network, channels = read_model(model)

@@ -13,10 +13,7 @@ from drivetwin.cli.arguments import ChannelsFile, TwinFile, read_twin_log
 from drivetwin.cli.output import JsonFlag, print_json, print_line, print_paragraph, show_step
 from drivetwin.cli.outputs import Output, Shape
 from drivetwin.errors import InputError, Where
-from drivetwin.export.fmu.version import FmiVersion
-from drivetwin.export.parameters.names import Names
-from drivetwin.export.platforms import Platform
-from drivetwin.export.targets import Target
+from drivetwin.export.targets import FmiVersion, Names, Platform, Target
 
 if TYPE_CHECKING:
     from drivetwin.export.fmu.experiment import Experiment
@@ -116,7 +113,7 @@ def export(
     components of the Standard Library. ssv, cdfx, dcm, m, json, csv: parameter files with units and
     intervals.
     """
-    from drivetwin.files.twin_conversion import load_twin
+    from drivetwin.files.twin_file import load_twin
 
     model = load_twin(twin)
     path = output or Path(f"{twin.stem}.{to.ending}")

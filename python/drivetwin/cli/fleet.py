@@ -228,7 +228,7 @@ def _print_estimates(found: list[JointEstimate]) -> None:
 
 def _describe_change(one: JointEstimate, change: Change) -> str:
     """Describe the change of a unit."""
-    from drivetwin.fleet.readings import format_span
+    from drivetwin.fleet.rules import format_span
 
     step = _format_deviation(one, change.size, change.std)
     where = format_span(change.field, change.before, change.after)
@@ -259,7 +259,7 @@ def _format_deviation(one: JointEstimate, size: float, std: float) -> str:
 def _describe_drift(one: JointEstimate) -> tuple[str, str, str]:
     """Drift over the first field, its interval, and per what it is."""
     from drivetwin.cli.numbers import format_estimate
-    from drivetwin.fleet.readings import get_drift_unit
+    from drivetwin.fleet.rules import get_drift_unit
 
     if not one.drifts:
         return "", "", ""

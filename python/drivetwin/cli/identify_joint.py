@@ -97,7 +97,7 @@ def write_joint(outcome: Joined, folder: Path) -> tuple[Path, ...]:
     `twin.toml` is that of the first log; of several each has `NAME-OF-LOG.twin.toml` besides.
     """
     from drivetwin.files.result_file import save_result
-    from drivetwin.files.twin_conversion import save_twin
+    from drivetwin.files.twin_file import save_twin
     from drivetwin.report.together import save_joint_report
 
     twins = list(outcome.made.twins.items())

@@ -99,7 +99,7 @@ def run_identification(log: Path, how: Request) -> Outcome:
 def write_outcome(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
     """Write result, twin and report into `folder`, all or none; returns their paths."""
     from drivetwin.files.result_file import save_result
-    from drivetwin.files.twin_conversion import save_twin
+    from drivetwin.files.twin_file import save_twin
     from drivetwin.report.html import save_report
 
     with show_step("writing the report"), write_atomically(folder) as beside:

@@ -68,7 +68,7 @@ def observe(
     The log needs no output torque; if it has one, it is not used.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.files.twin_conversion import load_twin
+    from drivetwin.files.twin_file import load_twin
     from drivetwin.observer.observe import estimate_torques
     from drivetwin.report.observer import render_observations
     from drivetwin.shifts.detect import require_shifts

@@ -125,7 +125,7 @@ def _assign_names(made: Sequence[Path]) -> dict[str, Path]:
 
 def _load_candidate(name: str, source: Path) -> Candidate:
     from drivetwin.files.result_file import load_result
-    from drivetwin.files.twin_conversion import load_twin
+    from drivetwin.files.twin_file import load_twin
     from drivetwin.report.find_reports import Candidate
 
     if source.suffix == ".toml":
@@ -135,7 +135,7 @@ def _load_candidate(name: str, source: Path) -> Candidate:
 
 def _load_twin(source: Path) -> Twin:
     """Load the twin of a source: the file itself, or the twin file next to its result."""
-    from drivetwin.files.twin_conversion import load_twin
+    from drivetwin.files.twin_file import load_twin
 
     return load_twin(find_twin(source))
 

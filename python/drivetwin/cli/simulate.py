@@ -25,7 +25,7 @@ from drivetwin.cli.output import (
     show_step,
 )
 from drivetwin.cli.outputs import PAGE, Output, select_outputs
-from drivetwin.export.input_kind import DEFAULT_STEP, InputKind
+from drivetwin.export.targets import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
     from drivetwin.estimation.result.validation import Validation
@@ -95,7 +95,7 @@ def simulate(
     from drivetwin._util.atomic import write_text
     from drivetwin.cli.tables import build_fit_table
     from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
-    from drivetwin.files.twin_conversion import load_twin
+    from drivetwin.files.twin_file import load_twin
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.command_pressures import replace_pressures
     from drivetwin.validation.signal_table import format_signals

@@ -116,7 +116,7 @@ def _require_dash() -> None:
 
 def _make_start(place: Folder, log: Path | None, card: Path | None, mapping: Path | None) -> Start:
     """The files of the command line, as far as the folder holds them. Raises RefusedError."""
-    from drivetwin.workbench.open_log import Source
+    from drivetwin.workbench.session_state import Source
     from drivetwin.workbench.views.page import Start
 
     def source(path: Path | None) -> Source | None:

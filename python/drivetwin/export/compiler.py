@@ -16,7 +16,7 @@ from os.path import relpath
 from pathlib import Path
 
 from drivetwin.errors import CompilerError, MissingExtraError
-from drivetwin.export.platforms import Platform
+from drivetwin.export.targets import Platform
 
 _ZIG_TARGETS = {
     Platform.LINUX: "x86_64-linux-gnu.2.17",  # runs from RHEL 7 on

@@ -12,7 +12,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
-from drivetwin.export.input_kind import InputKind
+from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     DualClutch,

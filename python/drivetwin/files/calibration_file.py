@@ -15,28 +15,83 @@ from drivetwin._util.atomic import write_text
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.toml import parse_toml
 from drivetwin.calibration.calibrate import Calibration
-from drivetwin.calibration.front import Front
-from drivetwin.calibration.metrics import METRICS
-from drivetwin.calibration.operating_map import OperatingMap
-from drivetwin.calibration.policy_kind import PolicyKind
+from drivetwin.calibration.certificate import LimitState
+from drivetwin.calibration.front import Arm, Front
+from drivetwin.calibration.metrics import METRICS, Metric
+from drivetwin.calibration.operating_map import MapPoint, OperatingMap
+from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.policy import Policy
 from drivetwin.calibration.spread import Spread
-from drivetwin.files.calibration_points import (
-    FrontRecord,
-    MapRecord,
-    build_front_records,
-    build_map_records,
-)
 from drivetwin.files.limits_file import SpreadRecord, build_limit_keys
 from drivetwin.files.read import read_record
 from drivetwin.files.records import Record, SchemaName
 
+
+class PointFigures(Record):
+    """Policy values (SI) of a calibration and its figures over fresh draws.
+
+    Peak jerk and shift time are for 95 % of the units, the friction energy is the mean.
+    """
+
+    parameters: dict[str, FiniteFloat]
+    peak_jerk_m_s3: FiniteFloat = Field(ge=0)
+    shift_time_s: FiniteFloat
+    mean_friction_energy_J: FiniteFloat = Field(ge=0)
+
+
+class FrontRecord(PointFigures):
+    """A point of the front; `arm` is the calibration itself or the figure whose limit was moved."""
+
+    arm: Arm
+
+
+class MapRecord(PointFigures):
+    """A point of a map; `exceeded` names the metrics whose limits it does not keep."""
+
+    engine_torque_Nm: FiniteFloat
+    engine_speed_rad_s: FiniteFloat = Field(gt=0)
+    exceeded: list[Metric] = Field(default_factory=list)
+
+
+def build_front_records(front: Front | None, policy: Policy) -> list[FrontRecord]:
+    """Return the records of a front; empty without one."""
+    return [
+        FrontRecord(
+            arm=one.arm,
+            parameters=policy.name_values(one.values),
+            peak_jerk_m_s3=one.jerk,
+            shift_time_s=one.time,
+            mean_friction_energy_J=one.energy,
+        )
+        for one in (() if front is None else front.points)
+    ]
+
+
+def build_map_records(mapped: OperatingMap | None) -> list[MapRecord]:
+    """Return the records of a map, by torque and speed; empty without one."""
+    if mapped is None:
+        return []
+    return [_build_map_record(mapped.points[place]) for place in sorted(mapped.points)]
+
+
+def _build_map_record(one: MapPoint) -> MapRecord:
+    point, certificate = one.task.maneuver.point, one.found.certificate
+    quantiles = certificate.quantiles
+    return MapRecord(
+        engine_torque_Nm=point.engine_torque,
+        engine_speed_rad_s=point.engine_speed,
+        parameters=one.task.policy.name_values(one.found.values),
+        peak_jerk_m_s3=one.jerk,
+        shift_time_s=quantiles[Metric.SHIFT_TIME].share_95,
+        mean_friction_energy_J=quantiles[Metric.FRICTION_ENERGY].mean,
+        exceeded=[
+            each.limit.metric for each in certificate.limits if each.state is LimitState.EXCEEDED
+        ],
+    )
+
+
 CALIBRATION_SCHEMA = "drivetwin/calibration-1"
 _HEADER = "Calibration of a shift; written by drivetwin. All values in SI units: s, N*m, Pa, rad/s."
-_PLACES = {
-    PolicyKind.CONTROLLER: "Pressures are those at the clutch.",
-    PolicyKind.KNOTS: "Pressures are those at the clutch.",
-    PolicyKind.SLIP: "Pressures are commands of the controller.",
-}
 
 
 class PolicyValueRecord(Record):
@@ -132,7 +187,7 @@ def build_calibration_file(
             "limits": {keys[one.metric, one.statistic]: one.bound for one in task.limits},
             "spread": SpreadRecord.from_spread(origin.spread).model_dump(mode="json"),
             "settings": asdict(task.settings),
-            "front": build_front_records(front, task.policy.parameters),
+            "front": build_front_records(front, task.policy),
             "map": build_map_records(mapped),
         }
     )
@@ -141,7 +196,7 @@ def build_calibration_file(
 def write_calibration_file(path: Path, content: CalibrationFile) -> None:
     """Write `calibration.toml`; it appears whole or not at all."""
     document = tomlkit.document()
-    place = f"{_PLACES[content.policy]} Times count from the request of the gear."
+    place = f"Pressures are {content.policy.pressures}. Times count from the request of the gear."
     for line in (_HEADER, place):
         document.add(tomlkit.comment(line))
     for key, value in content.model_dump(mode="json", by_alias=True).items():

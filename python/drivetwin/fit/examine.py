@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Certainty of a fit: what would narrow its intervals, and a parametric bootstrap."""
+"""Certainty of a fit: what would narrow its intervals, profiles, and a parametric bootstrap."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.analysis.bootstrap import MIN_FITS, Bootstrap, draw_prior
+from drivetwin.estimation.analysis.profile_likelihood import Profile, trace_profile
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_pressure
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.optimize.gauss_newton import minimise
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.search import BENT, Problem
@@ -121,3 +123,83 @@ def _draw_part(part: NetworkTerm, found: ModelFit, rng: np.random.Generator) -> 
         held_back[name] = read - driving
     made = replace(record, outputs=outputs, inputs=inputs, held_back=held_back, fast=held_back)
     return NetworkTerm.from_sensor_noise(part.plant, made)
+
+
+def compute_profile(found: ModelFit, unknown: str) -> Profile:
+    """Compute the profile likelihood of an unknown.
+
+    Parameters
+    ----------
+    found
+        Fit.
+    unknown
+        Its name.
+
+    Returns
+    -------
+    Profile
+        Rise of Q over values in SI, with the 95 % interval by it.
+
+    Raises
+    ------
+    InputError
+        For a name that is no unknown of the fit.
+    """
+    names = [one.name for one in found.sought]
+    if unknown not in names:
+        raise InputError(f"the fit has no unknown {unknown!r}", f"choose one of {', '.join(names)}")
+    one = found.sought[names.index(unknown)]
+    profile = trace_profile(_HeldCoordinate(found, names.index(unknown), unknown))
+    if not one.is_positive:
+        return profile
+    (low, high), (least, most) = profile.interval, profile.linear
+    return replace(
+        profile,
+        values=np.exp(profile.values),
+        estimate=one.to_value(profile.estimate),
+        interval=(float(np.exp(low)), float(np.exp(high))),
+        linear=(one.to_value(least), one.to_value(most)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _HeldCoordinate:
+    """Coordinate of an unknown, by its place."""
+
+    found: ModelFit
+    place: int
+    parameter: str
+
+    @property
+    def problem(self) -> Problem:
+        return self.found.problem
+
+    @property
+    def point(self) -> ParameterVector:
+        return self.found.minimum.point
+
+    @property
+    def cost(self) -> float:
+        return self.found.cost
+
+    @property
+    def estimate(self) -> float:
+        return float(self.point.values[self.place])
+
+    @property
+    def std(self) -> float:
+        return float(np.sqrt(self.found.covariance[self.place, self.place]))
+
+    @property
+    def unit(self) -> float:
+        """Rise of Q that counts as one: the variance over that by the sensors' noise."""
+        inverse = invert_information(self.found.normal.information)
+        return float(self.std**2 / inverse[self.place, self.place])
+
+    def compute_value(self, point: ParameterVector) -> float:
+        return float(point.values[self.place])
+
+    def compute_gradient(self, point: ParameterVector) -> FloatArray:
+        gradient = np.zeros(len(point.names))
+        gradient[self.place] = 1.0
+        return gradient

@@ -22,8 +22,7 @@ from drivetwin._util.toml import (
     validate_schema,
 )
 from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.extra_roles import EXTRA_ROLES, PLACED_ROLES
-from drivetwin.channels.roles import ROLES, get_quantity
+from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES, get_quantity
 from drivetwin.errors import InputError
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output

@@ -10,8 +10,7 @@ from drivetwin._util.display_units import get_display_unit
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fleet.mixed_model.mixed import FloatArray
 from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, UnitValue
-from drivetwin.fleet.readings import format_reading, to_datetime
-from drivetwin.fleet.rules import is_date
+from drivetwin.fleet.rules import format_reading, is_date, to_datetime
 from drivetwin.report.figure import Figure
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, make_axis, make_layout

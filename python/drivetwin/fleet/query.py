@@ -18,9 +18,8 @@ from drivetwin._util.csv_text import format_csv_row
 from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.errors import InputError, QueryError, Where
 from drivetwin.fleet.index import ONE_FILE_EACH, Index
-from drivetwin.fleet.readings import to_datetime
 from drivetwin.fleet.rows import RowKind, make_schema
-from drivetwin.fleet.rules import FILE_COLUMNS, is_date
+from drivetwin.fleet.rules import FILE_COLUMNS, is_date, to_datetime
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import Limits
 

@@ -24,7 +24,7 @@ from drivetwin.fleet.mixed_model.single_unit import (
     make_truncation_caption,
 )
 from drivetwin.fleet.pages import LIBRARY
-from drivetwin.fleet.readings import format_span, get_drift_unit
+from drivetwin.fleet.rules import format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
 from drivetwin.parameters import get_parameter_spec

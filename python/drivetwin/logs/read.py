@@ -15,13 +15,12 @@ from drivetwin._util.progress import notify_progress
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
-from drivetwin.channels.extra_roles import is_extra
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity
+from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity, is_extra
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
 from drivetwin.channels.unit_proposals import Proposal, propose_missing_units
 from drivetwin.channels.units import Unit, find_unit, list_first_spellings, resolve_channel_unit

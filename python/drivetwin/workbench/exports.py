@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from drivetwin.errors import InputError
 from drivetwin.estimation.identification import Identification
 from drivetwin.export.targets import Target
-from drivetwin.files.twin_conversion import save_twin
+from drivetwin.files.twin_file import save_twin
 from drivetwin.workbench import jobs, what_if
 from drivetwin.workbench.identifying import render_log_report
 from drivetwin.workbench.session_state import SessionState

@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.extra_roles import EXTRA_ROLES, is_extra
 from drivetwin.channels.mapping import make_spec
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.read_options import Column as LogColumn
-from drivetwin.channels.roles import ROLES, get_quantity
+from drivetwin.channels.roles import EXTRA_ROLES, ROLES, get_quantity, is_extra
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import (
     is_time_unit,

@@ -29,11 +29,10 @@ from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspa
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.identifying import Task, identify_all
 from drivetwin.workbench.mapping import Corrections, Entry, apply_entries
-from drivetwin.workbench.open_log import MOST_LOGS, OpenLog, Source
 from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.sample import write_sample
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
-from drivetwin.workbench.session_state import SessionState
+from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
 from drivetwin.workbench.workspace_folder import Folder
 from drivetwin.workbench.zoom import View
 

@@ -19,14 +19,12 @@ from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
 from drivetwin.errors import RefusedError, Where
 from drivetwin.estimation.result.method import Method
-from drivetwin.files.twin_conversion import build_twin_file, restore_twin
-from drivetwin.files.twin_file import TwinFile
+from drivetwin.files.twin_file import TwinFile, build_twin_file, restore_twin
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.mapping import Corrections
-from drivetwin.workbench.open_log import MOST_LOGS, OpenLog, Source
 from drivetwin.workbench.phases import Boundary
-from drivetwin.workbench.session_state import SessionState
+from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.workspace_folder import Folder
 

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from drivetwin.errors import InputError
-from drivetwin.export.c.layout import Precision
-from drivetwin.export.c.loaded import STATUS, CModel, CObserver, CRun
+from drivetwin.export.c.loaded import STATUS, CModel, CObserver, CRun, Precision
 from drivetwin.export.entries import get_lock_index, list_entries, start_entries
 from drivetwin.export.fixed_step import run_fixed_step
-from drivetwin.export.input_kind import InputKind
 from drivetwin.export.subject import compute_steady_start
+from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FloatArray,

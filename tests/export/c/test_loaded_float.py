@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.export.c.layout import Precision
-from drivetwin.export.c.loaded import CModel
+from drivetwin.export.c.loaded import CModel, Precision
 from drivetwin.export.fixed_step import run_fixed_step
-from drivetwin.export.input_kind import InputKind
+from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import RoadLoad, State
 from tests.export.c.test_loaded import set_model
 from tests.export.cases import paper_model, paper_subject

@@ -26,10 +26,8 @@ from drivetwin.export.fmu.build import BuildOptions, build_fmu, make_identifier
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.fmu.variables import INPUTS as FIRST_INPUT
 from drivetwin.export.fmu.variables import LOCKED, MODES, OUTPUTS, PARAMETERS, START
-from drivetwin.export.fmu.version import FmiVersion
-from drivetwin.export.input_kind import InputKind
 from drivetwin.export.parameters.files import read_parameters
-from drivetwin.export.platforms import Platform
+from drivetwin.export.targets import FmiVersion, InputKind, Platform
 from drivetwin.simulation.dual_clutch import FloatArray
 from tests.export.cases import CASES, STEP, Case, paper_subject
 

@@ -11,7 +11,7 @@ import pytest
 from drivetwin.export.compiler import detect_platform
 from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.build import build_fmu
-from drivetwin.export.input_kind import InputKind
+from drivetwin.export.targets import InputKind
 from tests.export.cases import CASES, STEP
 
 pytestmark = pytest.mark.skipif(

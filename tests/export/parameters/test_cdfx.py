@@ -9,8 +9,8 @@ import pytest
 
 from drivetwin.export.parameters.cdfx import format_cdfx, parse_cdfx
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.export.targets import Names
 from tests.export.parameters.sample import twin
 
 CONTENT = ParameterSet(

@@ -13,8 +13,8 @@ from hypothesis import assume, given, settings
 from drivetwin.errors import FileFormatError, InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.dcm import format_dcm, parse_dcm
-from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.export.targets import Names
 from tests.export.parameters.sample import SETS, twin
 
 CONTENT = ParameterSet(

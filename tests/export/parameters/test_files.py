@@ -18,8 +18,8 @@ from drivetwin.export.parameters.files import (
     read_parameters,
     write_parameters,
 )
-from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.export.targets import Names
 from tests.export.parameters.sample import SETS, twin
 
 TEXTS = {kind: codec.text(collect_parameters(twin())) for kind, codec in CODECS.items()}

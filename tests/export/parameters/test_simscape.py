@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.export.targets import Names
 from drivetwin.simulation.converter_map import Converter
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT

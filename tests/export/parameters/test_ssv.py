@@ -11,9 +11,9 @@ import pytest
 from lxml import etree
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.parameters.ssv import format_ssv, parse_ssv
+from drivetwin.export.targets import Names
 from tests.export.parameters.sample import twin
 
 CURVE = Curve("mu.B3", Axis("slip", (0.0, 20.0), "rad/s"), (0.13, 0.12), text="friction")

@@ -33,7 +33,7 @@ from drivetwin.export.parameters.template import (
     restore_entries,
 )
 from drivetwin.export.parameters.to_twin import update_twin
-from drivetwin.files.twin_conversion import save_twin
+from drivetwin.files.twin_file import save_twin
 from tests.export.parameters.sample import twin
 
 RPM = math.pi / 30.0

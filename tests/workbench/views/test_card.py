@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.files.twin_conversion import save_twin
+from drivetwin.files.twin_file import save_twin
 from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import build_server
 from drivetwin.workbench.session import Session

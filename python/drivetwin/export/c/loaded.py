@@ -4,20 +4,55 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from drivetwin.errors import InputError
-from drivetwin.export.c.layout import Precision, read_layout
-from drivetwin.export.c.write import write_c
+from drivetwin.export.c.write import read_model_sources, write_c
 from drivetwin.export.compiler import compile_library
 from drivetwin.export.subject import Subject
 from drivetwin.simulation.dual_clutch import FloatArray
+
+_CONSTANT = re.compile(r"#define DT_(\w+) (\d+)\b")
+_STRUCTURE = re.compile(r"typedef struct \{(.*?)\} dt_(\w+);", re.DOTALL)
+_FIELD = re.compile(r"(\w+) (\w+)((?:\[\w+\])*);")
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+
+
+class Precision(Enum):
+    """Number type of the compiled model."""
+
+    DOUBLE = ctypes.c_double
+    FLOAT = ctypes.c_float
+
+
+def read_layout(precision: Precision) -> SimpleNamespace:
+    """Return the ctypes class of every structure by its name without `dt_`."""
+    sources = read_model_sources()
+    text = _COMMENT.sub(
+        "", "".join(sources[f"dt_{n}.h"].decode() for n in ("model", "delay", "observer"))
+    )
+    sizes = {f"DT_{name}": int(value) for name, value in _CONSTANT.findall(text)}
+    types: dict[str, Any] = {"dt_real": precision.value, "uint64_t": ctypes.c_uint64}
+    types |= dict.fromkeys(("int", "dt_mode", "dt_loss_law"), ctypes.c_int)
+    for body, name in _STRUCTURE.findall(text):
+        fields = []
+        for kind, field, dimensions in _FIELD.findall(body):
+            shaped = types[kind]
+            for size in reversed(re.findall(r"\w+", dimensions)):
+                shaped = shaped * sizes[size]
+            fields.append((field, shaped))
+        types[f"dt_{name}"] = type(name, (ctypes.Structure,), {"_fields_": fields})
+    return SimpleNamespace(**{name.removeprefix("dt_"): kind for name, kind in types.items()})
+
 
 STATUS = (
     "completed",

@@ -23,11 +23,9 @@ from drivetwin.export.entries import list_entries
 from drivetwin.export.fmu.describe import Header, build_description
 from drivetwin.export.fmu.experiment import Experiment, build_reference_files
 from drivetwin.export.fmu.variables import list_variables
-from drivetwin.export.fmu.version import FmiVersion
-from drivetwin.export.input_kind import DEFAULT_STEP
 from drivetwin.export.parameters.xml_text import format_document
-from drivetwin.export.platforms import Platform
 from drivetwin.export.subject import Subject
+from drivetwin.export.targets import DEFAULT_STEP, FmiVersion, Platform
 
 _FOLDERS = {
     FmiVersion.FMI2: {

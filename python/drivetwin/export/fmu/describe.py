@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""`modelDescription.xml` for FMI 2.0 and 3.0."""
+"""`modelDescription.xml` for FMI 2.0 and 3.0, with the definitions of its units."""
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from drivetwin._util.version import get_program_version
-from drivetwin.export.fmu.units import build_unit_definitions, get_display_unit, to_fmi_unit
+from drivetwin.channels.units import BAR, RPM
 from drivetwin.export.fmu.variables import ENUMERATIONS, Kind, Role, Variable
-from drivetwin.export.fmu.version import FmiVersion
+from drivetwin.export.parameters.units import parse_base_units
 from drivetwin.export.parameters.xml_text import format_document
+from drivetwin.export.targets import FmiVersion
 
 
 @dataclass(frozen=True)
@@ -186,3 +187,30 @@ def _log_categories(root: ET.Element) -> None:
 def _add_experiment(root: ET.Element, header: Header) -> None:
     times = {"startTime": header.start_time, "stopTime": header.stop_time, "stepSize": header.step}
     ET.SubElement(root, "DefaultExperiment", {key: repr(value) for key, value in times.items()})
+
+
+_DISPLAY = {"rad/s": ("rpm", 1.0 / RPM), "Pa": ("bar", 1.0 / BAR), "rad": ("deg", 180.0 / math.pi)}
+"""SI unit -> display unit and its factor: displayed = factor · value."""
+
+
+def to_fmi_unit(unit: str) -> str:
+    """A unit in the spelling of FMI and Modelica: `N.m.s/rad` for `N*m*s/rad`."""
+    return unit.replace("*", ".").replace("^", "")
+
+
+def get_display_unit(unit: str) -> str | None:
+    """Display unit of an SI unit, None where it is shown as it is."""
+    return _DISPLAY[unit][0] if unit in _DISPLAY else None
+
+
+def build_unit_definitions(units: Iterable[str]) -> ET.Element:
+    """The element `UnitDefinitions` for SI units in ASCII."""
+    root = ET.Element("UnitDefinitions")
+    for unit in sorted(set(units)):
+        item = ET.SubElement(root, "Unit", name=to_fmi_unit(unit))
+        powers = parse_base_units(unit) or {}
+        ET.SubElement(item, "BaseUnit", {base: str(power) for base, power in powers.items()})
+        if unit in _DISPLAY:
+            name, factor = _DISPLAY[unit]
+            ET.SubElement(item, "DisplayUnit", name=name, factor=repr(factor))
+    return root

@@ -17,12 +17,11 @@ import numpy as np
 from drivetwin._util.csv_text import format_csv_row
 from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.variables import Role, Variable, list_variables
-from drivetwin.export.fmu.version import FmiVersion
-from drivetwin.export.input_kind import InputKind
 from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.ssv import format_ssv
 from drivetwin.export.parameters.xml_text import format_document
 from drivetwin.export.subject import Subject
+from drivetwin.export.targets import FmiVersion, InputKind
 from drivetwin.simulation.dual_clutch import FloatArray
 
 _FOLDER = "extra/org.fmi-standard.fmi-ls-ref"

@@ -14,8 +14,8 @@ from drivetwin.estimation.result.validation import Validation
 from drivetwin.export.fixed_step import Stepping, get_start_state, sample_inputs
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.input_delays import InputDelays
-from drivetwin.export.input_kind import DEFAULT_STEP
 from drivetwin.export.subject import Subject, build_note
+from drivetwin.export.targets import DEFAULT_STEP
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.pressures import get_shift_pressures

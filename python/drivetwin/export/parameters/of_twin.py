@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.names import Names
 from drivetwin.export.parameters.spelling import to_one_line
+from drivetwin.export.targets import Names
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.twin.twin import build_friction_law
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from drivetwin.fleet.mixed_model.observations import LogFacts, collect_facts
 from drivetwin.fleet.mixed_model.reasons import collect_output_fits
-from drivetwin.fleet.readings import format_reading
+from drivetwin.fleet.rules import format_reading
 from drivetwin.fleet.store import Store
 from drivetwin.report.sections.blocks import Block, Cell, Section, TableBlock, make_cells
 

@@ -25,9 +25,9 @@ from drivetwin.channels.units import get_time_factor, is_time_unit
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where
 from drivetwin.logs.formats.can.mdf_frames import has_only_frames, read_bus_frames
 from drivetwin.logs.formats.can.open import decode_recording
+from drivetwin.logs.formats.cell_text import parse_numbers, select_numbers
 from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.formats.mdf_integrity import check_blocks
-from drivetwin.logs.formats.number_texts import parse_numbers, select_numbers
 from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.raw import Joined, RawChannel, Recording, Window
 

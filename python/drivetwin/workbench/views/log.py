@@ -10,11 +10,10 @@ from dash.development.base_component import Component
 
 from drivetwin.findings import render
 from drivetwin.logs.formats.detect import SUFFIXES
-from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import SessionState
+from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import UploadField, get_triggered_part
 from drivetwin.workbench.views.sources import build_file_buttons, format_source, get_source

@@ -11,8 +11,8 @@ from dash.development.base_component import Component
 
 from drivetwin.report.html import read_template
 from drivetwin.workbench.access_control import Access
-from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.session import Session
+from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.steps import Step
 from drivetwin.workbench.views import (

@@ -17,7 +17,6 @@ from drivetwin.report.figures.stack import Panel
 from drivetwin.report.sections.summary import describe_phases
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift, make_shift_labels
-from drivetwin.workbench.open_log import OpenLog
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.phases import (
     LABELS,
@@ -27,7 +26,7 @@ from drivetwin.workbench.phases import (
     plot_phases,
 )
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import SessionState
+from drivetwin.workbench.session_state import OpenLog, SessionState
 from drivetwin.workbench.views import log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import ControlId, Index

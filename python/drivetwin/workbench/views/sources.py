@@ -6,8 +6,8 @@ from __future__ import annotations
 from dash import html
 from dash.development.base_component import Component
 
-from drivetwin.workbench.open_log import Source
 from drivetwin.workbench.session import Session
+from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import UploadField
 

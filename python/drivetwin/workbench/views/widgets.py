@@ -21,8 +21,8 @@ from dash.development.base_component import Component
 
 from drivetwin.errors import DrivetwinError, Where
 from drivetwin.report.figure import Figure
-from drivetwin.workbench.open_log import OpenLog
 from drivetwin.workbench.page_words import replace_options
+from drivetwin.workbench.session_state import OpenLog
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_fields

@@ -14,8 +14,8 @@ from drivetwin._util.optional_dependencies import handle_parser_errors, import_e
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError
+from drivetwin.logs.formats.cell_text import select_numbers
 from drivetwin.logs.formats.frames import Message, Signal
-from drivetwin.logs.formats.number_texts import select_numbers
 
 Bytes = NDArray[np.uint8]
 _MOST_BITS = 56

@@ -24,13 +24,15 @@ from drivetwin.logs.formats.can.database import (
 from drivetwin.logs.formats.frames import Frames, Message, Signal
 from drivetwin.logs.formats.j1939 import torque
 from drivetwin.logs.formats.j1939.codes import check_codes
-from drivetwin.logs.formats.j1939.identifier import (
+from drivetwin.logs.formats.j1939.matching import GroupTable, get_group
+from drivetwin.logs.formats.j1939.transport import (
     ENGINE,
+    REPEATED,
     TRANSMISSION,
+    Assembled,
+    assemble_messages,
     decode_sender,
 )
-from drivetwin.logs.formats.j1939.matching import GroupTable, get_group
-from drivetwin.logs.formats.j1939.transport import REPEATED, Assembled, assemble_messages
 from drivetwin.logs.raw import MIN_SAMPLES, RawChannel, Window
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.logs.formats.frames import Frames, Message, Signal
-from drivetwin.logs.formats.j1939.identifier import (
+from drivetwin.logs.formats.j1939.transport import (
     decode_group,
     decode_receiver,
     decode_sender,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.errors import DrivetwinError, MissingChannelError
-from drivetwin.logs.formats.paired_columns import find_pairs
+from drivetwin.logs.formats.table_columns import find_pairs
 from tests.logs.formats.text_logs import read_csv
 
 NAMES = ("EngTrq", "SpdIn", "p1")

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.channels.read_options import BusOptions, ReadOptions
-from drivetwin.logs.formats.number_texts import parse_numbers, select_numbers
+from drivetwin.logs.formats.cell_text import parse_numbers, select_numbers
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 

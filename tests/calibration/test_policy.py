@@ -3,18 +3,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.calibration.controller_policy import build_controller_policy
-from drivetwin.calibration.policy import Space
-from drivetwin.calibration.profiles import PolicyParameter, check_parameters, move_start
+from drivetwin.calibration.policies.controller import build_controller_policy
+from drivetwin.calibration.policy import PolicyParameter, Space
 from drivetwin.errors import InputError
 from tests.calibration.cases import SYSTEM, make_upshift
 
-SPACE = Space(build_controller_policy(make_upshift(), SYSTEM))
+POLICY = build_controller_policy(make_upshift(), SYSTEM)
+SPACE = Space(POLICY)
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=len(SPACE.free), max_size=len(SPACE.free)))
@@ -33,14 +35,13 @@ def test_a_kept_parameter_keeps_its_start() -> None:
 
 
 def test_start_moves_onto_the_bounds() -> None:
-    one = PolicyParameter("a", "s", 0.0, 1.0, 0.5, "")
-    (moved,) = move_start((one,), {"a": 7.0})
-    assert moved.start == 1.0
+    (moved, *_) = POLICY.set_start({"fill_pressure": 7e7}).parameters
+    assert moved.start == moved.high
     with pytest.raises(InputError, match="no parameter b"):
-        move_start((one,), {"b": 0.0})
+        POLICY.set_start({"b": 0.0})
 
 
 @pytest.mark.parametrize("bounds", [(1.0, 1.0, 1.0), (0.0, 1.0, 2.0), (2.0, 1.0, 1.5)])
 def test_bounds_contain_the_start(bounds: tuple[float, float, float]) -> None:
     with pytest.raises(InputError, match="bounds"):
-        check_parameters((PolicyParameter("a", "s", *bounds, ""),))
+        replace(POLICY, parameters=(PolicyParameter("a", "s", *bounds, ""),))

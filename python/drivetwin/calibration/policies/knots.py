@@ -3,19 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.profiles import (
-    PolicyParameter,
-    Profiles,
-    check_parameters,
-    move_start,
-)
+from drivetwin.calibration.policy import Policy, PolicyParameter
+from drivetwin.calibration.profiles import Profiles
 from drivetwin.simulation.dual_clutch import Signal
 
 _ONCOMING = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75)
@@ -67,50 +62,34 @@ def _describe(after: float) -> str:
 
 
 @dataclass(frozen=True)
-class KnotPolicy:
-    """Knots of on-coming pressure, off-going pressure [Pa] and engine torque [N m].
+class KnotPolicy(Policy):
+    """Knots of on-coming pressure, off-going pressure [Pa] and engine torque [N m], in this order.
 
-    `request` [s] as in `Maneuver`.
+    The parameters are the knots of the `profiles`; see `join_profiles`.
     """
 
-    oncoming: KnotProfile
-    offgoing: KnotProfile
-    engine_torque: KnotProfile
-    request: float
-
-    def __post_init__(self) -> None:
-        check_parameters(self.parameters)
-
-    @property
-    def parameters(self) -> tuple[PolicyParameter, ...]:
-        """Knots in the order of on-coming, off-going and engine torque."""
-        return (
-            *self.oncoming.list_parameters("oncoming_pressure", "Pa", self.request),
-            *self.offgoing.list_parameters("offgoing_pressure", "Pa", self.request),
-            *self.engine_torque.list_parameters("engine_torque", "N*m", self.request),
-        )
-
-    def set_start(self, values: Mapping[str, float]) -> KnotPolicy:
-        """Return the policy with other starting values by name; see `move_start`."""
-        starts = [one.start for one in move_start(self.parameters, values)]
-        first = len(self.oncoming.times)
-        second = first + len(self.offgoing.times)
-        return KnotPolicy(
-            replace(self.oncoming, start=tuple(starts[:first])),
-            replace(self.offgoing, start=tuple(starts[first:second])),
-            replace(self.engine_torque, start=tuple(starts[second:])),
-            self.request,
-        )
+    profiles: tuple[KnotProfile, KnotProfile, KnotProfile]
 
     def build_control(self, values: FloatArray) -> Profiles:
         """Return the profiles of values (p,) in SI."""
-        first = len(self.oncoming.times)
-        second = first + len(self.offgoing.times)
-        return Profiles(
-            engine_torque=self.engine_torque.build_signal(values[second:]),
-            offgoing=self.offgoing.build_signal(values[first:second]),
-            oncoming=self.oncoming.build_signal(values[:first]),
+        ends = np.cumsum([len(one.times) for one in self.profiles])
+        oncoming, offgoing, torque = (
+            one.build_signal(knots)
+            for one, knots in zip(self.profiles, np.split(values, ends[:-1]), strict=True)
         )
+        return Profiles(torque, offgoing, oncoming)
+
+
+def join_profiles(
+    oncoming: KnotProfile, offgoing: KnotProfile, engine_torque: KnotProfile, request: float
+) -> KnotPolicy:
+    """Return the policy of three profiles; `request` [s] as in `Maneuver`."""
+    parameters = (
+        *oncoming.list_parameters("oncoming_pressure", "Pa", request),
+        *offgoing.list_parameters("offgoing_pressure", "Pa", request),
+        *engine_torque.list_parameters("engine_torque", "N*m", request),
+    )
+    return KnotPolicy(parameters, (oncoming, offgoing, engine_torque))
 
 
 def build_knot_policy(maneuver: Maneuver, start: Profiles, system_pressure: float) -> KnotPolicy:
@@ -137,7 +116,7 @@ def build_knot_policy(maneuver: Maneuver, start: Profiles, system_pressure: floa
             *bounds,
         )
 
-    return KnotPolicy(
+    return join_profiles(
         build(start.oncoming, _ONCOMING, pressures, (0.0, system_pressure)),
         build(start.offgoing, _OFFGOING, pressures, (system_pressure, 0.0)),
         build(start.engine_torque, _TORQUE, bounds, (torque, torque)),

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.logs.formats.j1939.identifier import decode_group, decode_receiver, decode_sender
+from drivetwin.logs.formats.j1939.transport import decode_group, decode_receiver, decode_sender
 
 
 @pytest.mark.parametrize(

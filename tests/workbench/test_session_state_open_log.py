@@ -12,9 +12,9 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Outcome
 from drivetwin.workbench.mapping import Entry, list_rows
-from drivetwin.workbench.open_log import MOST_LOGS
 from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.session import Session
+from drivetwin.workbench.session_state import MOST_LOGS
 from tests.workbench.conftest import CARD, LOG, finish
 
 SECOND = "second.csv"

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.fleet.mixed_model.outliers import (
+from drivetwin.fleet.mixed_model.estimate import (
     FALSE_ALARMS,
     compute_unit_limit,
     compute_unit_scores,

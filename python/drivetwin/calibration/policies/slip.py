@@ -7,14 +7,13 @@ phase follows a reference slip, so that units of the spread take the same time.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import REFERENCE, ActuatorModel
 from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.profiles import PolicyParameter, check_parameters, move_start
+from drivetwin.calibration.policy import Policy, PolicyParameter
 from drivetwin.calibration.torque_balance import (
     INERTIA_TIME,
     REDUCTION,
@@ -36,28 +35,18 @@ _LOCK_RATE = 10.0
 
 
 @dataclass(frozen=True)
-class SlipPolicy:
+class SlipPolicy(Policy):
     """Controllers by the values of its parameters; see `build_slip_policy`.
 
     `base` has what is not calibrated; `unit` are the actuators of the nominal unit.
     """
 
-    parameters: tuple[PolicyParameter, ...]
     base: ShiftController
     unit: ControlledUnit
 
-    def __post_init__(self) -> None:
-        check_parameters(self.parameters)
-
-    def set_start(self, values: Mapping[str, float]) -> SlipPolicy:
-        """Return the policy with other starting values by name; see `move_start`."""
-        return replace(self, parameters=move_start(self.parameters, values))
-
     def build_control(self, values: FloatArray) -> ClosedLoop:
         """Return the controller of values (p,) in SI."""
-        names = (one.name for one in self.parameters)
-        given = dict(zip(names, values.tolist(), strict=True))
-        return ClosedLoop(replace(self.base, **given), self.unit)
+        return ClosedLoop(replace(self.base, **self.name_values(values)), self.unit)
 
 
 def build_slip_policy(

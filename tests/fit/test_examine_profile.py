@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
+from drivetwin.fit.examine import compute_profile
 from drivetwin.fit.fit import fit_network
-from drivetwin.fit.profile import compute_profile
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.fit.unknown import Unknown
 from tests.support.fits import fit_log, make_log, make_small

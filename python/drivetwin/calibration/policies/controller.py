@@ -4,24 +4,20 @@
 Events in the order of time: the on-coming element is filled and held at its kiss pressure; in the
 torque phase its pressure rises to the hand-over value while the off-going element is released; in
 the inertia phase its pressure follows two straight lines while the engine torque is reduced; a
-final ramp locks it. Pressures are those at the clutch; `slip_policy` commands actuators.
+final ramp locks it. Pressures are those at the clutch; `slip` commands actuators.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.profiles import (
-    PolicyParameter,
-    Profiles,
-    check_parameters,
-    move_start,
-)
+from drivetwin.calibration.policy import Policy, PolicyParameter
+from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.torque_balance import (
     INERTIA_TIME,
     REDUCTION,
@@ -37,31 +33,22 @@ _SHORTEST = 1e-3
 
 
 @dataclass(frozen=True)
-class ControllerPolicy:
+class ControllerPolicy(Policy):
     """Profiles from the controller's own parameters; see `build_controller_policy`.
 
     `request` and `horizon` [s] as in `Maneuver`; `engine_torque` [N m] is the driver's demand,
     `direction` the sign of the torque intervention, `system_pressure` [Pa] that of a held element.
     """
 
-    parameters: tuple[PolicyParameter, ...]
     request: float
     horizon: float
     engine_torque: float
     direction: float
     system_pressure: float
 
-    def __post_init__(self) -> None:
-        check_parameters(self.parameters)
-
-    def set_start(self, values: Mapping[str, float]) -> ControllerPolicy:
-        """Return the policy with other starting values by name; see `move_start`."""
-        return replace(self, parameters=move_start(self.parameters, values))
-
     def build_control(self, values: FloatArray) -> Profiles:
         """Return the profiles of values (p,) in SI."""
-        names = (one.name for one in self.parameters)
-        at = dict(zip(names, values.tolist(), strict=True))
+        at = self.name_values(values)
         filled = self.request + at["fill_time"]
         handed_over = filled + at["torque_phase_time"]
         return Profiles(

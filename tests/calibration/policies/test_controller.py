@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.calibration.controller_policy import build_controller_policy
 from drivetwin.calibration.identified_range import simulate_nominal
 from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.errors import InputError
 from tests.calibration.cases import SYSTEM, build_profiles, make_downshift, make_upshift

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.fleet.readings import format_reading, format_span, get_drift_unit
-from drivetwin.fleet.rules import parse_field_value
+from drivetwin.fleet.rules import format_reading, format_span, get_drift_unit, parse_field_value
 
 
 def test_dates_are_written_as_they_were_read() -> None:

@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.extra_roles import get_extra_quantity, get_place, is_extra
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import format_mapping
-from drivetwin.channels.roles import ROLES, get_quantity
+from drivetwin.channels.roles import ROLES, get_extra_quantity, get_place, get_quantity, is_extra
 from drivetwin.channels.shiftlog import Quantity
 
 
