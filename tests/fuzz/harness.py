@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import multiprocessing
 import resource
+import signal
 import sys
 import tempfile
 import time
@@ -31,6 +32,9 @@ MOST_MEMORY = 1_000_000_000
 PATIENCE = 30.0
 """A case that has not answered after so many times LONGEST on a busy machine hangs."""
 
+_CRASHES = (-signal.SIGSEGV, -signal.SIGBUS, -signal.SIGABRT)
+"""Exit codes of a process whose library has crashed."""
+
 Prepare = Callable[[Path], Callable[[int], str]]
 """Makes, in a folder of its own, the function from a seed to the name of what happened."""
 
@@ -50,8 +54,12 @@ class Tally:
         return "\n".join(lines)
 
 
-def run(prepare: Prepare, count: int, first: int = 0) -> Tally:
-    """Run the seeds `first` to `first + count` in other processes; `prepare` must be picklable."""
+def run(prepare: Prepare, count: int, first: int = 0, *, may_crash: bool = False) -> Tally:
+    """Run the seeds `first` to `first + count` in other processes; `prepare` must be picklable.
+
+    With `may_crash` a signal that ends the process is an outcome: a library of this format crashes
+    on damaged files, which drivetwin reads in a child.
+    """
     tally = Tally()
     seed = first
     while seed < first + count:
@@ -59,11 +67,17 @@ def run(prepare: Prepare, count: int, first: int = 0) -> Tally:
         worker = multiprocessing.Process(target=_work, args=(there, prepare, seed, first + count))
         worker.start()
         there.close()
-        seed = _follow(here, worker, tally, seed)
+        seed = _follow(here, worker, tally, seed, may_crash)
     return tally
 
 
-def _follow(here: Connection, worker: multiprocessing.Process, tally: Tally, seed: int) -> int:
+def _follow(
+    here: Connection,
+    worker: multiprocessing.Process,
+    tally: Tally,
+    seed: int,
+    may_crash: bool,
+) -> int:
     """Collect outcomes until the worker ends or hangs; the seed to go on with."""
     while True:
         if not here.poll(PATIENCE * LONGEST):
@@ -74,6 +88,9 @@ def _follow(here: Connection, worker: multiprocessing.Process, tally: Tally, see
             what, seconds, fault = here.recv()
         except EOFError:
             worker.join()
+            if worker.exitcode in _CRASHES and may_crash:
+                tally.outcomes["crash of the library"] += 1
+                return seed + 1
             if worker.exitcode:
                 tally.faults.append((seed, f"the process died: {worker.exitcode}"))
                 return seed + 1

@@ -17,7 +17,7 @@ from drivetwin.errors import DrivetwinError
 from drivetwin.logs.read import read_log, read_raw
 from tests.fuzz import harness
 from tests.fuzz.mutate import mutate
-from tests.fuzz.seeds import SEEDS
+from tests.fuzz.seeds import CRASHING, SEEDS
 from tests.logs.fixtures import card
 
 
@@ -57,7 +57,10 @@ def main() -> int:
     options = parser.parse_args()
     bad = 0
     for name in options.formats or SEEDS:
-        tally = harness.run(partial(prepare, name), options.count, options.first)
+        may_crash = name in CRASHING
+        tally = harness.run(
+            partial(prepare, name), options.count, options.first, may_crash=may_crash
+        )
         bad += len(tally.faults)
         print(f"{name}: {tally}", flush=True)
     return 1 if bad else 0

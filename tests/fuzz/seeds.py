@@ -217,3 +217,6 @@ SEEDS: dict[str, Callable[[Path], bytes]] = {
     "blf": _vector(".blf"),
 }
 """By format: the bytes of a sound file, written in the folder given."""
+
+CRASHING = frozenset({"mat5"})
+"""Formats whose library crashes on some damaged files: only the guarded child reads those."""

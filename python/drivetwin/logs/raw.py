@@ -123,6 +123,22 @@ Opener = Callable[[Path, ReadOptions], AbstractContextManager[Recording]]
 
 
 @dataclass(frozen=True)
+class LogFormat:
+    """Registered format of logs.
+
+    A file has it if it starts with one of `starts`, or if `recognises` is True for its first
+    bytes. A folder is searched for files with its `endings`. With `guarded` the file is read in a
+    child process, because the library trusts damaged bytes.
+    """
+
+    opener: Opener
+    endings: tuple[str, ...]
+    starts: tuple[bytes, ...] = ()
+    recognises: Callable[[bytes], bool] = lambda _: False
+    guarded: bool = False
+
+
+@dataclass(frozen=True)
 class Joined:
     """Several recordings as one: columns of the first one first."""
 

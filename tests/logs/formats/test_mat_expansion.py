@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from drivetwin.errors import ReaderFailureError
-from drivetwin.logs.formats.mat_integrity import refuse_expansion
+from drivetwin.logs.formats.mat import refuse_expansion
 from tests.workbench.bad_files import mat_bomb
 
 LIMIT = 2**31

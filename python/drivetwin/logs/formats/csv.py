@@ -43,7 +43,7 @@ from drivetwin.logs.formats.table_scan import (
 from drivetwin.logs.formats.text_file import TextFile, open_text
 from drivetwin.logs.formats.time_text import is_time_text, parse_time_texts
 from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import RawChannel, Recording, Window
+from drivetwin.logs.raw import LogFormat, RawChannel, Recording, Window
 
 _MOST_CELLS = 4 * 10**7
 """Cells that are kept at a time: all of most logs, eleven columns of one hour at 1 kHz."""
@@ -62,6 +62,9 @@ def open_csv(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a text log; see `CsvRecording`."""
     with path.open("rb") as source:
         yield read_table(source, str(path), options.time)
+
+
+CSV_FORMAT = LogFormat(open_csv, (".csv", ".txt", ".tsv", ".dat", ".lvm", ".msl", ".vbo"))
 
 
 def read_table(source: BinaryIO, file: str, time: TimeColumn) -> Recording:

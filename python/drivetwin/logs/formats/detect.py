@@ -9,38 +9,30 @@ from pathlib import Path
 from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.can.open import is_bus_text, open_blf, open_bus_text
+from drivetwin.logs.formats.can.open import BLF_FORMAT, BUS_TEXT_FORMAT
 from drivetwin.logs.formats.can.other_tools import refuse_bus_tool
-from drivetwin.logs.formats.csv import open_csv
+from drivetwin.logs.formats.csv import CSV_FORMAT
 from drivetwin.logs.formats.guarded import open_guarded
-from drivetwin.logs.formats.mat import open_mat
-from drivetwin.logs.formats.mat_integrity import is_version4
-from drivetwin.logs.formats.mdf import open_mdf
-from drivetwin.logs.formats.parquet import open_parquet
-from drivetwin.logs.raw import Opener, Recording
+from drivetwin.logs.formats.mat import MAT_FORMAT
+from drivetwin.logs.formats.mdf import MDF_FORMAT
+from drivetwin.logs.formats.parquet import PARQUET_FORMAT
+from drivetwin.logs.raw import LogFormat, Recording
 
-SUFFIXES = frozenset(
-    (
-        *(".csv", ".txt", ".tsv", ".dat", ".lvm", ".msl", ".vbo"),
-        *(".mf4", ".mdf", ".mat", ".parquet", ".asc", ".trc", ".blf", ".log"),
-    )
+FORMATS: tuple[LogFormat, ...] = (
+    MDF_FORMAT,
+    MAT_FORMAT,
+    PARQUET_FORMAT,
+    BLF_FORMAT,
+    BUS_TEXT_FORMAT,
+    CSV_FORMAT,
 )
+"""Formats in the order in which they are tried; a file that none of them recognises is CSV."""
+
+SUFFIXES = frozenset(ending for one in FORMATS for ending in one.endings)
 """Endings by which a folder's logs are known; a file that is named by itself may have any."""
 
 _HEAD = 8192
 """Number of bytes used to detect a format."""
-
-_BY_MAGIC: dict[bytes, Opener] = {
-    b"MDF     ": open_mdf,
-    b"UnFinMF ": open_mdf,
-    b"MATLAB 5.0": open_mat,
-    b"MATLAB 7.3": open_mat,
-    b"PAR1": open_parquet,
-    b"LOGG": open_blf,
-}
-
-_GUARDED = frozenset((open_mdf, open_mat, open_parquet, open_blf))
-"""Readers of binary formats, whose libraries trust damaged bytes."""
 
 _REFUSED = {
     b"\x89HDF": "an HDF5 file without MATLAB header",
@@ -52,7 +44,7 @@ _REFUSED = {
 
 def is_binary_log(head: bytes) -> bool:
     """Return whether the first bytes of a file are those of a binary log format."""
-    return any(head.startswith(magic) for magic in _BY_MAGIC)
+    return any(head.startswith(one.starts) for one in FORMATS if one.starts)
 
 
 def open_recording(
@@ -71,15 +63,17 @@ def open_recording(
     except OSError as fault:
         what = f"cannot read the file: {fault.strerror}"
         raise FileFormatError(what, "check the path", Where(file=str(path))) from None
-    opener = _select_opener(head, path)
+    chosen = _select_format(head, path)
     options = options or ReadOptions()
-    return open_guarded(opener, path, options) if opener in _GUARDED else opener(path, options)
+    if chosen.guarded:
+        return open_guarded(chosen.opener, path, options)
+    return chosen.opener(path, options)
 
 
-def _select_opener(head: bytes, path: Path) -> Opener:
-    for magic, opener in _BY_MAGIC.items():
-        if head.startswith(magic):
-            return opener
+def _select_format(head: bytes, path: Path) -> LogFormat:
+    for one in FORMATS:
+        if one.starts and head.startswith(one.starts):
+            return one
     for magic, name in _REFUSED.items():
         if head.startswith(magic):
             raise FileFormatError(
@@ -88,9 +82,8 @@ def _select_opener(head: bytes, path: Path) -> Opener:
                 "of a bus as ASC, BLF, TRC or candump",
                 Where(file=str(path)),
             )
-    if is_version4(head):
-        return open_mat
-    if is_bus_text(head):
-        return open_bus_text
+    for one in FORMATS:
+        if one.recognises(head):
+            return one
     refuse_bus_tool(head, path)
-    return open_csv
+    return CSV_FORMAT

@@ -2,32 +2,48 @@
 """Reader of MATLAB files: v4 to v7 by SciPy, v7.3 (HDF5) by pymatreader.
 
 A channel is `x` with its time `x_t`, a vector beside one time vector, or a struct of time and data.
+
+SciPy notices most damage of a file of version 5, and the checksums of its compressed variables. A
+file on which it crashes costs the child process that reads it. Two things it does not notice: a
+small file that expands to gigabytes, and a variable of version 4 that is cut or has another head.
+A file of version 4 is variables only: five numbers (type, rows, columns, whether complex, length of
+the name), name and data.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.errors import FileFormatError, MissingChannelError, Where
-from drivetwin.logs.formats.mat_integrity import check_blocks, refuse_expansion
+from drivetwin.errors import FileFormatError, MissingChannelError, ReaderFailureError, Where
 from drivetwin.logs.formats.mat_signals import Signals, find_signals
 from drivetwin.logs.formats.parser_limits import compute_parser_limits
 from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import RawLog, Recording
+from drivetwin.logs.raw import LogFormat, RawLog, Recording
 
 _KIND = "a MATLAB file"
 _PLAIN = (
     "export plain arrays: <name>, <name>_t with its time in s, and <name>_unit; timetables and "
     "Simulink data sets are closed objects"
 )
+
+_HEADER = 128
+"""Bytes of the header of version 5; elements follow, each with a tag of type and length."""
+_COMPRESSED = 15
+_HEAD4 = 20
+_BYTES4 = (8, 4, 4, 2, 2, 1)
+"""Bytes of a number by its kind in version 4: double, single, four kinds of integers."""
+_LONGEST4 = 256
+"""Letters that the name of a variable of version 4 has at most, with the zero at its end."""
 
 
 @contextmanager
@@ -65,7 +81,7 @@ def _read_tree(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
     refuse_expansion(path, compute_parser_limits(path).memory)
-    check_blocks(path)
+    _check_version4(path)
     content = loadmat(path, struct_as_record=False, squeeze_me=True, appendmat=False)
     return {name: _to_plain(v) for name, v in content.items() if not name.startswith("__")}
 
@@ -100,4 +116,87 @@ def _split_struct_array(value: Any) -> Any:
     return value
 
 
-__all__: Sequence[str] = ("open_mat",)
+def refuse_expansion(path: Path, limit: int) -> None:
+    """Raise ReaderFailureError if a file of version 5 declares variables above `limit` [bytes].
+
+    Otherwise the reader would expand a file of a few megabytes for half a minute before it fails.
+    """
+    total = 0
+    with path.open("rb") as file:
+        head = file.read(_HEADER)
+        if not head.startswith(b"MATLAB 5.0"):
+            return
+        for kind, size in _iterate_elements(file, "<" if head.endswith(b"IM") else ">"):
+            start = file.tell()
+            total += _read_declared_size(file.read(256), head) if kind == _COMPRESSED else size
+            file.seek(start + size)
+    if total > limit:
+        raise ReaderFailureError(
+            f"the file says that it expands to {total / 1e9:.1f} GB, at most {limit / 1e9:.1f} GB "
+            "are read",
+            "hand in a shorter log, or only the channels that are needed",
+            Where(file=str(path)),
+        )
+
+
+def _read_declared_size(packed: bytes, head: bytes) -> int:
+    """Read the declared size [bytes] of a compressed variable; 0 if its header cannot be read."""
+    try:
+        tag = zlib.decompressobj().decompress(packed, 8)
+    except zlib.error:
+        return 0
+    order = "<" if head.endswith(b"IM") else ">"
+    return int(struct.unpack(f"{order}II", tag)[1]) if len(tag) == 8 else 0
+
+
+def _iterate_elements(file: BinaryIO, order: str) -> Iterator[tuple[int, int]]:
+    """Type and length of each element; the caller leaves the file where the next one starts."""
+    while len(tag := file.read(8)) == 8:
+        kind, length = struct.unpack(f"{order}II", tag)
+        yield kind, length
+
+
+def is_version4(head: bytes) -> bool:
+    """Return True if a file that starts with `head` is one of version 4, which has no mark."""
+    variable = _measure_variable4(head[:_HEAD4])
+    return variable is not None and head[_HEAD4:][: variable[0]].find(b"\0") == variable[0] - 1
+
+
+def _measure_variable4(head: bytes) -> tuple[int, int] | None:
+    """Bytes of name and data of a variable of version 4; None where its head is none."""
+    if len(head) < _HEAD4:
+        return None
+    order = "<" if head[1:4] == bytes(3) else ">"  # the type is a small number
+    kind, rows, columns, imaginary, name = struct.unpack(f"{order}5i", head)
+    thousands, number, text = kind // 1000, kind // 10 % 10, kind % 10
+    if thousands != (order == ">") or kind // 100 % 10 or number >= len(_BYTES4) or text > 2:
+        return None
+    if min(rows, columns) < 0 or imaginary not in (0, 1) or not 1 < name <= _LONGEST4:
+        return None
+    return name, rows * columns * _BYTES4[number] * (1 + imaginary)
+
+
+def _check_version4(path: Path) -> None:
+    """Raise FileFormatError where a variable of a file of version 4 is cut or has no sound head."""
+    size = path.stat().st_size
+    place, number = 0, 0
+    with path.open("rb") as file:
+        if not is_version4(file.read(_HEADER)):
+            return
+        while place < size:
+            file.seek(place)
+            number += 1
+            variable = _measure_variable4(file.read(_HEAD4))
+            place += size if variable is None else _HEAD4 + sum(variable)
+            if place > size:
+                what = f"variable {number} {'is cut' if variable else 'has no sound head'}"
+                raise FileFormatError(
+                    f"not readable as a MATLAB file: {what}",
+                    "the file is damaged or was not copied whole: export it again",
+                    Where(file=str(path)),
+                )
+
+
+MAT_FORMAT = LogFormat(
+    open_mat, (".mat",), (b"MATLAB 5.0", b"MATLAB 7.3"), recognises=is_version4, guarded=True
+)

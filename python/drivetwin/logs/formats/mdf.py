@@ -29,7 +29,7 @@ from drivetwin.logs.formats.cell_text import parse_numbers, select_numbers
 from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.formats.mdf_integrity import check_blocks
 from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import Joined, RawChannel, Recording, Window
+from drivetwin.logs.raw import Joined, LogFormat, RawChannel, Recording, Window
 
 _KIND = "an MDF file"
 _FRAGMENT = 1 << 23
@@ -88,6 +88,9 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
             yield _merge_bus_frames(signals, frames, options, path)
         finally:
             mdf.close()
+
+
+MDF_FORMAT = LogFormat(open_mdf, (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), guarded=True)
 
 
 def _merge_bus_frames(

@@ -19,7 +19,7 @@ from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where
 from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import RawChannel, Recording, Window
+from drivetwin.logs.raw import LogFormat, RawChannel, Recording, Window
 
 _KIND = "a Parquet file"
 _UNIT_KEYS = ("unit", "units", "Unit")
@@ -48,6 +48,9 @@ def open_parquet(path: Path, options: ReadOptions) -> Iterator[Recording]:
         yield recording
     finally:
         table.close()
+
+
+PARQUET_FORMAT = LogFormat(open_parquet, (".parquet",), (b"PAR1",), guarded=True)
 
 
 class ParquetRecording:

@@ -19,7 +19,7 @@ from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.trc import is_trc, read_trc
 from drivetwin.logs.formats.frames import Frames, Message
 from drivetwin.logs.formats.j1939.matching import match_groups
-from drivetwin.logs.raw import Recording
+from drivetwin.logs.raw import LogFormat, Recording
 
 _HEAD = 8192
 """Number of bytes used to detect a format."""
@@ -53,6 +53,10 @@ def open_bus_text(path: Path, options: ReadOptions) -> Iterator[Recording]:
 def open_blf(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a BLF log; raises FileFormatError, MissingExtraError, MissingChannelError."""
     yield decode_recording(read_blf(path), options, path)
+
+
+BLF_FORMAT = LogFormat(open_blf, (".blf",), (b"LOGG",), guarded=True)
+BUS_TEXT_FORMAT = LogFormat(open_bus_text, (".asc", ".trc", ".log"), recognises=is_bus_text)
 
 
 def decode_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:

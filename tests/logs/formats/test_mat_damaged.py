@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Damaged MATLAB files are refused before SciPy reads them; sound ones of all classes pass."""
+"""Damaged MATLAB files are typed errors; sound ones of all classes are read."""
 
 from __future__ import annotations
 
+import contextlib
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,10 +14,13 @@ from scipy.io import savemat
 from scipy.sparse import csc_array
 
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.mat_integrity import check_blocks, is_version4
+from drivetwin.logs.formats import guarded
+from drivetwin.logs.formats.mat import is_version4
+from drivetwin.logs.read import read_raw
 
 CONTENT = {
     "x": np.arange(40.0),
+    "x_t": np.arange(40.0),
     "small": np.int8(3),
     "z": np.array([1.0 + 2.0j, 3.0]),
     "text": "rpm",
@@ -39,7 +43,8 @@ def written(compressed: bool) -> bytes:
 def check(folder: Path, data: bytes) -> None:
     path = folder / "log.mat"
     path.write_bytes(data)
-    check_blocks(path)
+    (channel,) = read_raw(path).channels
+    np.testing.assert_array_equal(channel.values, CONTENT["x"])
 
 
 @pytest.mark.parametrize("compressed", [True, False])
@@ -53,26 +58,28 @@ def test_every_flipped_bit_of_a_compressed_variable_is_noticed(tmp_path: Path) -
     for place in range(136, 136 + first, 7):
         damaged = bytearray(whole)
         damaged[place] ^= 4
-        with pytest.raises(FileFormatError, match="checksum"):
+        with pytest.raises(FileFormatError, match="cut or damaged"):
             check(tmp_path, bytes(damaged))
 
 
 @pytest.mark.parametrize(
-    ("place", "value", "says"),
+    ("place", "value"),
     [
-        (128, 77, "unknown type 77"),
-        (132, 255, "cut|parts"),
-        (136, 77, "parts of no known type"),
-        (145, 255, "parts of no known type"),  # says complex, has no imaginary part
-        (152, 200, "parts of no known type"),
+        (128, 77),  # unknown type
+        (132, 255),  # longer than it is
+        (136, 77),
+        (145, 255),  # complex, but there is no imaginary part
+        (152, 200),
     ],
 )
-def test_damaged_structure_is_named(tmp_path: Path, place: int, value: int, says: str) -> None:
+def test_damaged_structure_changes_nothing_or_is_a_typed_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: int, value: int
+) -> None:
+    monkeypatch.setattr(guarded, "_guards_parsers", True)
     damaged = bytearray(written(compressed=False))
     damaged[place] = value
-    with pytest.raises(FileFormatError, match=says) as caught:
+    with contextlib.suppress(FileFormatError):
         check(tmp_path, bytes(damaged))
-    assert "export it again" in caught.value.remedy
 
 
 @pytest.mark.parametrize("compressed", [True, False])
@@ -86,7 +93,8 @@ def test_cut_files_are_refused(tmp_path: Path, compressed: bool) -> None:
 
 def written4(folder: Path) -> bytes:
     path = folder / "whole4.mat"
-    savemat(path, {"x": np.arange(40.0), "text": "rpm", "z": CONTENT["z"]}, format="4")
+    content = {name: CONTENT[name] for name in ("x", "x_t", "text", "z")}
+    savemat(path, content, format="4")
     return path.read_bytes()
 
 
@@ -107,5 +115,5 @@ def test_cut_and_damaged_files_of_version_4_are_refused(tmp_path: Path) -> None:
     for place in (0, 1, 12, 16):  # type, rest of the type, complex, length of the name
         damaged = bytearray(whole)
         damaged[first + place] = 77
-        with pytest.raises(FileFormatError, match="variable 2"):
+        with pytest.raises(FileFormatError, match=r"variable [23]"):
             check(tmp_path, bytes(damaged))
