@@ -6,6 +6,8 @@ from __future__ import annotations
 import struct
 import warnings
 from collections.abc import Callable
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
@@ -217,6 +219,21 @@ SEEDS: dict[str, Callable[[Path], bytes]] = {
     "blf": _vector(".blf"),
 }
 """By format: the bytes of a sound file, written in the folder given."""
+
+_READER_TESTS = Path(__file__).parents[1] / "logs/formats"
+
+
+def _read_seed(module: str, folder: Path) -> bytes:
+    content: bytes = import_module(module).make_seed(folder)
+    return content
+
+
+SEEDS |= {
+    file.stem.removeprefix("test_"): partial(_read_seed, f"tests.logs.formats.{file.stem}")
+    for file in sorted(_READER_TESTS.glob("test_*.py"))
+    if "\ndef make_seed(" in file.read_text(encoding="utf-8")
+}
+"""A test of a reader may bring the sound file of its format."""
 
 CRASHING = frozenset({"mat5"})
 """Formats whose library crashes on some damaged files: only the guarded child reads those."""

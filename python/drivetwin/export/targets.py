@@ -7,6 +7,7 @@ The command line imports them before anything numerical.
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Self
 
 
 class Names(StrEnum):
@@ -49,19 +50,28 @@ class InputKind(StrEnum):
 
 
 class Target(StrEnum):
-    """A form of the twin for other programs."""
+    """A form of the twin for other programs: its name, and a label and a text for people.
 
-    C = "c"
-    FMU = "fmu"
-    MODELICA = "modelica"
-    SSV = "ssv"
-    CDFX = "cdfx"
-    DCM = "dcm"
-    M = "m"
-    JSON = "json"
-    CSV = "csv"
+    `ending` is that of its files, by default the name.
+    """
 
-    @property
-    def ending(self) -> str:
-        """Ending of its files."""
-        return "mo" if self is Target.MODELICA else self.value
+    label: str
+    text: str
+    ending: str
+
+    C = "c", "C sources", "C99 model of the shift for a controller, as an archive"
+    FMU = "fmu", "FMU", "co-simulation, FMI 2.0, sources inside"
+    MODELICA = "modelica", "Modelica", "the shift in components of the Standard Library", "mo"
+    SSV = "ssv", "SSV", "parameter values for SSP and FMUs"
+    CDFX = "cdfx", "CDFX", "calibration data, ASAM CDF"
+    DCM = "dcm", "DCM", "calibration data, ETAS DAMOS"
+    M = "m", "MATLAB", "script with all parameters"
+    JSON = "json", "JSON", "parameters with units and intervals"
+    CSV = "csv", "CSV", "parameters as a table"
+
+    def __new__(cls, value: str, label: str = "", text: str = "", ending: str = "") -> Self:
+        """Make a member of its name on the command line and the words for it."""
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.label, member.text, member.ending = label, text, ending or value
+        return member

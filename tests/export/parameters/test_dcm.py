@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 
 from drivetwin.errors import FileFormatError, InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.dcm import format_dcm, parse_dcm
+from drivetwin.export.parameters.dcm import CODEC
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.targets import Names
 from tests.export.parameters.sample import SETS, twin
@@ -94,14 +94,14 @@ _LINES = re.compile(
 
 
 def test_the_text_is_that_of_the_example() -> None:
-    assert format_dcm(CONTENT) == EXPECTED
+    assert CODEC.text(CONTENT) == EXPECTED
 
 
 @given(SETS)
 @settings(max_examples=25)
 def test_every_line_follows_the_grammar(content: ParameterSet) -> None:
     try:
-        text = format_dcm(content)
+        text = CODEC.text(content)
     except InputError:
         assume(False)
     assert text.isascii()
@@ -110,7 +110,7 @@ def test_every_line_follows_the_grammar(content: ParameterSet) -> None:
 
 
 def test_what_a_tool_writes_is_read_and_other_objects_are_named() -> None:
-    found = parse_dcm(FROM_A_TOOL, "transmission.dcm")
+    found = CODEC.parse(FROM_A_TOOL, "transmission.dcm")
     assert found.name == "Transmission"
     assert found.scalars == (Scalar("K_P0", 0.82, "bar", "fill pressure"),)
     axis = Axis("x", (0.0, 10.0, 20.0), "1/min")
@@ -120,19 +120,19 @@ def test_what_a_tool_writes_is_read_and_other_objects_are_named() -> None:
 
 def test_tabs_separate_as_blanks_do() -> None:
     tabbed = re.sub(r"(?m)^ *(\S+) +", r"\t\1\t", FROM_A_TOOL)
-    assert parse_dcm(tabbed, "transmission.dcm") == parse_dcm(FROM_A_TOOL, "transmission.dcm")
+    assert CODEC.parse(tabbed, "transmission.dcm") == CODEC.parse(FROM_A_TOOL, "transmission.dcm")
 
 
 def test_an_object_without_end_is_refused_by_name() -> None:
     with pytest.raises(FileFormatError, match="K_P0"):
-        parse_dcm(FROM_A_TOOL.replace("WERT  0.82\nEND", "WERT  0.82"), "cut.dcm")
+        CODEC.parse(FROM_A_TOOL.replace("WERT  0.82\nEND", "WERT  0.82"), "cut.dcm")
 
 
 @pytest.mark.parametrize("names", Names)
 def test_another_reader_finds_the_same_in_the_dcm(names: Names, tmp_path: Path) -> None:
     content = collect_parameters(twin(), names)
     path = tmp_path / "twin.dcm"
-    path.write_text(format_dcm(content), "ascii")
+    path.write_text(CODEC.text(content), "ascii")
     reader = DcmReader()
     reader.read(str(path))
     numbers = {one.name: (one.value, one.unit) for one in reader.get_parameters()}

@@ -7,7 +7,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.matlab import format_m, parse_m
+from drivetwin.export.parameters.matlab import CODEC
 
 CONTENT = ParameterSet(
     "truck",
@@ -28,12 +28,12 @@ mu_B3 = [0.13 1.0e-22]; % [1] friction (mu.B3)
 
 
 def test_the_text_is_that_of_the_example() -> None:
-    assert format_m(CONTENT) == EXPECTED
+    assert CODEC.text(CONTENT) == EXPECTED
 
 
 def test_lines_by_hand_are_read_and_the_rest_is_named() -> None:
     text = "clear all\nk_o=1.8e5;\nv = [1, 2,3]; % [m] no axis\n% remark\n\n"
-    found = parse_m(text, "by_hand.m")
+    found = CODEC.parse(text, "by_hand.m")
     assert found.scalars == (Scalar("k_o", 1.8e5),)
     assert found.skipped == ("clear all", "v")
 
@@ -42,4 +42,4 @@ def test_a_name_too_long_for_its_breakpoints_is_refused() -> None:
     """Cut to 63 characters the breakpoints would have the name of the curve and be overwritten."""
     curve = Curve("mu." + 60 * "x", Axis("slip", (0.0, 20.0)), (0.13, 0.12))
     with pytest.raises(InputError, match="both written as"):
-        format_m(ParameterSet("t", (), (curve,)))
+        CODEC.text(ParameterSet("t", (), (curve,)))

@@ -21,7 +21,7 @@ class PolicyKind(StrEnum):
     KNOTS = "knots", "knots of the profiles"
     SLIP = "slip", "commands with a closed slip loop behind the actuators", True
 
-    def __new__(cls, value: str, text: str, commands_actuators: bool = False) -> Self:
+    def __new__(cls, value: str, text: str = "", commands_actuators: bool = False) -> Self:
         """Make a member of its name on the command line and the words for it."""
         member = str.__new__(cls, value)
         member._value_ = value

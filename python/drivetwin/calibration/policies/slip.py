@@ -8,6 +8,7 @@ phase follows a reference slip, so that units of the spread take the same time.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import REFERENCE, ActuatorModel
@@ -46,7 +47,8 @@ class SlipPolicy(Policy):
 
     def build_control(self, values: FloatArray) -> ClosedLoop:
         """Return the controller of values (p,) in SI."""
-        return ClosedLoop(replace(self.base, **self.name_values(values)), self.unit)
+        given: dict[str, Any] = dict(self.name_values(values))
+        return ClosedLoop(replace(self.base, **given), self.unit)
 
 
 def build_slip_policy(

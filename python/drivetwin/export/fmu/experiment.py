@@ -17,8 +17,8 @@ import numpy as np
 from drivetwin._util.csv_text import format_csv_row
 from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.variables import Role, Variable, list_variables
+from drivetwin.export.parameters import ssv
 from drivetwin.export.parameters.content import ParameterSet, Scalar
-from drivetwin.export.parameters.ssv import format_ssv
 from drivetwin.export.parameters.xml_text import format_document
 from drivetwin.export.subject import Subject
 from drivetwin.export.targets import FmiVersion, InputKind
@@ -58,7 +58,7 @@ def build_reference_files(
     subject: Subject, experiment: Experiment | None, version: FmiVersion
 ) -> dict[str, bytes]:
     """Files of the archive by path; without an experiment only the parameter set."""
-    files = {"resources/parameters.ssv": format_ssv(_format_parameters(subject)).encode()}
+    files = {"resources/parameters.ssv": ssv.CODEC.text(_format_parameters(subject)).encode()}
     related = [(_PARAMETERS, "application/x-ssp-parameter-set", "parameter")]
     if experiment is not None:
         files |= _build_experiment_files(subject, experiment, version)

@@ -12,12 +12,12 @@ from pathlib import Path
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
     Axis,
+    Codec,
     Curve,
     ParameterSet,
     Scalar,
     build_curve,
     format_number,
-    make_legal,
     parse_finite,
 )
 from drivetwin.export.parameters.spelling import (
@@ -42,14 +42,7 @@ _DOCTYPE = (
 )
 
 
-def convert_for_cdfx(parameters: ParameterSet) -> ParameterSet:
-    """The set as the format can hold it."""
-    return make_legal(parameters, to_dotted_name, to_one_line)
-
-
-def format_cdfx(parameters: ParameterSet) -> str:
-    """Contents of the file."""
-    content = convert_for_cdfx(parameters)
+def _write_cdfx(content: ParameterSet) -> str:
     root = ET.Element("MSRSW", CREATOR="drivetwin")
     add_child(root, "SHORT-NAME", to_dotted_name(content.name))
     add_child(root, "CATEGORY", "CDF20")
@@ -87,7 +80,7 @@ def _add_values(parent: ET.Element, unit: str, values: tuple[float, ...]) -> Non
         add_child(listed, "V", format_number(value))
 
 
-def parse_cdfx(text: str, source: str) -> ParameterSet:
+def _parse_cdfx(text: str, source: str) -> ParameterSet:
     """Read instances of the categories VALUE and CURVE; others are named as skipped.
 
     Raises FileFormatError where the file is no CDF 2.0 or an instance is damaged.
@@ -139,3 +132,6 @@ def _parse_curve(name: str, at: tuple[ET.Element, ET.Element, ET.Element], sourc
         (parse_tool_unit(get_text(holder, "SW-VALUE-CONT/UNIT-DISPLAY-NAME")), description),
         source,
     )
+
+
+CODEC = Codec(_write_cdfx, _parse_cdfx, to_dotted_name, to_one_line)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Format-independent contents of a parameter file: named numbers and curves with units.
 
-A format writes a `ParameterSet` and reads it back unchanged, after `legal` has respelled the names
+A `Codec` writes a `ParameterSet` and reads it back unchanged, after `legal` has respelled the names
 and texts that the format does not allow.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from drivetwin.errors import FileFormatError, InputError, Where
 
@@ -71,52 +72,63 @@ class ParameterSet:
         return (*self.scalars, *self.curves)
 
 
-def make_legal(
-    parameters: ParameterSet,
-    spell: Callable[[str], str],
-    line: Callable[[str], str] = lambda text: text,
-    axis_name: Callable[[Curve], str] | None = None,
-) -> ParameterSet:
-    """Return the set with names put through `spell` and texts through `line`.
+E = TypeVar("E", Scalar, Curve)
 
-    `axis_name` is the name under which a format writes the axis of a respelled curve, where it
-    does so beside the curve. A name that changes is kept in the text. Raises InputError where two
-    names become one.
+
+@dataclass(frozen=True)
+class Codec:
+    """A format as functions: contents of a file, their inverse, and what the format can hold.
+
+    `write` takes a set whose names are put through `spell` and whose texts through `line`. `parse`
+    takes the text and the name of its file and raises FileFormatError. `axis_name` is the name
+    under which a format writes the axis of a respelled curve, where it does so beside the curve.
     """
 
-    def respelled(entry: Scalar | Curve) -> str:
-        kept = "" if spell(entry.name) == entry.name else f" ({entry.name})"
-        return line(entry.text + kept).strip()
+    write: Callable[[ParameterSet], str]
+    parse: Callable[[str, str], ParameterSet]
+    spell: Callable[[str], str]
+    line: Callable[[str], str]
+    axis_name: Callable[[Curve], str] | None = None
 
-    changed = ParameterSet(
-        name=line(parameters.name) or "parameters",
-        scalars=tuple(
-            replace(one, name=spell(one.name), text=respelled(one), unit=line(one.unit))
-            for one in parameters.scalars
-        ),
-        curves=tuple(
-            replace(
-                one,
-                name=spell(one.name),
-                text=respelled(one),
-                unit=line(one.unit),
-                axis=replace(
-                    one.axis,
-                    name=spell(one.axis.name).replace(".", "_"),
-                    unit=line(one.axis.unit),
-                ),
-            )
-            for one in parameters.curves
-        ),
-        notes=tuple(line(note) for note in parameters.notes),
-    )
-    written = zip((repr(one.name) for one in parameters.entries), changed.entries, strict=True)
-    names = [(origin, one.name) for origin, one in written]
-    if axis_name is not None:
-        curves = zip(parameters.curves, changed.curves, strict=True)
-        names += [(f"the axis of {old.name!r}", axis_name(new)) for old, new in curves]
-    _refuse_twins(names)
-    return changed
+    def text(self, parameters: ParameterSet) -> str:
+        """Return the contents of a file. Raises InputError where two names become one."""
+        return self.write(self.legal(parameters))
+
+    def legal(self, parameters: ParameterSet) -> ParameterSet:
+        """Return the set with names and texts respelled, which is what reading gives back.
+
+        A name that changes is kept in the text. Raises InputError where two names become one.
+        """
+        changed = ParameterSet(
+            name=self.line(parameters.name) or "parameters",
+            scalars=tuple(self._respell(one) for one in parameters.scalars),
+            curves=tuple(
+                replace(
+                    self._respell(one),
+                    axis=replace(
+                        one.axis,
+                        name=self.spell(one.axis.name).replace(".", "_"),
+                        unit=self.line(one.axis.unit),
+                    ),
+                )
+                for one in parameters.curves
+            ),
+            notes=tuple(self.line(note) for note in parameters.notes),
+        )
+        written = zip((repr(one.name) for one in parameters.entries), changed.entries, strict=True)
+        names = [(origin, one.name) for origin, one in written]
+        if self.axis_name is not None:
+            curves = zip(parameters.curves, changed.curves, strict=True)
+            names += [(f"the axis of {old.name!r}", self.axis_name(new)) for old, new in curves]
+        _refuse_twins(names)
+        return changed
+
+    def _respell(self, entry: E) -> E:
+        """Return an entry under its legal name; its text has the old name where that changes."""
+        name = self.spell(entry.name)
+        kept = "" if name == entry.name else f" ({entry.name})"
+        text = self.line(entry.text + kept).strip()
+        return replace(entry, name=name, text=text, unit=self.line(entry.unit))
 
 
 def _refuse_twins(names: Iterable[tuple[str, str]]) -> None:

@@ -14,12 +14,12 @@ from drivetwin._util.csv_text import NumberText, format_csv_row, parse_csv_row, 
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
     Axis,
+    Codec,
     Curve,
     ParameterSet,
     Scalar,
     build_curve,
     format_number,
-    make_legal,
     parse_finite,
 )
 from drivetwin.export.parameters.spelling import to_free_name, to_one_line
@@ -30,14 +30,7 @@ _TITLE = "# Parameters of "
 _Row = dict[str, str]
 
 
-def convert_for_csv(parameters: ParameterSet) -> ParameterSet:
-    """The set as the format can hold it."""
-    return make_legal(parameters, to_free_name, to_one_line)
-
-
-def format_csv(parameters: ParameterSet) -> str:
-    """Contents of the file."""
-    content = convert_for_csv(parameters)
+def _write_csv(content: ParameterSet) -> str:
     heads = (f"{_TITLE}{content.name}", *(f"# {note}" for note in content.notes))
     rows: list[tuple[object, ...]] = [*((head,) for head in heads), _COLUMNS]
     for one in content.scalars:
@@ -50,7 +43,7 @@ def format_csv(parameters: ParameterSet) -> str:
     return "".join(map(format_csv_row, rows))
 
 
-def parse_csv(text: str, source: str) -> ParameterSet:
+def _parse_csv(text: str, source: str) -> ParameterSet:
     """Read the file. Raises FileFormatError where columns are missing or a row is damaged."""
     lines = text.splitlines()
     head = list(takewhile(lambda line: line.startswith(("#", '"#')), lines))
@@ -112,3 +105,6 @@ def _parse_curve(name: str, rows: list[_Row], source: str) -> Curve:
         (first["unit"], first["text"]),
         source,
     )
+
+
+CODEC = Codec(_write_csv, _parse_csv, to_free_name, to_one_line)

@@ -15,12 +15,12 @@ from pathlib import Path
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
     Axis,
+    Codec,
     Curve,
     ParameterSet,
     Scalar,
     build_curve,
     format_number,
-    make_legal,
     parse_finite,
 )
 from drivetwin.export.parameters.spelling import (
@@ -42,14 +42,7 @@ _COMMENTS = ("*", "!", ".")
 _Fields = dict[str, list[str]]
 
 
-def convert_for_dcm(parameters: ParameterSet) -> ParameterSet:
-    """The set as the format can hold it."""
-    return make_legal(parameters, to_dotted_name, to_ascii_line)
-
-
-def format_dcm(parameters: ParameterSet) -> str:
-    """Contents of the file."""
-    content = convert_for_dcm(parameters)
+def _write_dcm(content: ParameterSet) -> str:
     function = to_dotted_name(content.name)
     lines = [f"* {note}" for note in content.notes]
     lines += ["", f"{_FORMAT} 2.0", "", "FUNKTIONEN"]
@@ -86,7 +79,7 @@ def _format_list(keyword: str, values: tuple[float, ...]) -> Iterator[str]:
         )
 
 
-def parse_dcm(text: str, source: str) -> ParameterSet:
+def _parse_dcm(text: str, source: str) -> ParameterSet:
     """Read fixed values and characteristic curves; other objects are named as skipped.
 
     Raises FileFormatError where the file is no DCM or an object is damaged.
@@ -166,3 +159,6 @@ def _parse_curve(label: str, fields: _Fields, source: str) -> Curve:
     )
     labels = (parse_tool_unit(_parse_string(fields, "EINHEIT_W")), text)
     return build_curve(label, axis, _parse_numbers(fields, "WERT", label, source), labels, source)
+
+
+CODEC = Codec(_write_dcm, _parse_dcm, to_dotted_name, to_ascii_line)

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
@@ -12,13 +10,8 @@ from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.errors import FileFormatError, InputError, Where
-from drivetwin.export.parameters.cdfx import convert_for_cdfx, format_cdfx, parse_cdfx
+from drivetwin.export.parameters import cdfx, csv_file, dcm, json_file, matlab, ssv
 from drivetwin.export.parameters.content import ParameterSet
-from drivetwin.export.parameters.csv_file import convert_for_csv, format_csv, parse_csv
-from drivetwin.export.parameters.dcm import convert_for_dcm, format_dcm, parse_dcm
-from drivetwin.export.parameters.json_file import convert_for_json, format_json, parse_json
-from drivetwin.export.parameters.matlab import convert_for_m, format_m, parse_m
-from drivetwin.export.parameters.ssv import convert_for_ssv, format_ssv, parse_ssv
 
 
 class ParameterFormat(StrEnum):
@@ -32,26 +25,13 @@ class ParameterFormat(StrEnum):
     CSV = "csv"
 
 
-@dataclass(frozen=True)
-class Codec:
-    """A format as functions: contents of a file, their inverse, and what the format can hold.
-
-    `parse` takes the text and the name of its file and raises FileFormatError; `legal` returns the
-    set with names and texts respelled, which is what reading gives back.
-    """
-
-    text: Callable[[ParameterSet], str]
-    parse: Callable[[str, str], ParameterSet]
-    legal: Callable[[ParameterSet], ParameterSet]
-
-
 CODECS = {
-    ParameterFormat.SSV: Codec(format_ssv, parse_ssv, convert_for_ssv),
-    ParameterFormat.CDFX: Codec(format_cdfx, parse_cdfx, convert_for_cdfx),
-    ParameterFormat.DCM: Codec(format_dcm, parse_dcm, convert_for_dcm),
-    ParameterFormat.M: Codec(format_m, parse_m, convert_for_m),
-    ParameterFormat.JSON: Codec(format_json, parse_json, convert_for_json),
-    ParameterFormat.CSV: Codec(format_csv, parse_csv, convert_for_csv),
+    ParameterFormat.SSV: ssv.CODEC,
+    ParameterFormat.CDFX: cdfx.CODEC,
+    ParameterFormat.DCM: dcm.CODEC,
+    ParameterFormat.M: matlab.CODEC,
+    ParameterFormat.JSON: json_file.CODEC,
+    ParameterFormat.CSV: csv_file.CODEC,
 }
 
 

@@ -10,7 +10,7 @@ from pydantic import Field, FiniteFloat, ValidationError
 
 from drivetwin._util.toml import StrictModel
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.export.parameters.content import Axis, ParameterSet, Scalar, build_curve, make_legal
+from drivetwin.export.parameters.content import Axis, Codec, ParameterSet, Scalar, build_curve
 from drivetwin.export.parameters.spelling import to_free_name, to_one_line
 
 SCHEMA = "drivetwin/parameters-1"
@@ -47,23 +47,17 @@ class ParameterFile(StrictModel):
     notes: list[str] = Field(default_factory=list)
 
 
-def convert_for_json(parameters: ParameterSet) -> ParameterSet:
-    """The set as the format can hold it."""
-    return make_legal(parameters, to_free_name, to_one_line)
-
-
-def format_json(parameters: ParameterSet) -> str:
-    """Contents of the file."""
-    fields = asdict(convert_for_json(parameters))
+def _write_json(content: ParameterSet) -> str:
+    fields = asdict(content)
     fields.pop("skipped")
     text = json.dumps({"schema": SCHEMA, **fields}, ensure_ascii=False, allow_nan=False, indent=2)
     return text + "\n"
 
 
-def parse_json(text: str, source: str) -> ParameterSet:
+def _parse_json(text: str, source: str) -> ParameterSet:
     """Read the file. Raises FileFormatError where it is damaged or of another schema."""
     try:
-        content = ParameterFile.model_validate_json(text)
+        file = ParameterFile.model_validate_json(text)
     except ValidationError as fault:
         raise FileFormatError(
             f"no parameters in the schema {SCHEMA}: {fault}",
@@ -78,7 +72,10 @@ def parse_json(text: str, source: str) -> ParameterSet:
             (one.unit, one.text),
             source,
         )
-        for one in content.curves
+        for one in file.curves
     )
-    scalars = (Scalar(**one.model_dump()) for one in content.scalars)
-    return ParameterSet(content.name, tuple(scalars), tuple(curves), notes=tuple(content.notes))
+    scalars = (Scalar(**one.model_dump()) for one in file.scalars)
+    return ParameterSet(file.name, tuple(scalars), tuple(curves), notes=tuple(file.notes))
+
+
+CODEC = Codec(_write_json, _parse_json, to_free_name, to_one_line)

@@ -12,12 +12,12 @@ from pathlib import Path
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
     Axis,
+    Codec,
     Curve,
     ParameterSet,
     Scalar,
     build_curve,
     format_number,
-    make_legal,
     parse_finite,
 )
 from drivetwin.export.parameters.spelling import to_ascii_line, to_flat_name
@@ -27,18 +27,11 @@ _LINE = re.compile(r"(\w+)\s*=\s*([^;%]+);\s*(?:%\s*\[([^\]]*)\]\s*(.*))?")
 _BREAKPOINTS = re.compile(r"breakpoints (\w+) of (\w+)")
 
 
-def convert_for_m(parameters: ParameterSet) -> ParameterSet:
-    """The set as the format can hold it."""
-    return make_legal(parameters, to_flat_name, to_ascii_line, _make_breakpoints_name)
-
-
 def _make_breakpoints_name(curve: Curve) -> str:
     return to_flat_name(f"{curve.name}_{curve.axis.name}")
 
 
-def format_m(parameters: ParameterSet) -> str:
-    """Contents of the file."""
-    content = convert_for_m(parameters)
+def _write_m(content: ParameterSet) -> str:
     lines = [f"{_TITLE}{content.name}", *(f"% {note}" for note in content.notes), ""]
     for scalar in content.scalars:
         lines.append(
@@ -65,7 +58,7 @@ def _format_row(values: tuple[float, ...]) -> str:
     return "[" + " ".join(format_number(value) for value in values) + "]"
 
 
-def parse_m(text: str, source: str) -> ParameterSet:
+def _parse_m(text: str, source: str) -> ParameterSet:
     """Read assignments of numbers and row vectors; other lines are named as skipped.
 
     Raises FileFormatError where nothing is assigned or a curve is damaged.
@@ -106,3 +99,6 @@ def parse_m(text: str, source: str) -> ParameterSet:
 
 def _split_words(row: str) -> list[str]:
     return row.strip("[]").replace(",", " ").split()
+
+
+CODEC = Codec(_write_m, _parse_m, to_flat_name, to_ascii_line, _make_breakpoints_name)

@@ -14,12 +14,12 @@ from pathlib import Path
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
     Axis,
+    Codec,
     Curve,
     ParameterSet,
     Scalar,
     build_curve,
     format_number,
-    make_legal,
     parse_finite,
 )
 from drivetwin.export.parameters.spelling import to_dotted_name, to_one_line
@@ -36,18 +36,11 @@ _SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 _INDEXED = re.compile(r"(.+)\[(\d{1,9})\]")
 
 
-def convert_for_ssv(parameters: ParameterSet) -> ParameterSet:
-    """The set as the format can hold it."""
-    return make_legal(parameters, to_dotted_name, to_one_line, _make_axis_name)
-
-
 def _make_axis_name(curve: Curve) -> str:
     return f"{curve.name}.{curve.axis.name}"
 
 
-def format_ssv(parameters: ParameterSet) -> str:
-    """Contents of the file."""
-    content = convert_for_ssv(parameters)
+def _write_ssv(content: ParameterSet) -> str:
     root = ET.Element("ssv:ParameterSet", {"xmlns:ssv": _SSV, "xmlns:ssc": _SSC})
     root.attrib |= {"version": "1.0", "name": content.name, "generationTool": "drivetwin"}
     listed = add_child(root, "ssv:Parameters")
@@ -79,7 +72,7 @@ def _add_units(content: ParameterSet) -> list[str]:
     return sorted({*entries, *(curve.axis.unit for curve in content.curves), "1"})
 
 
-def parse_ssv(text: str, source: str) -> ParameterSet:
+def _parse_ssv(text: str, source: str) -> ParameterSet:
     """Read the Real parameters and the curves among them; others are named as skipped.
 
     Raises FileFormatError where the file is no SSV or a value is damaged.
@@ -138,3 +131,6 @@ def _parse_curve(
         (values[0].unit, values[0].text),
         source,
     )
+
+
+CODEC = Codec(_write_ssv, _parse_ssv, to_dotted_name, to_one_line, _make_axis_name)

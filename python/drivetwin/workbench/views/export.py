@@ -16,17 +16,6 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import get_triggered_part
 
-TARGETS = {
-    Target.C: ("C sources", "C99 model of the shift for a controller, as an archive"),
-    Target.FMU: ("FMU", "co-simulation, FMI 2.0, sources inside"),
-    Target.MODELICA: ("Modelica", "the shift in components of the Standard Library"),
-    Target.SSV: ("SSV", "parameter values for SSP and FMUs"),
-    Target.CDFX: ("CDFX", "calibration data, ASAM CDF"),
-    Target.DCM: ("DCM", "calibration data, ETAS DAMOS"),
-    Target.M: ("MATLAB", "script with all parameters"),
-    Target.JSON: ("JSON", "parameters with units and intervals"),
-    Target.CSV: ("CSV", "parameters as a table"),
-}
 RECORDS = {
     Record.REPORT: ("Report", "one offline page with all evidence"),
     Record.TWIN: ("Twin", "twin.toml, for simulate, report and export"),
@@ -43,7 +32,7 @@ def layout() -> list[Component]:
             "The result that is shown in the step Model, as identified: sliders do not change it."
         ),
         html.H3("The twin for other programs"),
-        _build_group({target.value: text for target, text in TARGETS.items()}),
+        _build_group({one.value: (one.label, one.text) for one in Target}),
         html.H3("Files of drivetwin"),
         _build_group({record.value: text for record, text in RECORDS.items()}),
         dcc.Download(id="download"),
