@@ -9,6 +9,7 @@ from pathlib import Path
 from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.formats.arrow import ARROW_FORMAT
 from drivetwin.logs.formats.can.open import BLF_FORMAT, BUS_TEXT_FORMAT
 from drivetwin.logs.formats.can.other_tools import refuse_bus_tool
 from drivetwin.logs.formats.csv import CSV_FORMAT
@@ -22,6 +23,7 @@ FORMATS: tuple[LogFormat, ...] = (
     MDF_FORMAT,
     MAT_FORMAT,
     PARQUET_FORMAT,
+    ARROW_FORMAT,
     BLF_FORMAT,
     BUS_TEXT_FORMAT,
     CSV_FORMAT,
