@@ -15,7 +15,7 @@ from drivetwin.calibration.policy import Policy, Space
 from drivetwin.simulation.shift_control import ControlledUnit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PolicySetup:
     """Shift, pressure [Pa] of a held element, nominal unit and time between two commands [s].
 

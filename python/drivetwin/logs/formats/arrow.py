@@ -22,7 +22,7 @@ def open_arrow(path: Path, options: ReadOptions) -> Iterator[Recording]:
     ipc = import_extra("pyarrow.ipc", "io", _KIND, path)
     with path.open("rb") as file:
         with handle_parser_errors(_KIND, path):
-            recording = ParquetRecording(_Table(ipc, file), path, options)
+            recording = ParquetRecording(_Table(ipc, file), path, options, _KIND)
         yield recording
 
 

@@ -56,8 +56,9 @@ PARQUET_FORMAT = LogFormat(open_parquet, (".parquet",), (b"PAR1",), guarded=True
 class ParquetRecording:
     """Columns of an open Parquet file; the time column is in memory, others are loaded singly."""
 
-    def __init__(self, table: Any, path: Path, options: ReadOptions) -> None:
+    def __init__(self, table: Any, path: Path, options: ReadOptions, kind: str = _KIND) -> None:
         self._table = table
+        self._kind = kind
         self._path = path
         self.warnings: tuple[str, ...] = ()
         schema = table.schema_arrow
@@ -104,7 +105,7 @@ class ParquetRecording:
         numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind)
         if not (numeric or pa.types.is_boolean(kind) or pa.types.is_decimal(kind)):
             raise DamagedChannelError(f"it holds {kind}, not numbers", "map another column", where)
-        with handle_parser_errors(_KIND, self._path):
+        with handle_parser_errors(self._kind, self._path):
             data = self._load_values(field)
             present = np.asarray(pc.is_valid(data).to_numpy(zero_copy_only=False), np.bool_)
             floats = pc.cast(data, pa.float64(), safe=False)
@@ -145,7 +146,7 @@ class ParquetRecording:
         import pyarrow as pa
         import pyarrow.compute as pc
 
-        with handle_parser_errors(_KIND, self._path):
+        with handle_parser_errors(self._kind, self._path):
             data = self._load_values(field)
             _refuse_missing_stamps(np.asarray(pc.is_valid(data).to_numpy()), where)
             width = pa.int32() if pa.types.is_time32(data.type) else pa.int64()
