@@ -15,7 +15,7 @@ from jsonschema import Draft202012Validator
 
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_text import format_mapping
-from drivetwin.export.parameters.json_file import format_json
+from drivetwin.export.parameters.json_file import CODEC
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.files.fit_file import build_fit_file, format_fit_file
 from drivetwin.files.result_file import ResultFile
@@ -59,7 +59,7 @@ def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
         case FileKind.RESULT:
             yield json.loads(ResultFile.from_result(sample.identification()).to_json())
         case FileKind.PARAMETERS:
-            yield json.loads(format_json(collect_parameters(twin())))
+            yield json.loads(CODEC.text(collect_parameters(twin())))
         case FileKind.FIT:
             yield json.loads(
                 format_fit_file(build_fit_file(fit_log(ModelName.TIP_IN), ["a.csv"], {}))
