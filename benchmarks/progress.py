@@ -32,8 +32,7 @@ from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import Grid, calibrate_map
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.twin_task import Request, build_task
-from drivetwin.cli.identify_run import Request as ReadingRequest
-from drivetwin.cli.identify_run import read_shifts
+from drivetwin.cli.identify_run import IdentifyOptions, read_shifts
 from drivetwin.cli.synth import write_run
 from drivetwin.cli.time_left import Remaining
 from drivetwin.dyno.dyno import run
@@ -137,7 +136,7 @@ def make_bench(folder: Path, scenario: str, seed: int = 0) -> Bench:
     """Make the log of a scenario and read it as the command `identify` does."""
     made = run(load_scenario(scenario), seed)
     path, card_path, _ = write_run(folder / f"{scenario}-{seed}.csv", made)
-    how = ReadingRequest(card_path, None, Method.LIKELIHOOD)
+    how = IdentifyOptions(vehicle=card_path, method=Method.LIKELIHOOD)
     card = how.load_card()
     log, shifts, _ = read_shifts(path, how, card)
     return Bench(Source(log, shifts), card)
@@ -178,7 +177,7 @@ def run_calibrations(folder: Path) -> Iterator[tuple[str, Timeline]]:
     with record_stages():  # not recorded: a single identification is no measurement
         twin = make_bench(folder, "paper_steps").identify(Method.INTEGRAL).twin
     calibrated: list[Calibration] = []
-    request, grid = Request(("2", "3"), 0.5), Grid((1000.0, 1400.0), (160.0, 190.0))
+    request, grid = Request(gears=("2", "3")), Grid((1000.0, 1400.0), (160.0, 190.0))
     work = partial(_collect, calibrated, partial(run_calibration, twin, request))
     yield "calibrate, controller", record_timeline(work)
     yield "front", record_timeline(partial(trace_front, calibrated[0]))

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from plotly.io import to_html
 
-from drivetwin.cli.identify_run import Outcome, Request, run_identification
+from drivetwin.cli.identify_run import IdentifyOptions, Outcome, run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import load_scenario
@@ -42,7 +42,7 @@ OPTIONS = (
 def identify_demo(folder: Path) -> Outcome:
     """Write the log of the demo into `folder` and identify it."""
     log, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=0))
-    return run_identification(log, Request(card, None, DEFAULT_METHOD))
+    return run_identification(log, IdentifyOptions(vehicle=card, method=DEFAULT_METHOD))
 
 
 def write_figure(outcome: Outcome, folder: Path) -> Path:

@@ -45,7 +45,10 @@ def run_made_fleet(folder: Path, store: Path) -> dict[str, Settled]:
     """Run the fleet; return the last event of each file, by its name."""
     settled: dict[str, Settled] = {}
     request = FleetRun(
-        Sources([str(folder)]), read_rules(folder / "rules.toml"), store, Method.INTEGRAL
+        sources=Sources([str(folder)]),
+        rules=read_rules(folder / "rules.toml"),
+        store=store,
+        method=Method.INTEGRAL,
     )
     started = perf_counter()
     with show_progress(as_json=False) as show:

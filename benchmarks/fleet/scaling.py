@@ -35,7 +35,7 @@ from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import State, WorkerSpec
+from drivetwin.fleet.task import State
 
 ROOT = Path(__file__).parents[2]
 LOGS, FIRST = 60, 20
@@ -113,9 +113,14 @@ def _run(logs: Path, function: str, workers: int, cluster: bool) -> Ran:
             stack.enter_context(_start_cluster(workers)).scheduler_address if cluster else None
         )
         request = FleetRun(
-            Sources([str(logs)]), read_rules(logs / "rules.toml"), store, Method.INTEGRAL,
-            workers, scheduler, WorkerSpec(function),
-        )  # fmt: skip
+            sources=Sources([str(logs)]),
+            rules=read_rules(logs / "rules.toml"),
+            store=store,
+            method=Method.INTEGRAL,
+            workers=workers,
+            scheduler=scheduler,
+            function=function,
+        )
         watch = _Watch()
         run_fleet(request, watch.hear)
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

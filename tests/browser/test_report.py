@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from drivetwin.cli.identify_run import Request, run_identification
+from drivetwin.cli.identify_run import IdentifyOptions, run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import load_scenario
@@ -37,7 +37,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Report of an identification by the default method."""
     folder = tmp_path_factory.mktemp("report")
     shift, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=1))
-    outcome = run_identification(shift, Request(card, None, DEFAULT_METHOD))
+    outcome = run_identification(shift, IdentifyOptions(vehicle=card, method=DEFAULT_METHOD))
     save_report(folder / "report.html", outcome.found, outcome.log)
     twin = {"first": outcome.twin, "second": outcome.twin}
     trials = simulate_trials(twin, outcome.log, outcome.found.shifts, "shift.csv")

@@ -63,7 +63,7 @@ def test_late_pressures_move_the_shift_by_their_delay() -> None:
 def make_task(values: Mapping[str, float], kind: PolicyKind = PolicyKind.CONTROLLER) -> Task:
     """Task of a twin with the parameters of a part."""
     twin = add_part(make_hydraulic_twin(), values)
-    return build_task(twin, Request(("2", "3"), 0.5, policy=kind, limits=(), settings=QUICK))
+    return build_task(twin, Request(gears=("2", "3"), policy=kind, limits=(), settings=QUICK))
 
 
 @pytest.mark.parametrize("kind", [PolicyKind.CONTROLLER, PolicyKind.SLIP])

@@ -18,7 +18,7 @@ from tests.calibration.twins import make_twin
 def test_says_what_leaves_the_range_and_when() -> None:
     base = make_twin()
     twin = replace(base, validity={**base.validity, "speed": (60.0, 200.0)})
-    task = build_task(twin, Request(("2", "3"), 0.5, limits=()))
+    task = build_task(twin, Request(gears=("2", "3"), limits=()))
     space = Space(task.policy)
     profiles = build_profiles(space, space.start)
     assert check_identified_range(twin, task.maneuver, profiles) == ()

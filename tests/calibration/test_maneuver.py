@@ -37,7 +37,7 @@ def test_start_accelerates_steadily(shift: Maneuver) -> None:
 @pytest.mark.parametrize("part", list(PARTS))
 def test_start_with_a_part_accelerates_steadily(part: str) -> None:
     twin = add_part(make_twin(), PARTS[part])
-    shift = build_task(twin, Request(("2", "3"), 0.5, limits=())).maneuver
+    shift = build_task(twin, Request(gears=("2", "3"), limits=())).maneuver
     held = {"B2": SYSTEM, "B3": 0.0, ENGINE_TORQUE: shift.point.engine_torque}
     time = shift.time[:300]
     outputs: list[Output] = [("shaft_torque", SHAFT), ("acceleration", ENGINE)]

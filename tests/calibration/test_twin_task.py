@@ -14,7 +14,7 @@ from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.slip import SlipPolicy
 from drivetwin.calibration.scenarios import Purpose
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.twin_task import Hardware, Request, build_task
+from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.simulation.shift_control import ControlledUnit
@@ -22,7 +22,7 @@ from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.calibration.cases import ACTUATOR, FILLING, QUICK
 from tests.calibration.twins import PARTS, STD, add_part, make_hydraulic_twin, make_twin
 
-REQUEST = Request(("2", "3"), 0.5, settings=QUICK)
+REQUEST = Request(gears=("2", "3"), settings=QUICK)
 _DRAWN = {"eta": "i_in.loss.eta", "k_o": "output shaft.stiffness", "J_vehicle": "J_v.inertia"}
 """Paths of some numbers by the parameter that they are."""
 
@@ -109,7 +109,7 @@ def test_what_the_twin_does_not_say_must_be_given() -> None:
 
 
 def test_a_slip_loop_has_the_actuators_of_the_twin() -> None:
-    asked = replace(REQUEST, policy=PolicyKind.SLIP, hardware=Hardware(0.02, 0.03), limits=())
+    asked = replace(REQUEST, policy=PolicyKind.SLIP, task=0.02, engine_lag=0.03, limits=())
     task = build_task(make_hydraulic_twin(), asked)
     assert isinstance(task.policy, SlipPolicy)
     assert task.policy.base.task == 0.02

@@ -149,7 +149,7 @@ def test_a_twin_with_a_part_is_calibrated_with_it(part: str, tmp_path: Path) -> 
     given = ["--shift", "2-3", "--limits", str(limits), "-o", str(out)]
     assert main(["calibrate", str(source), *given, *SHORT]) == 0
     curves = read_parameters(out / "calibration.csv").curves
-    request = Request(("2", "3"), 0.5, engine_torque=1400.0, limits=())
+    request = Request(gears=("2", "3"), engine_torque=1400.0, limits=())
     shift = build_task(twin, request).maneuver
     after = shift.time - shift.request
     inputs = {

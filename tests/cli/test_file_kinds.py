@@ -10,33 +10,33 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.cli.arguments import find_twin
-from drivetwin.cli.file_kinds import FileKind, recognise_file, require_kind
+from drivetwin._util.request import FileRole
+from drivetwin.cli.file_kinds import find_twin, recognise_file, require_kind
 from drivetwin.errors import CardError, FileFormatError, ResultFileError
 
 CARD = 'name = "truck"\nfinal_drive = 5.0\n[[gears]]\nname = "2"\n[elements.B2]\nP0_bar = 0.8\n'
 TWIN = 'schema = "drivetwin/twin-2"\nname = "truck"\n[gears]\n[elements]\n'
 CONTENTS = {
-    "comma": ("time,torque\ns,Nm\n0.0,1.5\n0.1,1.6\n", FileKind.LOG),
-    "german": ("Zeit;M_ist\ns;Nm\n0,0;1,5\n0,1;1,6\n", FileKind.LOG),
-    "tabs": ("t\tM\n0\t-1.5e3\n", FileKind.LOG),
-    "asc": ("date Mon\n0.01 1 2 3\n", FileKind.LOG),
-    "mdf": ("MDF     4.10    ", FileKind.LOG),
-    "parquet": ("PAR1....", FileKind.LOG),
-    "card": (CARD, FileKind.CARD),
-    "commented card": ("# a card\n\n" + CARD, FileKind.CARD),
-    "twin": (TWIN, FileKind.TWIN),
-    "result": (json.dumps({"schema": "drivetwin/result-5"}), FileKind.RESULT),
-    "mapping": ('[channels.engine_torque]\nname = "M"\n', FileKind.MAPPING),
-    "other json": ("{}", FileKind.UNKNOWN),
-    "damaged twin": (TWIN + "law = [1.0, 2.0,\n3.0 4.0\n", FileKind.UNKNOWN),
-    "prose": ("A drive, on a Monday; it rained.\n", FileKind.UNKNOWN),
-    "nothing": ("", FileKind.UNKNOWN),
+    "comma": ("time,torque\ns,Nm\n0.0,1.5\n0.1,1.6\n", FileRole.LOG),
+    "german": ("Zeit;M_ist\ns;Nm\n0,0;1,5\n0,1;1,6\n", FileRole.LOG),
+    "tabs": ("t\tM\n0\t-1.5e3\n", FileRole.LOG),
+    "asc": ("date Mon\n0.01 1 2 3\n", FileRole.LOG),
+    "mdf": ("MDF     4.10    ", FileRole.LOG),
+    "parquet": ("PAR1....", FileRole.LOG),
+    "card": (CARD, FileRole.CARD),
+    "commented card": ("# a card\n\n" + CARD, FileRole.CARD),
+    "twin": (TWIN, FileRole.TWIN),
+    "result": (json.dumps({"schema": "drivetwin/result-5"}), FileRole.RESULT),
+    "mapping": ('[channels.engine_torque]\nname = "M"\n', FileRole.MAPPING),
+    "other json": ("{}", FileRole.OTHER),
+    "damaged twin": (TWIN + "law = [1.0, 2.0,\n3.0 4.0\n", FileRole.OTHER),
+    "prose": ("A drive, on a Monday; it rained.\n", FileRole.OTHER),
+    "nothing": ("", FileRole.OTHER),
 }
 
 
 @pytest.mark.parametrize(("content", "kind"), CONTENTS.values(), ids=list(CONTENTS))
-def test_content_decides(content: str, kind: FileKind, tmp_path: Path) -> None:
+def test_content_decides(content: str, kind: FileRole, tmp_path: Path) -> None:
     for name in ("a.csv", "a.toml", "a"):
         file = tmp_path / name
         file.write_text(content, encoding="utf-8")
@@ -57,7 +57,7 @@ def test_tables_of_numbers_are_logs(
     file = tmp_path_factory.mktemp("table") / "file"
     lines = [delimiter.join(("time", "torque")), *(delimiter.join(map(repr, row)) for row in rows)]
     file.write_text("\n".join(lines), encoding="utf-8")
-    assert recognise_file(file) is FileKind.LOG
+    assert recognise_file(file) is FileRole.LOG
 
 
 @given(content=st.binary(max_size=200))
@@ -66,24 +66,24 @@ def test_no_content_breaks_the_recognition(
 ) -> None:
     file = tmp_path_factory.mktemp("any") / "file"
     file.write_bytes(content)
-    assert recognise_file(file) in FileKind
+    assert recognise_file(file) in FileRole
 
 
 @pytest.mark.parametrize(
     ("content", "wanted", "error", "remedy"),
     [
-        ("card", FileKind.TWIN, ResultFileError, "identify with this card first"),
-        ("comma", FileKind.TWIN, ResultFileError, "give the twin first"),
-        ("twin", FileKind.LOG, FileFormatError, "the twin comes first"),
-        ("card", FileKind.LOG, FileFormatError, "--vehicle"),
-        ("result", FileKind.LOG, FileFormatError, "the log that was identified"),
-        ("comma", FileKind.CARD, CardError, "with --vehicle"),
-        ("twin", FileKind.CARD, CardError, "need no card"),
-        ("mapping", FileKind.CARD, CardError, "argument 'mapping'"),
+        ("card", FileRole.TWIN, ResultFileError, "identify with this card first"),
+        ("comma", FileRole.TWIN, ResultFileError, "give the twin first"),
+        ("twin", FileRole.LOG, FileFormatError, "the twin comes first"),
+        ("card", FileRole.LOG, FileFormatError, "--vehicle"),
+        ("result", FileRole.LOG, FileFormatError, "the log that was identified"),
+        ("comma", FileRole.CARD, CardError, "with --vehicle"),
+        ("twin", FileRole.CARD, CardError, "need no card"),
+        ("mapping", FileRole.CARD, CardError, "argument 'mapping'"),
     ],
 )
 def test_a_wrong_kind_is_named_with_the_remedy(
-    content: str, wanted: FileKind, error: type[Exception], remedy: str, tmp_path: Path
+    content: str, wanted: FileRole, error: type[Exception], remedy: str, tmp_path: Path
 ) -> None:
     text, found = CONTENTS[content]
     file = tmp_path / "file"
@@ -96,7 +96,7 @@ def test_a_wrong_kind_is_named_with_the_remedy(
 def test_what_is_not_recognised_is_left_to_its_reader(tmp_path: Path) -> None:
     damaged = tmp_path / "twin.toml"
     damaged.write_text(CONTENTS["damaged twin"][0], encoding="utf-8")
-    for wanted in (FileKind.TWIN, FileKind.LOG, FileKind.CARD):
+    for wanted in (FileRole.TWIN, FileRole.LOG, FileRole.CARD):
         require_kind(damaged, wanted)
         require_kind(tmp_path / "missing", wanted)
 

@@ -13,11 +13,14 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
+from drivetwin.cli.identify_joint import parse_holdouts
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
+from drivetwin.errors import InputError
 from drivetwin.files.result_file import load_result
 from drivetwin.files.twin_file import load_twin
-from tests.estimation.multi_log.fixtures import LEVEL, LOADS, scenario
+from drivetwin.shifts.detect import FoundShifts
+from tests.estimation.multi_log.fixtures import LEVEL, LOADS, pair, scenario
 
 
 @dataclass(frozen=True)
@@ -110,3 +113,30 @@ def test_holding_out_everything_is_refused(
     arguments = [str(written.logs[0]), "--vehicle", str(written.card), "--hold-out", "1"]
     assert main(["identify", *arguments]) == 2
     assert "nothing is left" in capsys.readouterr().err
+
+
+NAMES = (Path("runs/a.csv"), Path("runs/b.mf4"))
+
+
+def _held(*wanted: str, logs: tuple[Path, ...] = NAMES) -> list[set[int]]:
+    two = FoundShifts(2 * pair()[0].shifts.shifts, ())
+    return [set(one) for one in parse_holdouts(wanted, logs, [two] * len(logs))]
+
+
+@pytest.mark.parametrize("name", ["b", "b.mf4", "runs/b.mf4"])
+def test_a_log_holds_out_all_its_shifts(name: str) -> None:
+    assert _held(name) == [set(), {1, 2}]
+
+
+def test_a_shift_of_a_log() -> None:
+    assert _held("a.csv:2", "b:1") == [{2}, {1}]
+
+
+def test_of_one_log_the_number_is_enough() -> None:
+    assert _held("2", logs=NAMES[:1]) == [{2}]
+
+
+@pytest.mark.parametrize("name", ["1", "c.csv", "a:x", "a:", ":1", "c:1", "", "a:" + 5000 * "9"])
+def test_anything_else_is_refused_by_name(name: str) -> None:
+    with pytest.raises(InputError, match="names no shift or log"):
+        _held(name)

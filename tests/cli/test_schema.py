@@ -7,8 +7,10 @@ import json
 
 import pytest
 
+from drivetwin._util.request import COMMANDS
 from drivetwin.cli import main
 from drivetwin.files.schemas import FileKind, build_json_schema
+from tests.cli.test_app import COMMANDS as CALLS
 
 
 def test_without_a_kind_it_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
@@ -26,3 +28,15 @@ def test_the_schema_of_a_kind_is_printed_whole(capsys: pytest.CaptureFixture[str
 def test_a_kind_that_does_not_exist_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "truck"]) == 2
     assert "vehicle-card" in capsys.readouterr().err
+
+
+def test_the_schema_of_a_command_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", "--command", "fleet run"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["required"] == ["vehicle", "output"]
+    assert main(["schema", "--command", "fleet ran"]) == 2
+    assert "take one of" in capsys.readouterr().err
+
+
+def test_every_command_has_a_schema() -> None:
+    assert set(COMMANDS) == {" ".join(call) for call in CALLS}

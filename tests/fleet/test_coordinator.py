@@ -3,18 +3,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from drivetwin.errors import StoreError
 from drivetwin.estimation.result.method import Method
-from drivetwin.fleet.coordinator import RunOptions
 from drivetwin.fleet.events import Started, Summary
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import State, WorkerSpec
-from tests.fleet.toys import LIMITS, contents, make_logs, names, run_toys
+from drivetwin.fleet.task import State
+from tests.fleet.toys import contents, make_logs, names, run_toys
 
 
 def test_every_log_is_settled_once_and_never_computed_again(tmp_path: Path) -> None:
@@ -73,8 +71,7 @@ def test_equal_content_is_one_log_and_every_file_is_named(tmp_path: Path) -> Non
 def test_what_hangs_eats_or_kills_is_quarantined_with_its_reason(tmp_path: Path) -> None:
     spoilt = ["hang", "eat", "die"]
     logs, store = make_logs(tmp_path / "logs", 8, spoilt=spoilt), tmp_path / "store"
-    spec = WorkerSpec("tests.fleet.work:toy", replace(LIMITS, seconds=2.0))
-    summary, events = run_toys(logs, store, worker=spec, wishes=RunOptions(attempts=2))
+    summary, events = run_toys(logs, store, time_limit=2.0, attempts=2)
     assert (summary.done, summary.quarantined) == (5, 3)
     assert summary.failures == {"TimeLimit": 1, "MemoryLimit": 1, "WorkerLost": 1}
     for number, error in enumerate(("TimeLimit", "MemoryLimit", "WorkerLost")):
@@ -91,17 +88,16 @@ def test_what_hangs_eats_or_kills_is_quarantined_with_its_reason(tmp_path: Path)
 
 def test_quarantine_is_left_when_asked_for(tmp_path: Path) -> None:
     logs, store = make_logs(tmp_path / "logs", 2, spoilt=["die"]), tmp_path / "store"
-    assert run_toys(logs, store, wishes=RunOptions(attempts=1))[0].quarantined == 1
-    assert run_toys(logs, store, wishes=RunOptions(attempts=1))[0].computed == 0
-    again, _ = run_toys(logs, store, wishes=RunOptions(attempts=1, retry=True))
+    assert run_toys(logs, store, attempts=1)[0].quarantined == 1
+    assert run_toys(logs, store, attempts=1)[0].computed == 0
+    again, _ = run_toys(logs, store, attempts=1, retry=True)
     assert (again.computed, again.quarantined) == (1, 1)
 
 
 def test_workers_that_cannot_start_stop_the_run_and_blame_no_log(tmp_path: Path) -> None:
     logs, store = make_logs(tmp_path / "logs", 3), tmp_path / "store"
-    spec = WorkerSpec("tests.fleet.work:not_there", LIMITS)
     with pytest.raises(StoreError, match=r"no worker starts.*not_there"):
-        run_toys(logs, store, worker=spec)
+        run_toys(logs, store, function="tests.fleet.work:not_there")
     assert {row["state"] for row in contents(store)["logs"]} == {"waiting"}
     assert run_toys(logs, store)[0].done == 3
 

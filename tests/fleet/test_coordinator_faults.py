@@ -21,7 +21,6 @@ from typing import Any
 import pytest
 
 from drivetwin.errors import StoreError
-from drivetwin.fleet.coordinator import RunOptions
 from drivetwin.fleet.events import Event, Settled
 from drivetwin.fleet.run import run_fleet
 from drivetwin.fleet.store import Store
@@ -67,7 +66,7 @@ def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
             killed.append(dice.choice(workers))
             os.kill(killed[-1], signal.SIGKILL)
 
-    asked = request(logs, tmp_path / "store", wishes=RunOptions(attempts=50))
+    asked = request(logs, tmp_path / "store", attempts=50)
     summary = run_fleet(asked, kill_now_and_then)
     assert len(killed) >= 3
     assert (summary.done, summary.bad) == (COUNT - 1, 1)

@@ -14,13 +14,12 @@ from typing import Any
 
 from drivetwin._util.interrupts import interrupt_on_signals
 from drivetwin.estimation.result.method import Method
-from drivetwin.fleet.coordinator import RunOptions
 from drivetwin.fleet.events import Event, Settled, Summary, to_document
 from drivetwin.fleet.rules import RulesFile, RuleTable
 from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import Limits, WorkerSpec
+from drivetwin.fleet.task import Limits
 
 ROOT = Path(__file__).parents[2]
 LIMITS = Limits(seconds=30.0, memory=200 * 2**20)
@@ -41,13 +40,15 @@ def make_logs(folder: Path, count: int, *, word: str = "", spoilt: Sequence[str]
 def request(logs: Path, store: Path, **changes: Any) -> FleetRun:
     """What `drivetwin fleet` would ask, with the toy at work."""
     rules = RulesFile(rules=[RuleTable(name="toy", vehicle=str(logs / "card.toml"))])
-    settings = {
-        "worker": WorkerSpec("tests.fleet.work:toy", LIMITS),
+    settings: dict[str, Any] = {
+        "function": "tests.fleet.work:toy",
+        "time_limit": LIMITS.seconds,
+        "memory_limit": LIMITS.memory,
         "workers": 2,
         "method": Method.PAPER,
         **changes,
     }
-    return FleetRun(Sources([str(logs)]), rules, store, **settings)
+    return FleetRun(sources=Sources([str(logs)]), rules=rules, store=store, **settings)
 
 
 def run_toys(logs: Path, store: Path, **changes: Any) -> tuple[Summary, list[Event]]:
@@ -80,7 +81,5 @@ def _tell(event: Event) -> None:
 if __name__ == "__main__":
     interrupt_on_signals()
     scheduler = sys.argv[3] if len(sys.argv) > 3 else None
-    asked = request(
-        Path(sys.argv[1]), Path(sys.argv[2]), scheduler=scheduler, wishes=RunOptions(attempts=20)
-    )
+    asked = request(Path(sys.argv[1]), Path(sys.argv[2]), scheduler=scheduler, attempts=20)
     run_fleet(asked, _tell)

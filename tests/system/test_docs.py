@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
+from drivetwin._util.request import get_arguments
 from drivetwin.channels.mapping_file import read_mapping
-from drivetwin.cli.synth import ScenarioOption
+from drivetwin.cli.synth import Bench
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.parameters import SPECS, ParameterSpec
@@ -86,8 +87,8 @@ def test_every_page_is_listed() -> None:
 
 
 def test_every_scenario_and_effect_is_described() -> None:
-    (option,) = get_args(ScenarioOption)[1:]
-    described = re.findall(r"(\w+)(?=[\w, ]*:)", option.help)
+    scenario = get_arguments(Bench)["scenario"]
+    described = re.findall(r"(\w+)(?=[\w, ]*:)", scenario.help)
     page = (ROOT / "docs" / "howto" / "synthetic-log.md").read_text(encoding="utf-8")
     assert set(described) == set(ScenarioName)
     rows = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)

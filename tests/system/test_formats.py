@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.cli.identify_run import Request, run_identification
+from drivetwin.cli.identify_run import IdentifyOptions, run_identification
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import convert_channels, format_card
 from drivetwin.dyno.scenario_file import load_scenario
@@ -47,7 +47,7 @@ def test_every_format_gives_the_same_channels(logs: dict[str, Path]) -> None:
 
 def test_the_result_does_not_depend_on_the_format(logs: dict[str, Path]) -> None:
     """By the fast method, which uses every channel; the channels themselves are compared above."""
-    request = Request(logs["csv"].with_name("card.toml"), None, Method.INTEGRAL)
+    request = IdentifyOptions(vehicle=logs["csv"].with_name("card.toml"), method=Method.INTEGRAL)
     first, other = (run_identification(logs[one], request).found for one in ("csv", "mf4"))
     assert render(other.findings) == render(first.findings)
     assert other.shifts[0].sigma == pytest.approx(first.shifts[0].sigma, rel=ROUND_OFF)

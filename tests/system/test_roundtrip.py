@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.cli.identify_run import Request, run_identification
+from drivetwin.cli.identify_run import IdentifyOptions, run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno import dyno
 from drivetwin.dyno.files import format_card
@@ -38,7 +38,7 @@ def _identified(
             r"P0_bar = ([\d.]+)", r"P0_bar = { value = \1, std = 0.0 }", card.read_text()
         )
         card.write_text(exact)
-    return run_identification(log, Request(card, None, method)).found, bench.truth
+    return run_identification(log, IdentifyOptions(vehicle=card, method=method)).found, bench.truth
 
 
 def _friction_error(curve: FrictionCurve, law: Stribeck | FrictionTable) -> float:
@@ -140,7 +140,9 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Identification:
     )
     card = folder / "card.toml"
     card.write_text(format_card(load_scenario(ScenarioName.PAPER)), encoding="utf-8")
-    return run_identification(folder / "log.csv", Request(card, None, Method.INTEGRAL)).found
+    return run_identification(
+        folder / "log.csv", IdentifyOptions(vehicle=card, method=Method.INTEGRAL)
+    ).found
 
 
 @pytest.mark.parametrize("parameter", WITHIN_HALF_A_PERCENT)

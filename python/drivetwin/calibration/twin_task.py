@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from drivetwin.calibration.calibrate import Task, draw_for
 from drivetwin.calibration.certificate import compute_quantiles
@@ -13,7 +13,7 @@ from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import CalibrationOptions
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws
@@ -34,34 +34,17 @@ DEFAULT_LIMITS = {
 _NOT_IDENTIFIED = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
 
 
-@dataclass(frozen=True)
-class Hardware:
-    """Controller task and time constant of the engine torque [s], for a closed slip loop."""
+class Request(CalibrationOptions):
+    """Task of a calibration: gears and options, limits, spread between units, effort.
 
-    task: float = 0.01
-    engine_lag: float = 0.05
-
-
-@dataclass(frozen=True)
-class Request:
-    """Task of a calibration: gears, operating point (None: from the twin), policy, limits, effort.
-
-    `wheel_radius` [m]; `system_pressure` [Pa], by default the largest that the twin's log has;
-    `engine_torque` [N m] and `engine_speed` [rad/s] at the request; `start` holds starting values
-    of the policy by name; `limits` None stands for those of the start.
+    `start` holds starting values of the policy by name; `limits` None stands for those of the
+    start.
     """
 
     gears: tuple[str, str]
-    wheel_radius: float
-    engine_torque: float | None = None
-    engine_speed: float | None = None
-    system_pressure: float | None = None
-    policy: PolicyKind = PolicyKind.CONTROLLER
-    hardware: Hardware = field(default_factory=Hardware)
     limits: tuple[Limit, ...] | None = None
     spread: Spread = field(default_factory=Spread)
     start: Mapping[str, float] = field(default_factory=dict)
-    seed: int = 1
     settings: CalibrationSettings = field(default_factory=CalibrationSettings)
 
 
@@ -83,7 +66,7 @@ def build_task(twin: Twin, request: Request) -> Task:
     if request.policy.commands_actuators:
         units = _build_unit_draws(twin, maneuver, request)
     unit = None if units is None else units.nominal
-    setup = PolicySetup(maneuver, _choose_pressure(twin, request), unit, request.hardware.task)
+    setup = PolicySetup(maneuver, _choose_pressure(twin, request), unit, request.task)
     policy = POLICIES[request.policy](setup).set_start(request.start)
     draw = Draw(TwinDraws(twin, shift, request.spread), units)
     task = Task(maneuver, policy, draw, request.limits or (), request.seed, request.settings)
@@ -170,4 +153,4 @@ def _build_unit_draws(twin: Twin, maneuver: Maneuver, request: Request) -> UnitD
         )
     delay = twin.get_value(PRESSURE_DELAY, 0.0)
     old, new = (twin.actuators[name].delay(delay) for name in names)
-    return UnitDraws(old, new, request.hardware.engine_lag, request.spread)
+    return UnitDraws(old, new, request.engine_lag, request.spread)

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Arguments common to several commands, and the loading of log and card."""
+"""Files that several commands read: their declarations, and the loading of log, twin and card."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from drivetwin.errors import ResultFileError, Where
+from drivetwin._util.request import REQUIRED, FileRole, Request, argument, input_file, option
+from drivetwin.estimation.result.method import DEFAULT_METHOD
 
 if TYPE_CHECKING:
     from drivetwin.channels.mapping import Mapped
@@ -19,110 +18,69 @@ if TYPE_CHECKING:
 
 RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
 """Files that `identify -o` writes."""
+GEARBOX_HELP = "Gearbox card (TOML), or name of a built-in gearbox."
 
 
-def find_twin(source: Path) -> Path:
-    """Return the twin file of a source: the file itself, or that of an output folder or result.
-
-    Raises ResultFileError if the source is another kind of file, or has no twin.
-    """
-    from drivetwin.cli.file_kinds import FileKind, recognise_file, require_kind
-
-    if source.is_dir():
-        path = source / TWIN
-    elif recognise_file(source) is FileKind.RESULT:
-        path = source.with_name(TWIN)
-    else:
-        require_kind(source, FileKind.TWIN)
-        return source
-    if not path.is_file():
-        raise ResultFileError(
-            f"there is no {TWIN} in {path.parent}",
-            "give the folder that 'drivetwin identify LOG --vehicle CARD -o DIR' wrote, or its "
-            f"{TWIN}",
-            Where(file=str(source)),
-        )
-    return path
+def log_argument(help: str = "Shift log: CSV, MDF, MAT, Parquet, bus log.") -> Any:
+    """Declare a log."""
+    return argument(help, "LOG", role=FileRole.LOG)
 
 
-def require_log(source: Path) -> Path:
-    """Return the path of a log; raises FileFormatError if it is a twin, a card or another file."""
-    from drivetwin.cli.file_kinds import FileKind, require_kind
-
-    require_kind(source, FileKind.LOG)
-    return source
+def logs_argument(help: str) -> Any:
+    """Declare one or more logs."""
+    return argument(help, "LOG...", role=FileRole.LOG)
 
 
-def require_logs(sources: list[Path]) -> list[Path]:
-    """Return paths of logs; raises FileFormatError as `require_log` does."""
-    return [require_log(source) for source in sources]
+def card_option(default: Any = None) -> Any:
+    """Declare the card of a vehicle."""
+    help = "Vehicle card (TOML), as 'drivetwin card new' writes it."
+    return input_file(help, "CARD", FileRole.CARD, default)
 
 
-def require_card(source: Path | None) -> Path | None:
-    """Return the path of a card; raises CardError if it is a log, a twin or another file."""
-    from drivetwin.cli.file_kinds import FileKind, require_kind
+def mapping_option() -> Any:
+    """Declare the channel mapping of a log."""
+    help = (
+        "Channel mapping file (TOML); without it channels.toml beside the log and the mapping of "
+        "the twin, if any."
+    )
+    return input_file(help, "MAP", FileRole.MAPPING)
 
-    if source is not None:
-        require_kind(source, FileKind.CARD)
-    return source
+
+def method_option() -> Any:
+    """Declare the method of an identification."""
+    help = "paper, integral or likelihood."
+    return option(help, metavar="METHOD", default=DEFAULT_METHOD)
 
 
-TwinFile = Annotated[
-    Path,
-    typer.Argument(
-        metavar="TWIN",
-        help="Identified model: twin.toml, or the folder of 'identify -o'.",
-        callback=find_twin,
-    ),
-]
-LogFile = Annotated[
-    Path,
-    typer.Argument(
-        metavar="LOG", help="Shift log: CSV, MDF, MAT, Parquet, bus log.", callback=require_log
-    ),
-]
-VehicleFile = Annotated[
-    Path,
-    typer.Option(
-        "--vehicle",
-        metavar="CARD",
-        help="Vehicle card (TOML), as 'drivetwin card new' writes it.",
-        callback=require_card,
-    ),
-]
-OptionalCardFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--vehicle",
-        metavar="CARD",
-        help="Vehicle card (TOML), as 'drivetwin card new' writes it.",
-        callback=require_card,
-    ),
-]
-ModelFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--model", metavar="MODEL", help="Model file of 'drivetwin fit', in place of a card."
-    ),
-]
-OptionalVehicleFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--vehicle",
-        metavar="CARD",
-        help="Vehicle card, in place of that of the twin.",
-        callback=require_card,
-    ),
-]
-ChannelsFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--channels",
-        metavar="MAP",
-        help="Channel mapping file (TOML); without it channels.toml beside the log and the mapping "
-        "of the twin, if any.",
-    ),
-]
+class TwinInput(Request):
+    """A twin."""
+
+    twin: Path = argument(
+        "Identified model: twin.toml, or the folder of 'identify -o'.", "TWIN", role=FileRole.TWIN
+    )
+
+
+class CardInput(Request):
+    """The card of a vehicle, and the channel mapping of its logs."""
+
+    vehicle: Path = card_option(REQUIRED)
+    channels: Path | None = mapping_option()
+
+
+class LogInput(CardInput):
+    """A log with card and channel mapping."""
+
+    log: Path = log_argument()
+
+
+class TwinLogInput(TwinInput):
+    """A twin, and a log for use with it."""
+
+    log: Path = log_argument()
+    vehicle: Path | None = input_file(
+        "Vehicle card, in place of that of the twin.", "CARD", FileRole.CARD
+    )
+    channels: Path | None = mapping_option()
 
 
 def find_mapping(channels: Path | None, log: Path) -> Mapped:
@@ -145,7 +103,7 @@ def _load_twin_card(twin: Twin, vehicle: Path | None) -> VehicleCard:
 
 
 def read_twin_log(
-    twin: Twin, log: Path, vehicle: Path | None, channels: Path | None
+    twin: Twin, log: Path, vehicle: Path | None = None, channels: Path | None = None
 ) -> tuple[ShiftLog, VehicleCard]:
     """Read a log for use with a twin, and the card in the file `vehicle` or the twin's own.
 
@@ -160,13 +118,3 @@ def read_twin_log(
         recording = read_log(log, card, find_mapping(channels, log))
     show_findings(one for one in recording.findings if one.code in RECALLED)
     return recording, card
-
-
-def load_inputs(log: Path, vehicle: Path, channels: Path | None) -> tuple[ShiftLog, VehicleCard]:
-    """Read card, mapping and log for finding shifts; raises the typed errors of their readers."""
-    from drivetwin.channels.roles import FOR_SHIFTS
-    from drivetwin.logs.read import read_log
-    from drivetwin.vehicle.card import load_card
-
-    card = load_card(vehicle)
-    return read_log(log, card, find_mapping(channels, log), sound=FOR_SHIFTS), card

@@ -6,7 +6,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -64,6 +64,14 @@ def write_atomically(folder: Path) -> Iterator[Path]:
     finally:
         with defer_interrupts():
             shutil.rmtree(beside, ignore_errors=True)
+
+
+def write_texts(folder: Path, texts: Mapping[str, str]) -> tuple[Path, ...]:
+    """Write texts by file name into a folder, all or none; return their paths."""
+    with write_atomically(folder) as beside:
+        for name, text in texts.items():
+            (beside / name).write_text(text, encoding="utf-8", newline="\n")
+    return tuple(folder / name for name in texts)
 
 
 def _map_to_target(file: object, beside: Path, folder: Path) -> str | None:

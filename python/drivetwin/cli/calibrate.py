@@ -6,23 +6,22 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from drivetwin._util.request import REQUIRED, flag, input_file, option, output_folder
+from drivetwin.calibration.options import CalibrationOptions
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.cli.arguments import RESULT, TWIN, TwinFile
+from drivetwin.cli.arguments import RESULT, TWIN, TwinInput
 from drivetwin.cli.calibrate_logs import (
     correct_by_logs,
-    name_logs,
     print_correction,
     to_correction_document,
 )
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_findings,
     print_json,
@@ -31,7 +30,6 @@ from drivetwin.cli.output import (
     show_step,
     to_error_document,
 )
-from drivetwin.cli.outputs import Output, Shape
 from drivetwin.errors import (
     DrivetwinError,
     IdentificationError,
@@ -43,6 +41,7 @@ from drivetwin.errors import (
 if TYPE_CHECKING:
     from drivetwin.calibration.calibrate import Calibration
     from drivetwin.calibration.front import Front
+    from drivetwin.calibration.learn import Correction
     from drivetwin.calibration.operating_map import Grid, OperatingMap
     from drivetwin.calibration.twin_task import Request
     from drivetwin.files.stages_file import StagesFile
@@ -56,91 +55,40 @@ _RESUME = ".resume.json"
 """Ending of the file beside the output folder that has the stages of an interrupted calibration."""
 
 
-def calibrate(
-    twin: TwinFile,
-    shift: Annotated[
-        str, typer.Option("--shift", metavar="GEAR-GEAR", help="Shift to calibrate, such as 2-3.")
-    ],
-    output: Annotated[
-        Path,
-        Output(Shape.FOLDER),
-        typer.Option("-o", "--output", metavar="DIR", help="Folder for the results."),
-    ],
-    limits: Annotated[
-        Path | None,
-        typer.Option("--limits", metavar="FILE", help="Limits and spread (TOML)."),
-    ] = None,
-    engine_torque: Annotated[
-        float | None,
-        typer.Option("--engine-torque", metavar="NM", help="Engine torque at the shift request."),
-    ] = None,
-    engine_speed: Annotated[
-        float | None,
-        typer.Option("--engine-speed", metavar="RPM", help="Engine speed at the shift request."),
-    ] = None,
-    system_pressure: Annotated[
-        float | None,
-        typer.Option("--system-pressure", metavar="BAR", help="Pressure of a held element."),
-    ] = None,
-    wheel_radius: Annotated[
-        float, typer.Option("--wheel-radius", metavar="M", min=0.05, help="Dynamic tyre radius.")
-    ] = 0.5,
-    policy: Annotated[
-        PolicyKind,
-        typer.Option(
-            "--policy",
-            help=f"Unknowns: {PolicyKind.describe_all()}.",
-        ),
-    ] = PolicyKind.CONTROLLER,
-    task: Annotated[
-        float,
-        typer.Option("--task", metavar="S", min=1e-3, max=0.1, help="Controller task (slip)."),
-    ] = 0.01,
-    engine_lag: Annotated[
-        float,
-        typer.Option(
-            "--engine-lag", metavar="S", min=0.0, max=1.0, help="Lag of the engine torque (slip)."
-        ),
-    ] = 0.05,
-    start: Annotated[
-        Path | None,
-        typer.Option("--start", metavar="FILE", help="Earlier calibration.toml as the start."),
-    ] = None,
-    effort: Annotated[
-        float,
-        typer.Option("--effort", min=0.05, max=20.0, help="Factor on the length of the search."),
-    ] = 1.0,
-    draws: Annotated[
-        int, typer.Option("--draws", min=59, help="Number of fresh draws of the certificate.")
-    ] = 2000,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of draws and search.")] = 1,
-    front: Annotated[
-        bool, typer.Option("--front", help="Add the front of comfort, friction energy and time.")
-    ] = False,
-    grid: Annotated[
-        str | None,
-        typer.Option(
-            "--map",
-            metavar="GRID",
-            help="Grid of operating points, such as torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; "
-            "from, to, points).",
-        ),
-    ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Continue an interrupted calibration from DIR.resume.json."),
-    ] = False,
-    from_logs: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--from-logs",
-            metavar="LOG",
-            help="Log of the vehicle's shifts with an earlier calibration (may be repeated): it "
-            "corrects the twin. With --start the calibration is polished from there, not searched.",
-        ),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class CalibrationFiles(TwinInput):
+    """Shift, output folder and limits of a calibration."""
+
+    shift: str = option("Shift to calibrate, such as 2-3.", metavar="GEAR-GEAR", default=REQUIRED)
+    output: Path = output_folder("Folder for the results.", default=REQUIRED)
+    limits: Path | None = input_file("Limits and spread (TOML).")
+
+
+class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
+    """Arguments of `calibrate`."""
+
+    start: Path | None = input_file("Earlier calibration.toml as the start.")
+    effort: float = option(
+        "Factor on the length of the search.", minimum=0.05, maximum=20.0, default=1.0
+    )
+    draws: int = option("Number of fresh draws of the certificate.", minimum=59, default=2000)
+    front: bool = flag("Add the front of comfort, friction energy and time.", decides=False)
+    grid: str | None = option(
+        "Grid of operating points, such as torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; from, "
+        "to, points).",
+        "--map",
+        metavar="GRID",
+        decides=False,
+    )
+    resume: bool = flag("Continue an interrupted calibration from DIR.resume.json.", decides=False)
+    from_logs: tuple[Path, ...] = input_file(
+        "Log of the vehicle's shifts with an earlier calibration (may be repeated): it corrects "
+        "the twin. With --start the calibration is polished from there, not searched.",
+        metavar="LOG",
+        default=(),
+    )
+
+
+def calibrate(request: Calibrate, *, as_json: bool) -> None:
     """Find shift profiles with a small peak jerk over the spread of made units.
 
     Minimise the tail mean of peak jerk under limits, and certify the result on fresh draws. Write
@@ -149,52 +97,17 @@ def calibrate(
     Where a limit is out of reach, the best calibration found is written and the exit code is 2.
     """
     from drivetwin.calibration.identified_range import check_identified_range
-    from drivetwin.calibration.settings import CalibrationSettings
-    from drivetwin.calibration.twin_task import Hardware, Request
-    from drivetwin.cli.export import parse_gears
-    from drivetwin.files.limits_file import Requirements, load_limits
 
-    given = Requirements(()) if limits is None else load_limits(limits)
-    model = _load_valid_twin(twin)
-    gears, logs = parse_gears(shift), from_logs or []
-    correction = correct_by_logs(model, logs, gears, given.spread) if logs else None
+    model = _load_valid_twin(request.twin)
+    task, correction = _build_request(request, model)
     model = model if correction is None else correction.twin
-    settings = CalibrationSettings(certificate_draws=draws).scale_effort(effort)
-    warm = correction is not None and start is not None
-    request = Request(
-        gears=gears,
-        wheel_radius=wheel_radius,
-        engine_torque=engine_torque,
-        engine_speed=None if engine_speed is None else engine_speed * math.pi / 30.0,
-        system_pressure=None if system_pressure is None else system_pressure * 1e5,
-        policy=policy,
-        hardware=Hardware(task, engine_lag),
-        limits=given.limits or None,
-        spread=given.spread,
-        start=_load_start(start, policy),
-        seed=seed,
-        settings=replace(settings, starts=0) if warm else settings,
-    )
-    named = {
-        "shift": shift,
-        "engine torque": repr(engine_torque),
-        "engine speed": repr(engine_speed),
-        "system pressure": repr(system_pressure),
-        "wheel radius": repr(wheel_radius),
-        "policy": policy.value,
-        "task": repr(task),
-        "engine lag": repr(engine_lag),
-        "effort": repr(effort),
-        "number of draws": str(draws),
-        "seed": str(seed),
-    }
-    files = {"twin": twin, "limits": limits, "start": start, **name_logs(logs)}
-    stages = _open_stages(output, files, named, resume)
-    results = _calibrate(model, request, (grid, front), stages)
+    output, sources = request.output, (request.twin, *request.from_logs)
+    stages = _open_stages(request)
+    results = _calibrate(model, task, (request.grid, request.front), stages)
     found = results[0]
     findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
     with show_step(f"writing {output}"):
-        _write_results(output, results, findings, (model, request, (twin, *logs)))
+        _write_results(output, results, findings, (model, task, sources))
     stages.remove()
     infeasible = _find_excess(found, output)
     if as_json:
@@ -224,21 +137,43 @@ def _find_excess(found: Calibration, output: Path) -> DrivetwinError | None:
     return None
 
 
-def _open_stages(
-    output: Path, files: Mapping[str, Path | None], named: Mapping[str, str], resume: bool
-) -> StagesFile:
+def _build_request(request: Calibrate, twin: Twin) -> tuple[Request, Correction | None]:
+    """Build the task from options and files; correct the twin by logs if there are any."""
+    from drivetwin.calibration.settings import CalibrationSettings
+    from drivetwin.calibration.twin_task import Request
+    from drivetwin.cli.export import parse_gears
+    from drivetwin.files.limits_file import Requirements, load_limits
+
+    given = Requirements(()) if request.limits is None else load_limits(request.limits)
+    gears, logs = parse_gears(request.shift), request.from_logs
+    correction = correct_by_logs(twin, logs, gears, given.spread) if logs else None
+    settings = CalibrationSettings(certificate_draws=request.draws).scale_effort(request.effort)
+    task = Request(
+        **request.select(CalibrationOptions),
+        gears=gears,
+        limits=given.limits or None,
+        spread=given.spread,
+        start=_load_start(request.start, request.policy),
+        settings=replace(settings, starts=0) if logs and request.start else settings,
+    )
+    return task, correction
+
+
+def _open_stages(request: Calibrate) -> StagesFile:
     """Open the store of finished stages beside the output folder."""
     from drivetwin._util.version import get_program_version
     from drivetwin.files.calibration_file import hash_file
     from drivetwin.files.stages_file import StagesFile, resume_stages
 
     contents = {
-        f"{name} file": "" if path is None else hash_file(path) for name, path in files.items()
+        f"{name} file": "" if path is None else hash_file(path)
+        for name, path in request.list_files().items()
     }
-    inputs = {**contents, **named, "program version": get_program_version()}
-    whole = output.resolve()
+    version = {"program version": get_program_version()}
+    inputs = {**contents, **request.describe_settings(), **version}
+    whole = request.output.resolve()
     path = whole.parent / f"{whole.name}{_RESUME}"
-    return resume_stages(path, inputs) if resume else StagesFile(path, inputs)
+    return resume_stages(path, inputs) if request.resume else StagesFile(path, inputs)
 
 
 def _calibrate(

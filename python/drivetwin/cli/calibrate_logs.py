@@ -40,7 +40,7 @@ def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[Logg
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.logged_shift import LoggedShift
 
-    log, card = read_twin_log(twin, path, None, None)
+    log, card = read_twin_log(twin, path)
     if set(log.inputs.values()) & set(twin.inputs.values()):
         raise InputError(
             f"the twin {twin.name!r} contains this log already",
@@ -57,11 +57,6 @@ def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[Logg
             Where(file=str(path)),
         )
     return [LoggedShift(log, one) for one in chosen]
-
-
-def name_logs(logs: Sequence[Path]) -> dict[str, Path]:
-    """Name the logs in their order."""
-    return {f"log {number}": path for number, path in enumerate(logs, 1)}
 
 
 def print_correction(found: Correction | None) -> None:

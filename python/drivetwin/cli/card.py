@@ -5,15 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, find_mapping
+from drivetwin._util.request import Request, argument, flag
+from drivetwin.cli.arguments import find_mapping, mapping_option
 from drivetwin.cli.card_new import new
 from drivetwin.cli.command_group import CommandGroup
 from drivetwin.cli.output import (
-    JsonFlag,
     print_findings,
     print_json,
     print_line,
@@ -31,18 +31,18 @@ IMPLAUSIBLE = 3
 """Exit code of a card with findings, with --strict."""
 
 
-def check(
-    card_file: Annotated[Path, typer.Argument(metavar="CARD", help="Vehicle card (TOML).")],
-    log: Annotated[
-        Path | None,
-        typer.Argument(metavar="LOG", help="Log of the vehicle: CSV, MDF, MAT, Parquet, bus log."),
-    ] = None,
-    channels: ChannelsFile = None,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Exit with code 3 if an entry is implausible.")
-    ] = False,
-    as_json: JsonFlag = False,
-) -> None:
+class CheckCard(Request, command="card check"):
+    """Arguments of `card check`."""
+
+    card_file: Path = argument("Vehicle card (TOML).", "CARD")
+    log: Path | None = argument(
+        "Log of the vehicle: CSV, MDF, MAT, Parquet, bus log.", "LOG", default=None
+    )
+    channels: Path | None = mapping_option()
+    strict: bool = flag("Exit with code 3 if an entry is implausible.")
+
+
+def check(request: CheckCard, *, as_json: bool) -> None:
     """Report implausible entries of a vehicle card, before an identification.
 
     Each finding names the entry, its value, the value or range expected, the reason and the remedy.
@@ -54,23 +54,23 @@ def check(
     from drivetwin.vehicle.card import load_card
 
     try:
-        vehicle = load_card(card_file)
+        vehicle = load_card(request.card_file)
     except CardError as fault:
-        fault.remedy += _describe_ratios(log, channels)
+        fault.remedy += _describe_ratios(request.log, request.channels)
         raise
-    findings, refusal = _compare(vehicle, log, channels)
+    findings, refusal = _compare(vehicle, request.log, request.channels)
     warnings = select_warnings(findings)
     if as_json:
         error = None if refusal is None else to_error_document(refusal)["error"]
         print_json({"findings": dump_findings(findings), "refusal": error})
     else:
         print_findings(findings)
-        print_line(f"{card_file}: {_count_findings(findings)}")
+        print_line(f"{request.card_file}: {_count_findings(findings)}")
         if refusal is not None:
             show_error(refusal, as_json=False)
     if refusal is not None:
         raise typer.Exit(refusal.exit_code)
-    if strict and warnings:
+    if request.strict and warnings:
         raise typer.Exit(IMPLAUSIBLE)
 
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from drivetwin.cli.arguments import ChannelsFile, find_mapping
+from drivetwin._util.outputs import Output
+from drivetwin._util.request import REQUIRED, Request, flag, option, spell_option
+from drivetwin.cli.arguments import find_mapping, mapping_option
 from drivetwin.cli.output import (
-    JsonFlag,
     print_findings,
     print_json,
     print_line,
     print_paragraph,
     show_step,
 )
-from drivetwin.cli.outputs import Output
 from drivetwin.errors import InputError, Where
 
 if TYPE_CHECKING:
@@ -28,99 +26,73 @@ if TYPE_CHECKING:
     from drivetwin.findings import Finding
 
 
-def new(
-    output: Annotated[
-        Path,
-        Output(),
-        typer.Option("-o", "--output", metavar="CARD.toml", help="File of the new card."),
-    ],
-    from_log: Annotated[
-        Path | None,
-        typer.Option("--from", metavar="LOG", help="Log of the vehicle; its data fill in entries."),
-    ] = None,
-    channels: ChannelsFile = None,
-    draft: Annotated[
-        bool,
-        typer.Option(
-            "--draft", help="Ask no questions: mark guesses, leave open entries as comments."
-        ),
-    ] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing card.")] = False,
-    name: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Name of the vehicle; default: name of the file."),
-    ] = None,
-    gearbox: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="Built-in gearbox (listed by 'drivetwin gearbox'), or none."
-        ),
-    ] = None,
-    ratios: Annotated[
-        str | None,
-        typer.Option(metavar="LOW,...,HIGH", help="Ratios of the gears, in falling order."),
-    ] = None,
-    gears: Annotated[
-        str | None, typer.Option(metavar="NAME,...", help="Names of the gears, from low to high.")
-    ] = None,
-    elements: Annotated[
-        str | None, typer.Option(metavar="NAME,...", help="Shift element engaged in each gear.")
-    ] = None,
-    element: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="[NAME:]KEY=VALUE,...",
-            help="Data of a shift element, or of all without NAME; repeatable. Keys: kind, P0_bar, "
-            "P0_std_bar, gain_m3 or surfaces, derating, area_m2 (or piston_outer_mm, "
-            "piston_inner_mm), radius_m (or outer_mm, inner_mm), of a clutch i_c, i_out; "
-            "drum_inertia_kgm2, peak.",
-        ),
-    ] = None,
-    input_gear: Annotated[
-        str | None, typer.Option(metavar="RATIO", help="Ratio of the input gear; default: 1.")
-    ] = None,
-    final_drive: Annotated[
-        str | None, typer.Option(metavar="RATIO", help="Ratio of the final drive.")
-    ] = None,
-    converter: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NU:MU:TORQUE,...",
-            help="Map of the torque converter: speed ratio, torque ratio and pump torque at "
-            "1000 rpm [N·m] of each point.",
-        ),
-    ] = None,
-    engine_inertia: Annotated[
-        str | None,
-        typer.Option(metavar="LOW..HIGH", help="Range of the inertia J′ at the engine [kg·m²]."),
-    ] = None,
-    mass: Annotated[
-        str | None, typer.Option(metavar="KG", help="Mass of the vehicle, or LOW..HIGH [kg].")
-    ] = None,
-    wheel_radius: Annotated[
-        str | None, typer.Option(metavar="M", help="Radius of the driven wheels [m].")
-    ] = None,
-    vehicle_inertia: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LOW..HIGH", help="Inertia at the wheel, in place of the mass [kg·m²]."
-        ),
-    ] = None,
-    output_inertia: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VALUE+-STD", help="Inertia of the output side before the shaft [kg·m²]."
-        ),
-    ] = None,
-    sensor: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="ROLE=CLASS[:RANGE]",
-            help="Sensor class of a channel role, or of 'pressure'; repeatable.",
-        ),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class NewCardFiles(Request):
+    """Files of `card new`."""
+
+    output: Path = option(
+        "File of the new card.",
+        "-o",
+        "--output",
+        metavar="CARD.toml",
+        output=Output(),
+        default=REQUIRED,
+    )
+    from_log: Path | None = option(
+        "Log of the vehicle; its data fill in entries.", "--from", metavar="LOG"
+    )
+    channels: Path | None = mapping_option()
+    draft: bool = flag("Ask no questions: mark guesses, leave open entries as comments.")
+    force: bool = flag("Replace an existing card.")
+
+
+class CardEntries(Request):
+    """Entries of a card as texts."""
+
+    name: str | None = option("Name of the vehicle; default: name of the file.", metavar="NAME")
+    gearbox: str | None = option(
+        "Built-in gearbox (listed by 'drivetwin gearbox'), or none.", metavar="NAME"
+    )
+    ratios: str | None = option("Ratios of the gears, in falling order.", metavar="LOW,...,HIGH")
+    gears: str | None = option("Names of the gears, from low to high.", metavar="NAME,...")
+    elements: str | None = option("Shift element engaged in each gear.", metavar="NAME,...")
+    element: tuple[str, ...] = option(
+        "Data of a shift element, or of all without NAME; repeatable. Keys: kind, P0_bar, "
+        "P0_std_bar, gain_m3 or surfaces, derating, area_m2 (or piston_outer_mm, "
+        "piston_inner_mm), radius_m (or outer_mm, inner_mm), of a clutch i_c, i_out; "
+        "drum_inertia_kgm2, peak.",
+        metavar="[NAME:]KEY=VALUE,...",
+        default=(),
+    )
+    input_gear: str | None = option("Ratio of the input gear; default: 1.", metavar="RATIO")
+    final_drive: str | None = option("Ratio of the final drive.", metavar="RATIO")
+    converter: str | None = option(
+        "Map of the torque converter: speed ratio, torque ratio and pump torque at 1000 rpm [N·m] "
+        "of each point.",
+        metavar="NU:MU:TORQUE,...",
+    )
+    engine_inertia: str | None = option(
+        "Range of the inertia J′ at the engine [kg·m²].", metavar="LOW..HIGH"
+    )
+    mass: str | None = option("Mass of the vehicle, or LOW..HIGH [kg].", metavar="KG")
+    wheel_radius: str | None = option("Radius of the driven wheels [m].", metavar="M")
+    vehicle_inertia: str | None = option(
+        "Inertia at the wheel, in place of the mass [kg·m²].", metavar="LOW..HIGH"
+    )
+    output_inertia: str | None = option(
+        "Inertia of the output side before the shaft [kg·m²].", metavar="VALUE+-STD"
+    )
+    sensor: tuple[str, ...] = option(
+        "Sensor class of a channel role, or of 'pressure'; repeatable.",
+        metavar="ROLE=CLASS[:RANGE]",
+        default=(),
+    )
+
+
+class NewCard(CardEntries, NewCardFiles, command="card new"):
+    """Arguments of `card new`."""
+
+
+def new(request: NewCard, *, as_json: bool) -> None:
     """Write a vehicle card by questions in a terminal, or from options.
 
     With --from LOG, entries are estimated from the log. Without a terminal, or with --draft, the
@@ -134,23 +106,18 @@ def new(
     from drivetwin.authoring.session import Session
     from drivetwin.files.records import dump_findings
 
-    _refuse_existing(output, force=force)
-    single = {
-        "--name": name, "--gearbox": gearbox, "--ratios": ratios, "--gears": gears,
-        "--elements": elements, "--input-gear": input_gear, "--final-drive": final_drive,
-        "--engine-inertia": engine_inertia, "--vehicle-inertia": vehicle_inertia, "--mass": mass,
-        "--wheel-radius": wheel_radius, "--output-inertia": output_inertia,
-        "--converter": converter,
-    }  # fmt: skip
-    given = {option: text for option, text in single.items() if text is not None}
-    survey = None if from_log is None else _survey(from_log, channels)
+    output, from_log = request.output, request.from_log
+    _refuse_existing(output, force=request.force)
+    entries = request.select(CardEntries)
+    given = {spell_option(name): one for name, one in entries.items() if isinstance(one, str)}
+    survey = None if from_log is None else _survey(from_log, request.channels)
     sources = Sources(_make_default_name(output), survey)
     if survey is not None and survey.remark and not as_json:
         print_paragraph(f"{survey.name} gives no ratios: {survey.remark}")
-    options = CardOptions(given, element or (), sensor or ())
+    options = CardOptions(given, request.element, request.sensor)
     session = Session(parse_options(options, sources), sources)
     can_ask = has_terminal() and not as_json
-    is_draft = draft or (from_log is not None and not can_ask)
+    is_draft = request.draft or (from_log is not None and not can_ask)
     if is_draft:
         session.fill_draft()
     elif can_ask:
@@ -161,7 +128,7 @@ def new(
     text = format_card(session.answers, survey, session.estimates, draft=is_draft)
     if not session.list_open():
         refuse_faults(text, str(output))
-    _refuse_existing(output, force=force)
+    _refuse_existing(output, force=request.force)
     write_text(output, text)
     findings = () if session.list_open() else _check(output)
     if as_json:

@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperGroup
 
 from drivetwin._util.visible_text import escape_line
-from drivetwin.cli.inputs import protect_inputs
+from drivetwin.cli.options import bind_command
 
 WRONG_USAGE = 2
 """Exit code of a call without a command."""
@@ -86,7 +86,7 @@ def build_command(name: str, entry: Entry) -> Any:
     if isinstance(entry, CommandGroup):
         return entry
     single = typer.Typer(add_completion=False, **PLAIN)
-    single.command(name)(protect_inputs(entry))
+    single.command(name)(bind_command(entry))
     command = typer.main.get_command(single)
     for parameter in command.params:
         vars(parameter)["display_type"] = lambda *_, one=parameter: _describe_type(one)

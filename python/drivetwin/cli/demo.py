@@ -3,58 +3,59 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Any
 
-import typer
-
+from drivetwin._util.request import output_folder
+from drivetwin.cli.arguments import REPORT
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_json,
     print_line,
     print_paragraph,
     print_table,
 )
-from drivetwin.cli.outputs import Output, Shape
-from drivetwin.cli.synth import NoiseOption, ScenarioOption, SeedOption
+from drivetwin.cli.synth import Bench
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from drivetwin.cli.comparison import Row
+    from drivetwin.dyno.truth import Truth
+    from drivetwin.estimation.identification import Identification
 
 _METHODS = (DEFAULT_METHOD, Method.PAPER)
+_SLIPS = (10.0, 30.0, 50.0, 80.0)
+"""Slips [rad/s] at which friction coefficients are compared."""
 
 
-def demo(
-    output: Annotated[
-        Path,
-        Output(Shape.FOLDER),
-        typer.Option("-o", "--output", metavar="DIR", help="Folder for all files."),
-    ] = Path("drivetwin-demo"),
-    scenario: ScenarioOption = ScenarioName.PAPER_STEPS,
-    seed: SeedOption = 0,
-    noise: NoiseOption = 1.0,
-    as_json: JsonFlag = False,
-) -> None:
+class Demonstrate(Bench, command="demo"):
+    """Arguments of `demo`."""
+
+    output: Path = output_folder("Folder for all files.", default=Path("drivetwin-demo"))
+
+
+def demo(request: Demonstrate, *, as_json: bool) -> None:
     """Identify a synthetic log with known truth by two methods, and compare."""
-    from drivetwin.cli.arguments import REPORT
-    from drivetwin.cli.comparison import compare
-    from drivetwin.cli.identify_run import Request, run_identification, write_outcome
+    from drivetwin.cli.identify_run import IdentifyOptions, run_identification, write_outcome
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run as run_dyno
     from drivetwin.dyno.scenario_file import load_scenario
 
-    bench = run_dyno(load_scenario(scenario), seed, noise=noise)
+    scenario, output = request.scenario, request.output
+    bench = run_dyno(load_scenario(scenario), request.seed, noise=request.noise)
     log, card, _ = write_run(output / f"{scenario}.csv", bench)
-    outcomes = {method: run_identification(log, Request(card, None, method)) for method in _METHODS}
+    outcomes = {
+        method: run_identification(log, IdentifyOptions(vehicle=card, method=method))
+        for method in _METHODS
+    }
     for method, outcome in outcomes.items():
         write_outcome(outcome, output / method)
     found = {method: outcome.found for method, outcome in outcomes.items()}
-    rows = compare(bench.truth, found)
+    rows = _compare(bench.truth, found)
     report = output / DEFAULT_METHOD / REPORT
     if as_json:
         print_json(
@@ -69,7 +70,84 @@ def demo(
     print_line(f"report: {report}")
 
 
-def _build_table(rows: list[Row], scenario: ScenarioName) -> Table:
+@dataclass(frozen=True)
+class _Found:
+    """Value and total 95 % interval of one method; None if not estimated."""
+
+    value: float | None = None
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One quantity: id, true value, what each method found, SI unit."""
+
+    id: str
+    truth: float
+    found: Mapping[Method, _Found]
+    unit: str
+
+    def to_document(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "id": self.id,
+            "truth": self.truth,
+            "unit": self.unit,
+            **{
+                method.value: {"value": one.value, "ci95_total": one.interval}
+                for method, one in self.found.items()
+            },
+        }
+
+
+def _compare(truth: Truth, found: Mapping[Method, Identification]) -> list[_Row]:
+    """Rows for all true parameters that some method answers, then friction over slip."""
+    import numpy as np
+
+    from drivetwin.parameters import get_parameter_spec
+
+    rows = [
+        _Row(
+            key,
+            value,
+            {m: _get_estimate(one, key) for m, one in found.items()},
+            get_parameter_spec(key).unit,
+        )
+        for key, value in truth.parameters.items()
+        if any(key in one.estimates for one in found.values())
+    ]
+    for element, law in truth.friction.items():
+        for slip in _SLIPS:
+            points = {method: _get_friction(one, element, slip) for method, one in found.items()}
+            if any(point.value is not None for point in points.values()):
+                rows.append(
+                    _Row(
+                        f"mu.{element} @{slip:g}", float(law.evaluate(np.array(slip))), points, "1"
+                    )
+                )
+    return rows
+
+
+def _get_estimate(found: Identification, key: str) -> _Found:
+    estimate = found.estimates.get(key)
+    return _Found() if estimate is None else _Found(estimate.value, estimate.ci95_total)
+
+
+def _get_friction(found: Identification, element: str, slip: float) -> _Found:
+    """The curve of an element at one slip; nothing outside the slip range seen."""
+    import numpy as np
+
+    curve = found.friction.get(element)
+    if curve is None or not curve.slip[0] <= slip <= curve.slip[-1]:
+        return _Found()
+    mu, low, high = (
+        float(np.interp(slip, curve.slip, values))
+        for values in (curve.mu, curve.mu_lo, curve.mu_hi)
+    )
+    return _Found(mu, (low, high) if np.isfinite(high - low) else None)
+
+
+def _build_table(rows: list[_Row], scenario: ScenarioName) -> Table:
     """Truth, and value, interval and deviation of both methods."""
     from drivetwin.cli.numbers import format_deviation, format_estimate
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
+from drivetwin._util.request import Request, argument, option, output_folder
+from drivetwin.cli.arguments import GEARBOX_HELP
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_json,
     print_line,
@@ -18,7 +17,6 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
-from drivetwin.cli.outputs import Output, Shape
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -36,29 +34,22 @@ class Course(StrEnum):
     ALL_KINDS = "all_kinds"
 
 
-def drive(
-    card: Annotated[
-        str,
-        typer.Argument(metavar="CARD", help="Gearbox card (TOML), or name of a built-in gearbox."),
-    ] = "three-set-4000cr",
-    course: Annotated[
-        Course,
-        typer.Option(
-            help="launch: standstill to the highest gear under power; all_kinds: the same, then "
-            "kick-down, up-shift with closed pedal, coast-down to first gear."
-        ),
-    ] = Course.ALL_KINDS,
-    powertrain: Annotated[
-        str | None,
-        typer.Option(metavar="FILE", help="Powertrain file (TOML), or name of a built-in one."),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        Output(Shape.FOLDER),
-        typer.Option("-o", "--output", metavar="DIR", help=f"Folder for {FIGURE} and {TRACES}."),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class Drive(Request, command="drive"):
+    """Arguments of `drive`."""
+
+    card: str = argument(GEARBOX_HELP, "CARD", default="three-set-4000cr")
+    course: Course = option(
+        "launch: standstill to the highest gear under power; all_kinds: the same, then kick-down, "
+        "up-shift with closed pedal, coast-down to first gear.",
+        default=Course.ALL_KINDS,
+    )
+    powertrain: str | None = option(
+        "Powertrain file (TOML), or name of a built-in one.", metavar="FILE"
+    )
+    output: Path | None = output_folder(f"Folder for {FIGURE} and {TRACES}.")
+
+
+def drive(request: Drive, *, as_json: bool) -> None:
     """Simulate a drive from standstill with converter, lock-up and all kinds of shift.
 
     Print a table of all shifts: start, duration of slip at the input, friction work and peak power
@@ -74,20 +65,18 @@ def drive(
     )
     from drivetwin.gearbox import load_gearbox
 
-    box = load_gearbox(card)
-    chosen = load_powertrain(powertrain or select_powertrain(box))
-    plan = {Course.LAUNCH: plan_launch, Course.ALL_KINDS: plan_all_shift_kinds}[course](
-        box, chosen.control
-    )
+    box = load_gearbox(request.card)
+    chosen = load_powertrain(request.powertrain or select_powertrain(box))
+    plans = {Course.LAUNCH: plan_launch, Course.ALL_KINDS: plan_all_shift_kinds}
+    plan = plans[request.course](box, chosen.control)
+    title = f"{box.name}, {chosen.name}"
     with show_step(f"driving {box.name}"):
         motion = run(box, chosen, plan)
-        files = (
-            () if output is None else _write_outputs(output, motion, f"{box.name}, {chosen.name}")
-        )
+        files = _write_outputs(request.output, motion, title) if request.output else ()
     if as_json:
         print_json(_to_document(motion) | {"gearbox": box.name, "powertrain": chosen.name})
         return
-    print_table(_build_shift_table(motion, f"{box.name}, {chosen.name}"))
+    print_table(_build_shift_table(motion, title))
     print_table(_build_energy_table(motion))
     for warning in motion.warnings:
         print_paragraph(f"warning: {warning}")
@@ -97,14 +86,11 @@ def drive(
 
 def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
     """Write figure and traces, both or none."""
-    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.cli.atomic_outputs import write_texts
     from drivetwin.report.drive import format_traces, render_drive
 
     texts = {FIGURE: render_drive(motion, title), TRACES: format_traces(motion)}
-    with write_atomically(folder) as place:
-        for name, text in texts.items():
-            (place / name).write_text(text, encoding="utf-8", newline="\n")
-    return tuple(folder / name for name in texts)
+    return write_texts(folder, texts)
 
 
 def _build_shift_table(motion: DriveRun, title: str) -> Table:

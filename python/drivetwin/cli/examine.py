@@ -4,17 +4,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from drivetwin.cli.arguments import ChannelsFile, LogFile, ModelFile, OptionalCardFile
+from drivetwin._util.request import Request, flag, input_file, option, output_folder
+from drivetwin.cli.arguments import card_option, log_argument, mapping_option
 from drivetwin.cli.numbers import format_estimate, format_half_width
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_json,
     print_line,
@@ -22,7 +20,6 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
-from drivetwin.cli.outputs import Output, Shape
 from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.parameters import get_parameter_spec
@@ -35,51 +32,37 @@ if TYPE_CHECKING:
     from drivetwin.estimation.analysis.friction_dependence import Departure
     from drivetwin.estimation.analysis.profile_likelihood import Profile
     from drivetwin.estimation.result.estimate import Estimate
+    from drivetwin.fit.examine import Improvement
     from drivetwin.twin.twin import Twin
 
 SUGGESTIONS, BOOTSTRAP = "suggestions.json", "bootstrap.json"
 FRICTION, DEPARTURES = "friction.json", "departures.json"
 
 
-def examine(
-    log: LogFile,
-    vehicle: OptionalCardFile = None,
-    model: ModelFile = None,
-    channels: ChannelsFile = None,
-    profile: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PARAMETER",
-            help="Compute the profile likelihood of a parameter, such as J_out.",
-        ),
-    ] = None,
-    bootstrap: Annotated[
-        int,
-        typer.Option(
-            min=0, metavar="N", help="Fit N logs simulated from the fit with other noise."
-        ),
-    ] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap's noise.")] = 0,
-    friction: Annotated[
-        FrictionShape | None,
-        typer.Option(
-            help="Estimate friction over slip as a curve of this shape instead of the Stribeck law."
-        ),
-    ] = None,
-    departures: Annotated[
-        bool,
-        typer.Option(
-            "--departures",
-            help="Estimate drag of the open clutches, and friction over pressure.",
-        ),
-    ] = False,
-    output: Annotated[
-        Path | None,
-        Output(Shape.FOLDER),
-        typer.Option("-o", "--output", metavar="DIR", help="Folder for the files."),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class Examine(Request, command="examine"):
+    """Arguments of `examine`."""
+
+    log: Path = log_argument()
+    vehicle: Path | None = card_option()
+    model: Path | None = input_file("Model file of 'drivetwin fit', in place of a card.", "MODEL")
+    channels: Path | None = mapping_option()
+    profile: tuple[str, ...] = option(
+        "Compute the profile likelihood of a parameter, such as J_out.",
+        metavar="PARAMETER",
+        default=(),
+    )
+    bootstrap: int = option(
+        "Fit N logs simulated from the fit with other noise.", metavar="N", minimum=0, default=0
+    )
+    seed: int = option("Seed of the bootstrap's noise.", minimum=0, default=0)
+    friction: FrictionShape | None = option(
+        "Estimate friction over slip as a curve of this shape instead of the Stribeck law."
+    )
+    departures: bool = flag("Estimate drag of the open clutches, and friction over pressure.")
+    output: Path | None = output_folder("Folder for the files.")
+
+
+def examine(request: Examine, *, as_json: bool) -> None:
     """Recommend the test that reduces parameter uncertainty most, and test the intervals.
 
     The log is first identified by the likelihood method. The command lists the experiments that
@@ -88,21 +71,19 @@ def examine(
     with a twin, and departures from the friction law. With a model file the log is fitted as by
     'drivetwin fit', and all but the last two apply.
     """
-    from drivetwin.cli.examine_fit import examine_fit
-    from drivetwin.cli.identify_run import Request, run_identification
-    from drivetwin.estimation.result.method import Method
+    from drivetwin.cli.identify_run import IdentifyOptions, run_identification
 
-    asked = Asked(tuple(profile or ()), bootstrap, seed, friction, departures)
-    if model is not None and vehicle is None:
-        answers = list(examine_fit(log, model, asked))
-    elif vehicle is None or model is not None:
+    if request.model is not None and request.vehicle is None:
+        answers = list(_iterate_fit_answers(request.model, request))
+    elif request.vehicle is None or request.model is not None:
         raise InputError("name what the log is of", "give --vehicle CARD or --model MODEL")
     else:
-        for name in asked.profiles:
+        for name in request.profile:
             get_parameter_spec(name)
-        outcome = run_identification(log, Request(vehicle, channels, Method.LIKELIHOOD))
-        answers = list(_iterate_answers(outcome, asked))
-    files = () if output is None else _write_outputs(output, answers)
+        how = IdentifyOptions(vehicle=request.vehicle, channels=request.channels)
+        outcome = run_identification(request.log, how)
+        answers = list(_iterate_answers(outcome, request))
+    files = () if request.output is None else _write_outputs(request.output, answers)
     if as_json:
         print_json({one.file: json.loads(one.text) for one in answers})
         return
@@ -112,17 +93,6 @@ def examine(
             print_paragraph(note)
     for file in files:
         print_line(f"wrote {file}")
-
-
-@dataclass(frozen=True)
-class Asked:
-    """Analyses requested in addition to the experiments."""
-
-    profiles: tuple[str, ...]
-    bootstrap: int
-    seed: int
-    friction: FrictionShape | None
-    departures: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +106,7 @@ class Answer:
     notes: Sequence[str] = ()
 
 
-def _iterate_answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
+def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
     """Every answer, in the order in which they are printed."""
     from drivetwin.cli.tables import build_suggestion_table, list_limits
     from drivetwin.estimation.analysis.bootstrap import bootstrap
@@ -154,25 +124,10 @@ def _iterate_answers(outcome: Outcome, asked: Asked) -> Iterator[Answer]:
         build_suggestion_table(suggestions, found.estimates),
         notes=list_limits(suggestions),
     )
-    for name in asked.profiles:
-        with show_step(f"profile likelihood of {name}"):
-            one = compute_profile(found, name)
-        yield Answer(
-            f"profile.{name}.json",
-            analysis_files.format_profile(one, found.estimates[name].unit),
-            build_profile_table(one, found.estimates[name].unit),
-        )
-    if asked.bootstrap:
-        with show_step(f"bootstrap of {asked.bootstrap} fits"):
-            refits = bootstrap(found, asked.bootstrap, asked.seed)
-        yield Answer(
-            BOOTSTRAP,
-            analysis_files.format_bootstrap(refits, get_units(found.estimates)),
-            build_bootstrap_table(refits, found.estimates),
-        )
-    if asked.friction is not None:
-        yield _identify_friction(outcome, asked.friction)
-    if asked.departures:
+    yield from _iterate_interval_answers(found, request, compute_profile, bootstrap)
+    if request.friction is not None:
+        yield _identify_friction(outcome, request.friction)
+    if request.departures:
         with show_step("looking for what departs from the friction law"):
             seen = estimate_departures(found)
         yield Answer(
@@ -215,12 +170,7 @@ def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     return tuple(folder / name for name in names)
 
 
-def get_units(estimates: Mapping[str, Estimate]) -> dict[str, str]:
-    """Return the SI unit of each estimate by id."""
-    return {name: one.unit for name, one in estimates.items()}
-
-
-def build_profile_table(one: Profile, unit: str) -> Table:
+def _build_profile_table(one: Profile, unit: str) -> Table:
     """Build the table of both intervals of a profile."""
     table = make_table(
         f"Profile likelihood of {one.parameter}", "interval (noise)", "from", "to", "unit",
@@ -235,7 +185,7 @@ def build_profile_table(one: Profile, unit: str) -> Table:
     return table
 
 
-def build_bootstrap_table(one: Bootstrap, estimates: Mapping[str, Estimate]) -> Table:
+def _build_bootstrap_table(one: Bootstrap, estimates: Mapping[str, Estimate]) -> Table:
     """Build the table of the spreads by covariance and by bootstrap."""
     from drivetwin.estimation.result.estimate import Z95
 
@@ -268,4 +218,68 @@ def _build_departure_table(found: tuple[Departure, ...]) -> Table:
     for one in found:
         value, half = f"{one.value:.2g}", f"{Z95 * one.std:.1g}"
         table.add_row(one.element, one.kind, value, half, UNITS[one.kind], one.text)
+    return table
+
+
+def _iterate_fit_answers(model: Path, request: Examine) -> Iterator[Answer]:
+    """Fit a model to a log, and yield every answer in the order in which they are printed."""
+    from drivetwin.files import analysis_files
+    from drivetwin.fit.examine import bootstrap, compute_profile, rank_improvements
+    from drivetwin.fit.fit import fit_network
+    from drivetwin.fit.model_file import read_model
+    from drivetwin.fit.read import read_recording
+
+    network, channels = read_model(model)
+    with show_step(f"fitting {network.name}"):
+        found = fit_network(
+            network, [read_recording(request.log, network, channels)[0]], seed=request.seed
+        )
+    units = {name: one.unit for name, one in found.estimates.items()}
+    improvements = rank_improvements(found)
+    yield Answer(
+        SUGGESTIONS,
+        analysis_files.format_improvements(improvements, units),
+        _build_improvement_table(improvements, units),
+    )
+    yield from _iterate_interval_answers(found, request, compute_profile, bootstrap)
+
+
+def _iterate_interval_answers(
+    found: Any,
+    request: Examine,
+    compute_profile: Callable[[Any, str], Profile],
+    bootstrap: Callable[[Any, int, int], Bootstrap],
+) -> Iterator[Answer]:
+    """Yield profiles and bootstrap of a fit, by the functions for its kind of model."""
+    from drivetwin.files import analysis_files
+
+    units = {name: one.unit for name, one in found.estimates.items()}
+    for name in request.profile:
+        with show_step(f"profile likelihood of {name}"):
+            one = compute_profile(found, name)
+        text = analysis_files.format_profile(one, units[name])
+        yield Answer(f"profile.{name}.json", text, _build_profile_table(one, units[name]))
+    if request.bootstrap:
+        with show_step(f"bootstrap of {request.bootstrap} fits"):
+            refits = bootstrap(found, request.bootstrap, request.seed)
+        text = analysis_files.format_bootstrap(refits, units)
+        yield Answer(BOOTSTRAP, text, _build_bootstrap_table(refits, found.estimates))
+
+
+def _build_improvement_table(found: Sequence[Improvement], units: Mapping[str, str]) -> Table:
+    from drivetwin.fit.examine import REPEATS
+
+    repeated = f"{REPEATS} recordings"
+    numbers = ("now", repeated, "then")
+    table = make_table(
+        "Narrower intervals", "unknown", "now", repeated, "or exact", "then", "unit", right=numbers
+    )
+    for one in found:
+        unit = units[one.unknown]
+        now, several, then = (
+            format_half_width(width, unit) for width in (one.now, one.repeated, one.then)
+        )
+        known = (one.known, then) if one.known else ("–", "")
+        shown = format_estimate(None, None, unit)[2]
+        table.add_row(one.unknown, now, several, *known, shown)
     return table

@@ -6,13 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from drivetwin.cli.arguments import require_logs
+from drivetwin._util.request import Request, argument, input_file, option, output_folder
+from drivetwin.cli.arguments import logs_argument
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_json,
     print_line,
@@ -21,7 +19,6 @@ from drivetwin.cli.output import (
     show_findings,
     show_step,
 )
-from drivetwin.cli.outputs import Output, Shape
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -35,27 +32,19 @@ RESULT, MODEL, REPORT = "fit.json", "model.toml", "report.html"
 """Files that `fit -o` writes."""
 
 
-def fit(
-    model: Annotated[
-        Path,
-        typer.Argument(metavar="MODEL", help="Model file (TOML); see 'drivetwin schema model'."),
-    ],
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG...", help="Recordings of any format.", callback=require_logs),
-    ],
-    hold_out: Annotated[
-        list[Path] | None,
-        typer.Option("--hold-out", metavar="LOG", help="Predict a recording with the fit."),
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the draws of the search.")] = 0,
-    output: Annotated[
-        Path | None,
-        Output(Shape.FOLDER),
-        typer.Option("-o", "--output", metavar="DIR", help="Folder for result, model and report."),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class Fit(Request, command="fit"):
+    """Arguments of `fit`."""
+
+    model: Path = argument("Model file (TOML); see 'drivetwin schema model'.", "MODEL")
+    logs: tuple[Path, ...] = logs_argument("Recordings of any format.")
+    hold_out: tuple[Path, ...] = input_file(
+        "Predict a recording with the fit.", metavar="LOG", default=()
+    )
+    seed: int = option("Seed of the draws of the search.", minimum=0, default=0)
+    output: Path | None = output_folder("Folder for result, model and report.")
+
+
+def fit(request: Fit, *, as_json: bool) -> None:
     """Identify the unknowns of a model of any driveline from recordings.
 
     The model file has the elements of the driveline, the columns of the log for its inputs and
@@ -67,19 +56,20 @@ def fit(
     from drivetwin.fit.holdout import predict
     from drivetwin.fit.model_file import format_model, read_model
 
-    network, channels = read_model(model)
+    logs, hold_out = request.logs, request.hold_out
+    network, channels = read_model(request.model)
     answer = _Answer([one.name for one in logs])
     with show_step(f"reading {len(logs)} recordings"):
         recordings = list(_read_recordings(answer, logs, network, channels))
-        held = list(_read_recordings(answer, hold_out or [], network, channels))
+        held = list(_read_recordings(answer, hold_out, network, channels))
     with show_step(f"fitting {network.name}"):
-        answer.found = found = fit_network(network, recordings, seed=seed)
+        answer.found = found = fit_network(network, recordings, seed=request.seed)
     with show_step("predicting"):
-        names = [one.name for one in hold_out or []]
+        names = [one.name for one in hold_out]
         answer.held_out = dict(zip(names, predict(found, held), strict=True))
-    files = [] if output is None else _write_outputs(output, answer, format_model(
-        found.fitted, channels
-    ))  # fmt: skip
+    files: Sequence[Path] = ()
+    if request.output is not None:
+        files = _write_outputs(request.output, answer, format_model(found.fitted, channels))
     if as_json:
         print_json(answer.to_document())
         return
@@ -117,9 +107,9 @@ def _read_recordings(
         yield recording
 
 
-def _write_outputs(folder: Path, answer: _Answer, model: str) -> list[Path]:
+def _write_outputs(folder: Path, answer: _Answer, model: str) -> tuple[Path, ...]:
     """Write result, fitted model and report, all or none."""
-    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.cli.atomic_outputs import write_texts
     from drivetwin.files.fit_file import build_fit_file, format_fit_file
     from drivetwin.report.fit import render_fit
 
@@ -131,10 +121,7 @@ def _write_outputs(folder: Path, answer: _Answer, model: str) -> list[Path]:
         MODEL: model,
         REPORT: render_fit(answer.found, answer.logs, held_out, answer.remarks),
     }
-    with write_atomically(folder) as place:
-        for name, text in texts.items():
-            (place / name).write_text(text, encoding="utf-8", newline="\n")
-    return [folder / name for name in texts]
+    return write_texts(folder, texts)
 
 
 def _print_answer(answer: _Answer) -> None:

@@ -4,13 +4,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from drivetwin._util.outputs import PAGE
+from drivetwin._util.request import (
+    MEBIBYTE,
+    REQUIRED,
+    SECOND,
+    Request,
+    argument,
+    flag,
+    option,
+    output_file,
+    output_folder,
+)
 from drivetwin.cli.command_group import CommandGroup
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_json,
     print_line,
@@ -18,9 +29,8 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
-from drivetwin.cli.outputs import PAGE, Output, Shape
-from drivetwin.errors import INTERRUPTED
-from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.errors import INTERRUPTED, InputError
+from drivetwin.fleet.options import FleetOptions
 
 if TYPE_CHECKING:
     from drivetwin.fleet.events import Summary
@@ -29,95 +39,51 @@ if TYPE_CHECKING:
 RUN = "run"
 
 
-StoreFolder = Annotated[Path, typer.Argument(metavar="STORE", help="Folder of 'fleet -o'.")]
+class FleetFiles(Request):
+    """Logs, rules and store of a fleet run."""
+
+    logs: tuple[str, ...] = argument("Files, folders and quoted globs.", "LOGS...", default=())
+    vehicle: Path = option("Vehicle card, or rules (TOML).", metavar="CARD|RULES", default=REQUIRED)
+    output: Path = output_folder("Folder of the store.", "STORE", REQUIRED)
+    listed: Path | None = option(
+        "CSV with a column 'path', or text with one path per line.", "--list", metavar="FILE"
+    )
 
 
-Logs = Annotated[
-    list[str] | None, typer.Argument(metavar="LOGS...", help="Files, folders and quoted globs.")
-]
-CardOrRules = Annotated[
-    Path, typer.Option("--vehicle", metavar="CARD|RULES", help="Vehicle card, or rules (TOML).")
-]
-StoreOption = Annotated[
-    Path,
-    Output(Shape.FOLDER),
-    typer.Option("-o", "--output", metavar="STORE", help="Folder of the store."),
-]
-ListFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--list", metavar="FILE", help="CSV with a column 'path', or text with one path per line."
-    ),
-]
-MethodOption = Annotated[
-    Method, typer.Option(metavar="METHOD", help="paper, integral or likelihood.")
-]
-Workers = Annotated[
-    int | None, typer.Option(min=1, help="Processes on this machine; default: one per core.")
-]
-Scheduler = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="Work on a Dask cluster, tcp://host:port.")
-]
-TimeLimit = Annotated[float, typer.Option(min=0.1, metavar="S", help="Time limit of one log.")]
-MemoryLimit = Annotated[
-    int, typer.Option(min=64, metavar="MIB", help="Memory limit of one worker.")
-]
-Attempts = Annotated[
-    int, typer.Option(min=1, help="Number of attempts for a log that loses its worker.")
-]
-Retry = Annotated[bool, typer.Option("--retry", help="Retry the logs in quarantine.")]
-Reports = Annotated[bool, typer.Option("--reports", help="Also write the report of each log.")]
-Traces = Annotated[
-    bool, typer.Option("--traces", help="Also write measured and simulated signals of each log.")
-]
-Events = Annotated[bool, typer.Option("--json", help="Print one JSON event per line on stdout.")]
+class RunFleet(FleetOptions, FleetFiles, command="fleet run"):
+    """Arguments of `fleet run`."""
+
+    as_json: bool = flag("Print one JSON event per line on stdout.", "--json")
 
 
-def run(
-    *,
-    logs: Logs = None,
-    vehicle: CardOrRules,
-    output: StoreOption,
-    listed: ListFile = None,
-    method: MethodOption = DEFAULT_METHOD,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    time_limit: TimeLimit = 600.0,
-    memory_limit: MemoryLimit = 4096,
-    attempts: Attempts = 3,
-    retry: Retry = False,
-    reports: Reports = False,
-    traces: Traces = False,
-    as_json: Events = False,
-) -> None:
+class StoreInput(Request):
+    """The store of a fleet."""
+
+    store: Path = argument("Folder of 'fleet -o'.", "STORE")
+
+
+def run(request: RunFleet) -> None:
     """Identify all logs that are not yet in the store.
 
     The same command continues an interrupted run; finished logs are not computed again.
     """
     from drivetwin.cli.fleet_view import show_progress
-    from drivetwin.errors import InputError
-    from drivetwin.fleet.coordinator import RunOptions
     from drivetwin.fleet.rules import read_rules
     from drivetwin.fleet.run import FleetRun, run_fleet
     from drivetwin.fleet.sources import Sources
-    from drivetwin.fleet.task import Limits, WorkerSpec
 
-    if not logs and listed is None:
+    if not request.logs and request.listed is None:
         raise InputError("no logs are named", "give files, folders, a quoted glob or --list FILE")
-    request = FleetRun(
-        Sources(logs or [], listed),
-        read_rules(vehicle),
-        output,
-        method,
-        workers,
-        scheduler,
-        WorkerSpec(limits=Limits(time_limit, memory_limit * 2**20)),
-        RunOptions(attempts, retry, reports, traces),
+    wanted = FleetRun(
+        **request.select(FleetOptions),
+        sources=Sources(request.logs, request.listed),
+        rules=read_rules(request.vehicle),
+        store=request.output,
     )
-    with show_progress(as_json=as_json) as tell:
-        summary = run_fleet(request, tell)
-    if not as_json:
-        _print_summary(summary, output)
+    with show_progress(as_json=request.as_json) as tell:
+        summary = run_fleet(wanted, tell)
+    if not request.as_json:
+        _print_summary(summary, request.output)
     if not summary.complete:
         raise typer.Exit(INTERRUPTED)
 
@@ -143,26 +109,22 @@ def _print_summary(summary: Summary, output: Path) -> None:
             "JOIN logs USING (log) WHERE error <> ''\"")  # fmt: skip
 
 
-def report(
-    store: StoreFolder,
-    output: Annotated[
-        Path | None,
-        Output(endings=PAGE),
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE.html",
-            help="Page to write; default: report.html in the store.",
-        ),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class ReportFleet(StoreInput, command="fleet report"):
+    """Arguments of `fleet report`."""
+
+    output: Path | None = output_file(
+        "Page to write; default: report.html in the store.", "FILE.html", PAGE
+    )
+
+
+def report(request: ReportFleet, *, as_json: bool) -> None:
     """Write the report of a store: shared values, ageing, units, outliers, failures."""
-    from drivetwin.fleet.report import PAGE, save_fleet_report
+    from drivetwin.fleet.report import PAGE as REPORT
+    from drivetwin.fleet.report import save_fleet_report
     from drivetwin.fleet.store import Store
 
-    page = store / PAGE if output is None else output
-    with show_step("estimating over the fleet"), Store(store) as opened:
+    page = request.store / REPORT if request.output is None else request.output
+    with show_step("estimating over the fleet"), Store(request.store) as opened:
         save_fleet_report(opened, page)
     if as_json:
         print_json({"report": page})
@@ -170,23 +132,22 @@ def report(
     print_line(f"wrote {page}")
 
 
-def estimate(
-    store: StoreFolder,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--parameter", metavar="ID", help="Parameter to estimate; repeatable; default: all."
-        ),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class EstimateFleet(StoreInput, command="fleet estimate"):
+    """Arguments of `fleet estimate`."""
+
+    parameter: tuple[str, ...] = option(
+        "Parameter to estimate; repeatable; default: all.", metavar="ID", default=()
+    )
+
+
+def estimate(request: EstimateFleet, *, as_json: bool) -> None:
     """Estimate over all logs: shared values, spread over units, ageing, changes, outliers."""
     from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
     from drivetwin.fleet.store import Store
 
-    with show_step("estimating over the fleet"), Store(store) as opened:
-        found = estimate_fleet(opened, parameter or ())
-        missing = list_missing_estimates(opened, found, parameter or ())
+    with show_step("estimating over the fleet"), Store(request.store) as opened:
+        found = estimate_fleet(opened, request.parameter)
+        missing = list_missing_estimates(opened, found, request.parameter)
     if as_json:
         print_json({"estimates": [one.to_document() for one in found], "untold": missing})
         return
@@ -269,24 +230,22 @@ def _describe_drift(one: JointEstimate) -> tuple[str, str, str]:
     return *format_estimate(drift.slope * factor, ends, one.si_unit)[:2], per
 
 
-def query(
-    store: StoreFolder,
-    sql: Annotated[str, typer.Argument(metavar="SQL", help="SELECT over parameters, files, …")],
-    output: Annotated[
-        Path | None,
-        Output(endings={".csv": "text table", ".parquet": "binary table"}),
-        typer.Option(
-            "-o", "--output", metavar="FILE", help="Write the answer as .csv or .parquet."
-        ),
-    ] = None,
-    time_limit: Annotated[
-        float, typer.Option(min=0.1, metavar="S", help="Time limit of the query.")
-    ] = 60.0,
-    memory_limit: Annotated[
-        int, typer.Option(min=64, metavar="MIB", help="Memory limit of the query.")
-    ] = 2048,
-    as_json: JsonFlag = False,
-) -> None:
+class QueryFleet(StoreInput, command="fleet query"):
+    """Arguments of `fleet query`."""
+
+    sql: str = argument("SELECT over parameters, files, …", "SQL")
+    output: Path | None = output_file(
+        "Write the answer as .csv or .parquet.",
+        "FILE",
+        {".csv": "text table", ".parquet": "binary table"},
+    )
+    time_limit: float = option("Time limit of the query.", unit=SECOND, minimum=0.1, default=60.0)
+    memory_limit: int = option(
+        "Memory limit of the query.", unit=MEBIBYTE, minimum=64, default=2 * 2**30
+    )
+
+
+def query(request: QueryFleet, *, as_json: bool) -> None:
     """Query a store in SQL (DuckDB).
 
     Tables: parameters, frictions, fits, qualities, warnings, rows, files, logs, shifts, settings.
@@ -295,11 +254,11 @@ def query(
     from drivetwin.fleet.store import Store
     from drivetwin.fleet.task import Limits
 
-    limits = Limits(time_limit, memory_limit * 2**20)
-    with show_step("asking"), Store(store) as opened:
-        answer = query_store(opened, sql, limits)
+    output, limits = request.output, Limits(request.time_limit, request.memory_limit)
+    with show_step("asking"), Store(request.store) as opened:
+        answer = query_store(opened, request.sql, limits)
     if output is not None:
-        save_answer(answer, output, store)
+        save_answer(answer, output, request.store)
     if as_json:
         rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
         print_json({"rows": rows})

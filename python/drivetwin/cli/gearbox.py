@@ -5,19 +5,17 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
+from drivetwin._util.request import Request, argument, option, output_file
+from drivetwin.cli.arguments import GEARBOX_HELP
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_json,
     print_line,
     print_paragraph,
     print_table,
 )
-from drivetwin.cli.outputs import Output
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -25,23 +23,17 @@ if TYPE_CHECKING:
     from drivetwin.gearbox import Gearbox, GearStatics
 
 
-def gearbox(
-    card: Annotated[
-        str | None,
-        typer.Argument(metavar="CARD", help="Gearbox card (TOML), or name of a built-in gearbox."),
-    ] = None,
-    gear: Annotated[
-        str | None, typer.Option("--gear", metavar="GEAR", help="Show one gear in full.")
-    ] = None,
-    output: Annotated[
-        Path | None,
-        Output(endings={".mo": "Modelica package"}),
-        typer.Option(
-            "-o", "--output", metavar="FILE.mo", help="Write the gearbox as a Modelica package."
-        ),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class ShowGearbox(Request, command="gearbox"):
+    """Arguments of `gearbox`."""
+
+    card: str | None = argument(GEARBOX_HELP, "CARD", default=None)
+    gear: str | None = option("Show one gear in full.", metavar="GEAR")
+    output: Path | None = output_file(
+        "Write the gearbox as a Modelica package.", "FILE.mo", {".mo": "Modelica package"}
+    )
+
+
+def gearbox(request: ShowGearbox, *, as_json: bool) -> None:
     """List the gears of a gearbox with computed and published ratio.
 
     Without CARD, list the built-in gearboxes. With --gear, print the speed of every member per
@@ -54,16 +46,17 @@ def gearbox(
         solve_gear,
     )
 
-    if card is None:
+    if request.card is None:
         names = list_builtin_gearboxes()
         if as_json:
             print_json({"builtin": list(names)})
         else:
             print_line("\n".join(names))
         return
-    box = load_gearbox(card)
-    if output is not None:
-        _write_modelica(box, output)
+    box = load_gearbox(request.card)
+    if request.output is not None:
+        _write_modelica(box, request.output)
+    gear = request.gear
     names = (gear,) if gear is not None else tuple(each.name for each in box.gears)
     gears = [solve_gear(box, name) for name in names]
     warnings = describe_ratio_differences(box, {each.gear: each.ratio for each in gears})

@@ -6,15 +6,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from drivetwin.cli.arguments import ChannelsFile, VehicleFile, require_logs
+from drivetwin._util.request import flag, option, output_folder
+from drivetwin.cli.arguments import logs_argument
 from drivetwin.cli.atomic_outputs import refuse_same_names
-from drivetwin.cli.identify_run import Request
+from drivetwin.cli.identify_run import IdentifyOptions
 from drivetwin.cli.output import (
-    JsonFlag,
     print_findings,
     print_json,
     print_line,
@@ -24,9 +24,7 @@ from drivetwin.cli.output import (
     show_error,
     to_error_document,
 )
-from drivetwin.cli.outputs import Output, Shape
 from drivetwin.errors import DrivetwinError
-from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.status import ModelStatus
 
 if TYPE_CHECKING:
@@ -38,47 +36,21 @@ NOT_CONFIRMED = 3
 """Exit code of a model that is neither valid nor valid with limits, with --strict."""
 
 
-def identify(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG...", help="One or more shift logs.", callback=require_logs),
-    ],
-    vehicle: VehicleFile,
-    channels: ChannelsFile = None,
-    method: Annotated[
-        Method, typer.Option(metavar="METHOD", help="paper, integral or likelihood.")
-    ] = DEFAULT_METHOD,
-    output: Annotated[
-        Path | None,
-        Output(Shape.FOLDER),
-        typer.Option("-o", "--output", metavar="DIR", help="Folder for result, twin and report."),
-    ] = None,
-    together: Annotated[
-        bool, typer.Option("--together", help="Fit all logs of one vehicle jointly.")
-    ] = False,
-    hold_out: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="SHIFT",
-            help="Shift to predict instead of fit: its number, a LOG, or LOG:NUMBER; repeatable.",
-        ),
-    ] = None,
-    effects: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--effect",
-            metavar="NAME=STD",
-            help="Prior of an effect that the model omits, such as tyre_slip=0.002; 0: no effect.",
-        ),
-    ] = None,
-    strict: Annotated[
-        bool,
-        typer.Option(
-            "--strict", help="Exit with code 3 unless every model is valid, limits included."
-        ),
-    ] = False,
-    as_json: JsonFlag = False,
-) -> None:
+class Identify(IdentifyOptions, command="identify"):
+    """Arguments of `identify`."""
+
+    logs: tuple[Path, ...] = logs_argument("One or more shift logs.")
+    output: Path | None = output_folder("Folder for result, twin and report.")
+    together: bool = flag("Fit all logs of one vehicle jointly.")
+    hold_out: tuple[str, ...] = option(
+        "Shift to predict instead of fit: its number, a LOG, or LOG:NUMBER; repeatable.",
+        metavar="SHIFT",
+        default=(),
+    )
+    strict: bool = flag("Exit with code 3 unless every model is valid, limits included.")
+
+
+def identify(request: Identify, *, as_json: bool) -> None:
     """Identify the driveline from shift logs.
 
     With -o, write DIR/result.json, DIR/twin.toml and DIR/report.html. Several logs are identified
@@ -89,20 +61,19 @@ def identify(
     to each log. With --hold-out, which implies --together, a log or shift takes no part in the fit.
     It is simulated with the parameters of the others and compared.
     """
-    how = Request(vehicle, channels, method, tuple(effects or ()))
-    if together or hold_out:
-        status = _identify_joint(logs, how, hold_out or [], output, as_json)
-        _exit_by_status([status], strict)
+    if request.together or request.hold_out:
+        _exit_by_status([_identify_joint(request, as_json)], request.strict)
         return
-    folders = _choose_folders(logs, output)
+    logs = request.logs
+    folders = _choose_folders(logs, request.output)
     results: list[dict[str, Any]] = []
     failed: DrivetwinError | None = None
     for log in logs:
         try:
-            results.append(_identify_log(log, how, folders.get(log), as_json))
+            results.append(_identify_log(log, request, folders.get(log), as_json))
         except DrivetwinError as error:
             error.where = replace(error.where, file=error.where.file or str(log))
-            if len(logs) == 1 or error.where.file in (str(vehicle), str(channels)):
+            if len(logs) == 1 or error.where.file in (str(request.vehicle), str(request.channels)):
                 raise
             results.append(to_error_document(error))
             failed = error
@@ -112,7 +83,7 @@ def identify(
         print_json(results[0] if len(results) == 1 else {"results": results})
     if failed is not None:
         raise typer.Exit(failed.exit_code)
-    _exit_by_status([one["status"] for one in results], strict)
+    _exit_by_status([one["status"] for one in results], request.strict)
 
 
 def _exit_by_status(statuses: Sequence[str], strict: bool) -> None:
@@ -121,7 +92,9 @@ def _exit_by_status(statuses: Sequence[str], strict: bool) -> None:
         raise typer.Exit(NOT_CONFIRMED)
 
 
-def _identify_log(log: Path, how: Request, folder: Path | None, as_json: bool) -> dict[str, Any]:
+def _identify_log(
+    log: Path, how: IdentifyOptions, folder: Path | None, as_json: bool
+) -> dict[str, Any]:
     """Identify a log, write and print the result."""
     from drivetwin.cli.identify_run import run_identification, write_outcome
 
@@ -134,18 +107,12 @@ def _identify_log(log: Path, how: Request, folder: Path | None, as_json: bool) -
     return _to_document(outcome.found, files)
 
 
-def _identify_joint(
-    logs: list[Path],
-    how: Request,
-    hold_out: list[str],
-    output: Path | None,
-    as_json: bool,
-) -> ModelStatus:
+def _identify_joint(request: Identify, as_json: bool) -> ModelStatus:
     """Fit all logs as one and predict the held-out shifts; return the status of the model."""
     from drivetwin.cli.identify_joint import identify_logs, print_joint, write_joint
 
-    outcome = identify_logs(logs, how, hold_out)
-    files = write_joint(outcome, output) if output is not None else ()
+    outcome = identify_logs(request.logs, request, request.hold_out)
+    files = () if request.output is None else write_joint(outcome, request.output)
     if as_json:
         print_json(_to_document(outcome.found, files))
         return outcome.found.status
@@ -156,7 +123,7 @@ def _identify_joint(
     return outcome.found.status
 
 
-def _choose_folders(logs: list[Path], output: Path | None) -> dict[Path, Path]:
+def _choose_folders(logs: Sequence[Path], output: Path | None) -> dict[Path, Path]:
     """Output folder of each log; empty where nothing is to be written."""
     if output is None:
         return {}

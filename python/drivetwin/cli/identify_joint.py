@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,8 +12,7 @@ from typing import TYPE_CHECKING
 from drivetwin._util.progress import scale_progress
 from drivetwin.cli.arguments import REPORT, RESULT, TWIN
 from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
-from drivetwin.cli.holdout_args import parse_holdouts
-from drivetwin.cli.identify_run import Request, read_shifts
+from drivetwin.cli.identify_run import IdentifyOptions, read_shifts
 from drivetwin.cli.numbers import format_percent, format_quantity
 from drivetwin.cli.output import (
     make_table,
@@ -22,6 +22,7 @@ from drivetwin.cli.output import (
     show_findings,
     show_step,
 )
+from drivetwin.errors import InputError, Where
 from drivetwin.report.labels import get_channel_unit
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.identification import Identification
     from drivetwin.estimation.result.multi_log import Several
     from drivetwin.estimation.result.validation import HeldOut
+    from drivetwin.shifts.detect import FoundShifts
     from drivetwin.shifts.shift import Shift
     from drivetwin.validation.multi_log import JointIdentification
 
@@ -58,7 +60,7 @@ class Joined:
 
 def identify_logs(
     logs: Sequence[Path],
-    how: Request,
+    how: IdentifyOptions,
     wanted: Sequence[str],
 ) -> Joined:
     """Read all logs, fit what is not held out together, predict the rest.
@@ -163,3 +165,39 @@ def _build_holdout_table(held: Sequence[HeldOut], found: Identification) -> Tabl
                 one.get_signal_outcome(signal).value,
             )
     return table
+
+
+def parse_holdouts(
+    wanted: Sequence[str], logs: Sequence[Path], shifts: Sequence[FoundShifts]
+) -> list[frozenset[int]]:
+    """Numbers of the shifts to predict, log by log, counted from 1.
+
+    `N` is a shift of the only log, `FILE` all shifts of a log, `FILE:N` one of them; a file may be
+    named with or without folder and ending. Raises InputError for what is none of these.
+    """
+    held: list[set[int]] = [set() for _ in logs]
+    for text in wanted:
+        place, number = _parse_shift(text, logs)
+        every = range(1, len(shifts[place].shifts) + 1)
+        held[place] |= set(every) if number is None else {number}
+    return [frozenset(one) for one in held]
+
+
+def _parse_shift(text: str, logs: Sequence[Path]) -> tuple[int, int | None]:
+    """Place of the log, and number of the shift; None for all of them."""
+    whole = _find_logs(text, logs)
+    if len(whole) == 1:
+        return whole[0], None
+    name, _, number = text.rpartition(":")
+    places = _find_logs(name, logs) if name else list(range(len(logs)))
+    if not re.fullmatch(r"\d{1,9}", number) or len(places) != 1:
+        raise InputError(
+            f"{text!r} names no shift or log of {', '.join(log.name for log in logs)}",
+            "give the number of a shift of the only log, a log, or LOG:NUMBER",
+            Where(key="--hold-out"),
+        )
+    return places[0], int(number)
+
+
+def _find_logs(name: str, logs: Sequence[Path]) -> list[int]:
+    return [k for k, log in enumerate(logs) if name in (str(log), log.name, log.stem)]

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drivetwin._util.request import option
 from drivetwin._util.timed_stages import TimedStages
-from drivetwin.cli.arguments import REPORT, RESULT, TWIN, find_mapping
+from drivetwin.cli.arguments import REPORT, RESULT, TWIN, CardInput, find_mapping, method_option
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_findings, show_step
 from drivetwin.estimation.result.method import Method
@@ -25,14 +26,16 @@ if TYPE_CHECKING:
 _READING = TimedStages("reading", ("log", "shifts", "card"))
 
 
-@dataclass(frozen=True)
-class Request:
+class IdentifyOptions(CardInput):
     """Card, channel mapping and method of an identification, and priors of effects as typed."""
 
-    vehicle: Path
-    channels: Path | None
-    method: Method
-    effects: tuple[str, ...] = ()
+    method: Method = method_option()
+    effects: tuple[str, ...] = option(
+        "Prior of an effect that the model omits, such as tyre_slip=0.002; 0: no effect.",
+        "--effect",
+        metavar="NAME=STD",
+        default=(),
+    )
 
     def load_card(self) -> VehicleCard:
         """Read the card with the priors of effects."""
@@ -53,7 +56,7 @@ class Outcome:
 
 
 def read_shifts(
-    path: Path, how: Request, card: VehicleCard
+    path: Path, how: IdentifyOptions, card: VehicleCard
 ) -> tuple[ShiftLog, FoundShifts, tuple[Finding, ...]]:
     """Read a log and detect its shifts; the findings compare it with the card.
 
@@ -71,7 +74,7 @@ def read_shifts(
         return log, shifts, tuple(check_card(card, log, shifts.shifts))
 
 
-def run_identification(log: Path, how: Request) -> Outcome:
+def run_identification(log: Path, how: IdentifyOptions) -> Outcome:
     """Read, find shifts, identify, and validate by simulation.
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.

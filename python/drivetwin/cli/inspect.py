@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from drivetwin.cli.arguments import ChannelsFile, LogFile, find_mapping
+from drivetwin._util.outputs import Output
+from drivetwin._util.request import Request, flag, input_file, option
+from drivetwin.cli.arguments import find_mapping, log_argument, mapping_option
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_findings,
     print_json,
@@ -23,7 +22,6 @@ from drivetwin.cli.output import (
     show_step,
     to_error_document,
 )
-from drivetwin.cli.outputs import Output
 from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
 
@@ -37,32 +35,21 @@ if TYPE_CHECKING:
     from drivetwin.vehicle.card import VehicleCard
 
 
-def inspect(
-    log: LogFile,
-    vehicle: Annotated[
-        Path | None,
-        typer.Option(
-            "--vehicle", metavar="CARD", help="Vehicle card; its elements name the pressures."
-        ),
-    ] = None,
-    channels: ChannelsFile = None,
-    write_mapping: Annotated[
-        Path | None,
-        Output(),
-        typer.Option(
-            metavar="MAP",
-            help="Write the channel mapping as a file to edit; open points are comments.",
-        ),
-    ] = None,
-    accept_proposals: Annotated[
-        bool,
-        typer.Option(
-            "--accept-proposals",
-            help="With --write-mapping: enter units that are the only proposal.",
-        ),
-    ] = False,
-    as_json: JsonFlag = False,
-) -> None:
+class Inspect(Request, command="inspect"):
+    """Arguments of `inspect`."""
+
+    log: Path = log_argument()
+    vehicle: Path | None = input_file("Vehicle card; its elements name the pressures.", "CARD")
+    channels: Path | None = mapping_option()
+    write_mapping: Path | None = option(
+        "Write the channel mapping as a file to edit; open points are comments.",
+        metavar="MAP",
+        output=Output(),
+    )
+    accept_proposals: bool = flag("With --write-mapping: enter units that are the only proposal.")
+
+
+def inspect(request: Inspect, *, as_json: bool) -> None:
     """List the columns of a log with unit, rate, range, gaps and proposed role.
 
     Also list the warnings of shifts and identify, and their reason if they refuse the log.
@@ -75,10 +62,11 @@ def inspect(
     from drivetwin.logs.mapping_draft import draft_mapping
     from drivetwin.vehicle.card import load_card
 
-    if accept_proposals and write_mapping is None:
+    log, write_mapping, accept = request.log, request.write_mapping, request.accept_proposals
+    if accept and write_mapping is None:
         raise InputError("--accept-proposals needs a mapping file", "add --write-mapping MAP")
-    card = None if vehicle is None else load_card(vehicle)
-    stated = find_mapping(channels, log)
+    card = None if request.vehicle is None else load_card(request.vehicle)
+    stated = find_mapping(request.channels, log)
     with show_step(f"reading {log.name}"):
         try:
             seen = _look_at(log, card, stated)
@@ -86,12 +74,12 @@ def inspect(
             if write_mapping is not None:
                 _write_unread(write_mapping, card, stated, fault, list_databases(log))
             raise
-        draft = draft_mapping(seen.survey, unnamed_step=seen.unnamed_step, accept=accept_proposals)
+        draft = draft_mapping(seen.survey, unnamed_step=seen.unnamed_step, accept=accept)
         if write_mapping is not None:
             found = seen.survey
             text = format_mapping(found.mapping, found.options, found.names, draft)
             write_text(write_mapping, text)
-        if write_mapping is not None and accept_proposals:
+        if write_mapping is not None and accept:
             seen = _look_at(log, card, read_mapping(write_mapping))
             draft = draft_mapping(seen.survey, unnamed_step=seen.unnamed_step)
     if as_json:

@@ -6,19 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from drivetwin.cli.arguments import (
-    ChannelsFile,
-    LogFile,
-    OptionalVehicleFile,
-    TwinFile,
-    read_twin_log,
-)
+from drivetwin._util.outputs import LOG_ENDINGS, PAGE, select_outputs
+from drivetwin._util.request import option, output_file
+from drivetwin.cli.arguments import TwinLogInput, read_twin_log
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_json,
     print_line,
@@ -26,7 +19,6 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
-from drivetwin.cli.outputs import LOG_ENDINGS, PAGE, Output, select_outputs
 from drivetwin.errors import DamagedChannelError
 from drivetwin.observer.kind import Observer
 
@@ -38,31 +30,24 @@ if TYPE_CHECKING:
     from drivetwin.shifts.shift import Shift
 
 
-def observe(
-    twin: TwinFile,
-    log: LogFile,
-    vehicle: OptionalVehicleFile = None,
-    channels: ChannelsFile = None,
-    by: Annotated[
-        Observer,
-        typer.Option(
-            help="smoother: from the measured speeds, with or without pressures; simulation: from "
-            "engine torque and pressures alone."
-        ),
-    ] = Observer.SMOOTHER,
-    output: Annotated[
-        list[Path] | None,
-        Output(endings=LOG_ENDINGS | PAGE),
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="File for the torques: .csv, .parquet, .mf4 or .mat; page with the figures: "
-            ".html; repeatable.",
-        ),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class Observe(TwinLogInput, command="observe"):
+    """Arguments of `observe`."""
+
+    by: Observer = option(
+        "smoother: from the measured speeds, with or without pressures; simulation: from engine "
+        "torque and pressures alone.",
+        default=Observer.SMOOTHER,
+    )
+    output: tuple[Path, ...] = output_file(
+        "File for the torques: .csv, .parquet, .mf4 or .mat; page with the figures: .html; "
+        "repeatable.",
+        "FILE",
+        LOG_ENDINGS | PAGE,
+        (),
+    )
+
+
+def observe(request: Observe, *, as_json: bool) -> None:
     """Estimate torques of output shaft and clutches in the shifts of a log, with 95 % bands.
 
     The log needs no output torque; if it has one, it is not used.
@@ -73,15 +58,15 @@ def observe(
     from drivetwin.report.observer import render_observations
     from drivetwin.shifts.detect import require_shifts
 
-    model = load_twin(twin)
-    recording, card = read_twin_log(model, log, vehicle, channels)
+    model, by = load_twin(request.twin), request.by
+    recording, card = read_twin_log(model, request.log, request.vehicle, request.channels)
     shifts = require_shifts(recording, card)
     found, left_out = _observe_shifts(
         shifts.shifts, lambda shift: estimate_torques(model, recording, shift, by), by
     )
-    for table in select_outputs(output, *LOG_ENDINGS):
+    for table in select_outputs(request.output, *LOG_ENDINGS):
         _write_observations(table, found)
-    for page in select_outputs(output, *PAGE):
+    for page in select_outputs(request.output, *PAGE):
         write_text(page, render_observations(found, recording))
     if as_json:
         shown = [_to_document(one) for one in found]
@@ -93,7 +78,7 @@ def observe(
             print_paragraph(text)
     for name, reason in left_out.items():
         print_paragraph(f"shift {name} is left out: {reason}")
-    for file in output or ():
+    for file in request.output:
         print_line(f"wrote {file}")
 
 

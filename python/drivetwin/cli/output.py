@@ -7,9 +7,7 @@ import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-import typer
+from typing import TYPE_CHECKING, Any, Literal
 
 from drivetwin._util.visible_text import escape_json
 from drivetwin.errors import DrivetwinError
@@ -28,8 +26,6 @@ _STATUS_COLOURS = {
     ModelStatus.NOT_VALID: "red",
     ModelStatus.NOT_VALIDATED: "yellow",
 }
-
-JsonFlag = Annotated[bool, typer.Option("--json", help="Print only the result, as JSON on stdout.")]
 
 
 def make_console(*, stderr: bool = False) -> Console:

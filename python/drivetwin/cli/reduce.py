@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
+from drivetwin._util.request import REQUIRED, Request, argument, option
+from drivetwin.cli.arguments import GEARBOX_HELP
 from drivetwin.cli.output import (
-    JsonFlag,
     make_table,
     print_json,
     print_line,
@@ -23,18 +22,15 @@ if TYPE_CHECKING:
 
     from drivetwin.gearbox import CouplingError, Reduction
 
-GearboxCard = Annotated[
-    str, typer.Argument(metavar="CARD", help="Gearbox card (TOML), or name of a built-in gearbox.")
-]
+
+class Reduce(Request, command="reduce"):
+    """Arguments of `reduce`."""
+
+    card: str = argument(GEARBOX_HELP, "CARD")
+    shift: str = option("The two gears, such as 2-3.", metavar="OLD-NEW", default=REQUIRED)
 
 
-def reduce(
-    card: GearboxCard,
-    shift: Annotated[
-        str, typer.Option("--shift", metavar="OLD-NEW", help="The two gears, such as 2-3.")
-    ],
-    as_json: JsonFlag = False,
-) -> None:
+def reduce(request: Reduce, *, as_json: bool) -> None:
     """Reduce a shift to the dual-clutch form and compute the error of the reduction.
 
     Print the ratios of both elements, the mass matrix, and condition (1) with the members that
@@ -43,10 +39,11 @@ def reduce(
     from drivetwin.gearbox import describe_ratio_differences, load_gearbox
     from drivetwin.gearbox import reduce as reduce_shift
 
+    shift = request.shift
     old, dash, new = shift.rpartition("-")
     if not dash or not old or not new:
         raise InputError(f"{shift!r} is no shift", "write two gears with a hyphen, such as 2-3")
-    box = load_gearbox(card)
+    box = load_gearbox(request.card)
     reduction = reduce_shift(box, old, new)
     ratios = {old: reduction.off_going.ratio, new: reduction.on_coming.ratio}
     warnings = describe_ratio_differences(box, ratios)

@@ -5,13 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from drivetwin.cli.arguments import REPORT, RESULT, ChannelsFile, find_twin, read_twin_log
-from drivetwin.cli.output import JsonFlag, print_json, print_line, print_verdict, show_step
-from drivetwin.cli.outputs import PAGE, Output
+from drivetwin._util.outputs import PAGE
+from drivetwin._util.request import Request, argument, output_file
+from drivetwin.cli.arguments import REPORT, RESULT, mapping_option, read_twin_log
+from drivetwin.cli.output import print_json, print_line, print_verdict, show_step
 from drivetwin.errors import InputError, ResultFileError, Where
 
 if TYPE_CHECKING:
@@ -19,26 +18,25 @@ if TYPE_CHECKING:
     from drivetwin.twin.twin import Twin
 
 
-def report(
-    sources: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="SOURCE...", help="Folders of 'identify -o', result.json, twin.toml, or logs."
-        ),
-    ],
-    output: Annotated[
-        Path,
-        Output(endings=PAGE),
-        typer.Option("-o", "--output", metavar="FILE.html", help="Page with the comparison."),
-    ] = Path("comparison.html"),
-    channels: ChannelsFile = None,
-    as_json: JsonFlag = False,
-) -> None:
+class Report(Request, command="report"):
+    """Arguments of `report`."""
+
+    sources: tuple[Path, ...] = argument(
+        "Folders of 'identify -o', result.json, twin.toml, or logs.", "SOURCE..."
+    )
+    output: Path = output_file(
+        "Page with the comparison.", "FILE.html", PAGE, Path("comparison.html")
+    )
+    channels: Path | None = mapping_option()
+
+
+def report(request: Report, *, as_json: bool) -> None:
     """Print the path of a report, or compare several identifications.
 
     For one folder or result.json, print the path of its report. For several, or a twin and logs,
     write a page that compares parameters, friction, and the simulation of each log by each twin.
     """
+    sources, output = request.sources, request.output
     made = [source for source in sources if _is_identification(source)]
     logs = [source for source in sources if not _is_identification(source)]
     if not made:
@@ -56,7 +54,7 @@ def report(
             )
         _print_page_name(made[0], as_json=as_json)
         return
-    _write_comparison(made, logs, channels, output)
+    _write_comparison(made, logs, request.channels, output)
     if as_json:
         print_json({"report": output, "compared": made, "logs": logs})
         return
@@ -124,6 +122,7 @@ def _assign_names(made: Sequence[Path]) -> dict[str, Path]:
 
 
 def _load_candidate(name: str, source: Path) -> Candidate:
+    from drivetwin.cli.file_kinds import find_twin
     from drivetwin.files.result_file import load_result
     from drivetwin.files.twin_file import load_twin
     from drivetwin.report.find_reports import Candidate
@@ -135,6 +134,7 @@ def _load_candidate(name: str, source: Path) -> Candidate:
 
 def _load_twin(source: Path) -> Twin:
     """Load the twin of a source: the file itself, or the twin file next to its result."""
+    from drivetwin.cli.file_kinds import find_twin
     from drivetwin.files.twin_file import load_twin
 
     return load_twin(find_twin(source))

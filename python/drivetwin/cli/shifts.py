@@ -6,14 +6,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
-
-import typer
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivetwin._util.display_units import format_uncertainty
-from drivetwin.cli.arguments import ChannelsFile, LogFile, VehicleFile, load_inputs
+from drivetwin._util.outputs import PAGE
+from drivetwin._util.request import output_file
+from drivetwin.cli.arguments import LogInput, find_mapping
 from drivetwin.cli.output import (
-    JsonFlag,
     print_findings,
     print_json,
     print_line,
@@ -21,7 +20,6 @@ from drivetwin.cli.output import (
     print_table,
     show_step,
 )
-from drivetwin.cli.outputs import PAGE, Output
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -35,34 +33,33 @@ if TYPE_CHECKING:
     from drivetwin.vehicle.card import VehicleCard
 
 
-def shifts(
-    log: LogFile,
-    vehicle: VehicleFile,
-    channels: ChannelsFile = None,
-    output: Annotated[
-        Path | None,
-        Output(endings=PAGE),
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE.html",
-            help="Page with shift quality by kind of shift.",
-        ),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class DetectShifts(LogInput, command="shifts"):
+    """Arguments of `shifts`."""
+
+    output: Path | None = output_file(
+        "Page with shift quality by kind of shift.", "FILE.html", PAGE
+    )
+
+
+def shifts(request: DetectShifts, *, as_json: bool) -> None:
     """Detect the shifts of a log, with phases and shift quality.
 
     For a log without output torque, also estimate the resonance of the driveline after each shift,
     and the total inertia over η in each gear held, as far as the log determines them.
     """
+    from drivetwin.channels.roles import FOR_SHIFTS
     from drivetwin.cli.tables import build_shift_table
     from drivetwin.files.records import dump_findings
+    from drivetwin.logs.read import read_log
     from drivetwin.shifts.detect import detect_shifts, find_gear_spans
     from drivetwin.shifts.lockup_clutch import detect_lock_ups
+    from drivetwin.vehicle.card import load_card
 
+    log, output = request.log, request.output
     with show_step(f"reading {log.name}"):
-        recording, card = load_inputs(log, vehicle, channels)
+        card = load_card(request.vehicle)
+        mapping = find_mapping(request.channels, log)
+        recording = read_log(log, card, mapping, sound=FOR_SHIFTS)
         found = detect_shifts(recording, card)
     closings = detect_lock_ups(recording, card)
     seen = _estimate_from_speeds(recording, card, found.shifts)

@@ -5,26 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from drivetwin.cli.arguments import (
-    ChannelsFile,
-    LogFile,
-    OptionalVehicleFile,
-    TwinFile,
-    read_twin_log,
-)
+from drivetwin._util.outputs import PAGE, select_outputs
+from drivetwin._util.request import flag, input_file, option, output_file
+from drivetwin.cli.arguments import TwinLogInput, read_twin_log
 from drivetwin.cli.output import (
-    JsonFlag,
     print_findings,
     print_json,
     print_line,
     print_table,
     show_step,
 )
-from drivetwin.cli.outputs import PAGE, Output, select_outputs
 from drivetwin.export.targets import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
@@ -32,61 +24,33 @@ if TYPE_CHECKING:
     from drivetwin.twin.twin import Twin
 
 
-def simulate(
-    twin: TwinFile,
-    log: LogFile,
-    vehicle: OptionalVehicleFile = None,
-    channels: ChannelsFile = None,
-    output: Annotated[
-        list[Path] | None,
-        Output(endings={".csv": "table"} | PAGE),
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Measured and simulated signals: .csv as a table side by side (SI), .html as a "
-            "page with plots; repeatable.",
-        ),
-    ] = None,
-    step_size: Annotated[
-        float | None,
-        typer.Option(
-            "--step",
-            metavar="SECONDS",
-            help="Step at which the inputs are sampled, as by an importer of the exported FMU.",
-        ),
-    ] = None,
-    input_kind: Annotated[
-        InputKind,
-        typer.Option(
-            "--input", help="Inputs between these steps; without --step the step is 1 ms."
-        ),
-    ] = InputKind.LINEAR,
-    parameters: Annotated[
-        Path | None,
-        typer.Option(
-            "--parameters",
-            metavar="FILE",
-            help="Exported and edited parameter file; its values replace those of the twin.",
-        ),
-    ] = None,
-    from_command: Annotated[
-        bool,
-        typer.Option(
-            "--from-command",
-            help="Compute pressures from the commands in the log by the actuators of the twin.",
-        ),
-    ] = False,
-    template: Annotated[
-        Path | None,
-        typer.Option(
-            "--template",
-            metavar="FILE",
-            help="Template by which the file of --parameters was exported.",
-        ),
-    ] = None,
-    as_json: JsonFlag = False,
-) -> None:
+class Simulate(TwinLogInput, command="simulate"):
+    """Arguments of `simulate`."""
+
+    output: tuple[Path, ...] = output_file(
+        "Measured and simulated signals: .csv as a table side by side (SI), .html as a page with "
+        "plots; repeatable.",
+        "FILE",
+        {".csv": "table"} | PAGE,
+        (),
+    )
+    step: float | None = option(
+        "Step at which the inputs are sampled, as by an importer of the exported FMU.",
+        metavar="SECONDS",
+    )
+    input: InputKind = option(
+        "Inputs between these steps; without --step the step is 1 ms.", default=InputKind.LINEAR
+    )
+    parameters: Path | None = input_file(
+        "Exported and edited parameter file; its values replace those of the twin."
+    )
+    from_command: bool = flag(
+        "Compute pressures from the commands in the log by the actuators of the twin."
+    )
+    template: Path | None = input_file("Template by which the file of --parameters was exported.")
+
+
+def simulate(request: Simulate, *, as_json: bool) -> None:
     """Simulate the shifts of a log with an identified model and compare.
 
     The inputs are the measured engine torque and pressures. The log can differ from the log of the
@@ -101,22 +65,23 @@ def simulate(
     from drivetwin.validation.signal_table import format_signals
     from drivetwin.validation.simulate_log import simulate_shift
 
-    model = load_twin(twin)
-    if parameters is not None:
-        model = _apply_parameters(model, parameters, template)
-    recording, card = read_twin_log(model, log, vehicle, channels)
-    if from_command:
+    model, log = load_twin(request.twin), request.log
+    if request.parameters is not None:
+        model = _apply_parameters(model, request.parameters, request.template)
+    recording, card = read_twin_log(model, log, request.vehicle, request.channels)
+    if request.from_command:
         recording, replaced = replace_pressures(model, recording)
         print_line(f"pressures of {', '.join(replaced)} from their commands", stderr=True)
     with show_step(f"simulating {log.name}"):
         shifts = require_shifts(recording, card)
         runs = [simulate_shift(model, recording, shift) for shift in shifts.shifts]
-        if step_size is not None or input_kind is InputKind.HOLD:
-            stepping = Stepping(DEFAULT_STEP if step_size is None else step_size, input_kind)
+        if request.step is not None or request.input is InputKind.HOLD:
+            step = DEFAULT_STEP if request.step is None else request.step
+            stepping = Stepping(step, request.input)
             runs = [rerun_fixed_step(run, model, recording, stepping) for run in runs]
-    for table in select_outputs(output, ".csv"):
+    for table in select_outputs(request.output, ".csv"):
         write_text(table, format_signals(runs, recording))
-    for page in select_outputs(output, *PAGE):
+    for page in select_outputs(request.output, *PAGE):
         with show_step(f"writing {page.name}"):
             _write_page(page, model, runs, log.name)
     if as_json:
@@ -129,7 +94,7 @@ def simulate(
             )
         )
         print_findings(run.findings)
-    for file in output or ():
+    for file in request.output:
         print_line(f"wrote {file}")
 
 

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from drivetwin._util.interrupts import ignore_interrupts
+from drivetwin._util.request import Request, argument, input_file, option
 from drivetwin.cli.output import print_line, print_paragraph
 from drivetwin.errors import MissingExtraError
 
@@ -25,30 +26,21 @@ _LINK_PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><titl
 """
 
 
-def workbench(
-    log: Annotated[
-        Path | None, typer.Argument(metavar="[LOG]", help="Log to open, inside the folder.")
-    ] = None,
-    vehicle: Annotated[
-        Path | None, typer.Option("--vehicle", metavar="CARD", help="Vehicle card (TOML).")
-    ] = None,
-    channels: Annotated[
-        Path | None, typer.Option("--channels", metavar="MAP", help="Channel mapping file (TOML).")
-    ] = None,
-    folder: Annotated[
-        Path,
-        typer.Option(
-            "--folder", metavar="DIR", help="Folder for all files that are opened or saved."
-        ),
-    ] = Path(),
-    host: Annotated[
-        str, typer.Option("--host", help="Address to listen on; default: this machine only.")
-    ] = LOOPBACK,
-    port: Annotated[int, typer.Option("--port", help="Port; 0: any free port.")] = 8050,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
-    ] = True,
-) -> None:
+class OpenWorkbench(Request, command="app"):
+    """Arguments of `app`."""
+
+    log: Path | None = argument("Log to open, inside the folder.", "[LOG]", default=None)
+    vehicle: Path | None = input_file("Vehicle card (TOML).", "CARD")
+    channels: Path | None = input_file("Channel mapping file (TOML).", "MAP")
+    folder: Path = option(
+        "Folder for all files that are opened or saved.", metavar="DIR", default=Path()
+    )
+    host: str = option("Address to listen on; default: this machine only.", default=LOOPBACK)
+    port: int = option("Port; 0: any free port.", default=8050)
+    browser: bool = option("Open the page in a browser.", "--browser/--no-browser", default=True)
+
+
+def workbench(request: OpenWorkbench) -> None:
     """Open the workbench in the browser: from a log to a validated model.
 
     No network is needed. Access requires the printed link. Other machines can connect only with
@@ -61,12 +53,12 @@ def workbench(
     from drivetwin.workbench.server import build_server, start_server
     from drivetwin.workbench.workspace_folder import Folder
 
-    place = Folder.from_path(folder)
-    access = Access(host)
+    place, access = Folder.from_path(request.folder), Access(request.host)
     remove_dead_folders()
-    app, sessions = build_server(place, _make_start(place, log, vehicle, channels), access)
+    app, sessions = build_server(place, _make_start(place, request), access)
     try:
-        _serve(start_server(app, host, port), access, place, sessions.place.path, browser=browser)
+        server = start_server(app, request.host, request.port)
+        _serve(server, access, place, sessions.place.path, browser=request.browser)
     except KeyboardInterrupt:
         pass  # the way to end the program
     finally:
@@ -114,7 +106,7 @@ def _require_dash() -> None:
         ) from None
 
 
-def _make_start(place: Folder, log: Path | None, card: Path | None, mapping: Path | None) -> Start:
+def _make_start(place: Folder, request: OpenWorkbench) -> Start:
     """The files of the command line, as far as the folder holds them. Raises RefusedError."""
     from drivetwin.workbench.session_state import Source
     from drivetwin.workbench.views.page import Start
@@ -125,4 +117,4 @@ def _make_start(place: Folder, log: Path | None, card: Path | None, mapping: Pat
         found = place.get_file(str(path.resolve()))
         return Source(place.get_name(found), found)
 
-    return Start(source(log), source(card), mapping)
+    return Start(source(request.log), source(request.vehicle), request.channels)

@@ -7,12 +7,12 @@ import heapq
 from collections import Counter
 from collections.abc import Generator
 from contextlib import closing
-from dataclasses import dataclass
 from time import monotonic
 
 from drivetwin.errors import StoreError, Where
 from drivetwin.fleet.events import Listener, Retried, Settled, Started, Summary
 from drivetwin.fleet.index import FileRow
+from drivetwin.fleet.options import FleetOptions
 from drivetwin.fleet.pool import Pool
 from drivetwin.fleet.scan import Scan, Scanned, Skipped, make_settings_document
 from drivetwin.fleet.sources import Sources
@@ -36,28 +36,14 @@ _BACK_OFF = 0.5
 """First wait [s] after the loss of a worker; it doubles with every further loss of the log."""
 
 
-@dataclass(frozen=True)
-class RunOptions:
-    """Options of a fleet run.
-
-    `attempts` is the number of tries of a log after lost workers. `retry` selects the quarantined
-    logs. The other fields request single reports and traces.
-    """
-
-    attempts: int = 3
-    retry: bool = False
-    reports: bool = False
-    traces: bool = False
-
-
 class Coordinator:
     """Scheduler of one run: `run` processes the files of `sources` into `store`."""
 
-    def __init__(self, store: Store, pool: Pool, wishes: RunOptions, tell: Listener) -> None:
+    def __init__(self, store: Store, pool: Pool, options: FleetOptions, tell: Listener) -> None:
         self._store = store
         self._index = store.index
         self._pool = pool
-        self._wishes = wishes
+        self._options = options
         self._tell = tell
         self._out: dict[str, list[FileRow]] = {}
         self._tries: Counter[str] = Counter()
@@ -162,15 +148,15 @@ class Coordinator:
         store, log = self._store, file.log
         return Task(
             log, file.path, file.content, recipe, str(store.get_part_path(log)),
-            report=str(store.get_report_path(log)) if self._wishes.reports else None,
-            traces=str(store.get_traces_path(log)) if self._wishes.traces else None,
+            report=str(store.get_report_path(log)) if self._options.reports else None,
+            traces=str(store.get_traces_path(log)) if self._options.traces else None,
         )  # fmt: skip
 
     def _reuse_outcome(self, task: Task, file: FileRow) -> bool:
         """Reuse the stored outcome of a log if all its files exist; return True if reused."""
         log = task.log
         state = self._index.get_state(log)
-        if state is State.QUARANTINED and self._wishes.retry:
+        if state is State.QUARANTINED and self._options.retry:
             self._index.reset([log])
             return False
         if state is State.WAITING:
@@ -206,7 +192,7 @@ class Coordinator:
         if loss.blame:
             self._tries[task.log] += 1
             tries = self._tries[task.log]
-            if tries >= self._wishes.attempts:
+            if tries >= self._options.attempts:
                 self._record_completion(
                     task, Completed(_make_quarantine_outcome(tries, loss.reason), 0.0)
                 )

@@ -4,36 +4,34 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import dataclass, field
 from pathlib import Path
 
-from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.fleet.coordinator import Coordinator, RunOptions
+from drivetwin.fleet.coordinator import Coordinator
 from drivetwin.fleet.events import Listener, Summary
+from drivetwin.fleet.options import FleetOptions
 from drivetwin.fleet.pool import LocalPool, Pool, count_usable_cores
 from drivetwin.fleet.rules import RulesFile
 from drivetwin.fleet.scan import Scan
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import WorkerSpec
+from drivetwin.fleet.task import IDENTIFY, Limits, WorkerSpec
 
 
-@dataclass(frozen=True)
-class FleetRun:
-    """Request of `drivetwin fleet`: files, rules, output folder and workers.
+class FleetRun(FleetOptions):
+    """Request of a fleet run: files, rules, folder of the store, and options.
 
-    `workers` processes run on this machine, one for each core if None. With `scheduler`, the
-    address of a Dask scheduler, the work is done there instead.
+    `function` identifies a log; see `WorkerSpec`.
     """
 
     sources: Sources
     rules: RulesFile
     store: Path
-    method: Method = DEFAULT_METHOD
-    workers: int | None = None
-    scheduler: str | None = None
-    worker: WorkerSpec = field(default_factory=WorkerSpec)
-    wishes: RunOptions = field(default_factory=RunOptions)
+    function: str = IDENTIFY
+
+    @property
+    def worker(self) -> WorkerSpec:
+        """Function and limits of a worker."""
+        return WorkerSpec(self.function, Limits(self.time_limit, self.memory_limit))
 
 
 def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
@@ -43,8 +41,8 @@ def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
     until then stays in the store.
     """
     with Store(request.store, write=True) as store, closing(_make_pool(request, tell)) as pool:
-        scan = Scan(request.rules, request.method, request.worker.limits.seconds)
-        return Coordinator(store, pool, request.wishes, tell).run(scan, request.sources)
+        scan = Scan(request.rules, request.method, request.time_limit)
+        return Coordinator(store, pool, request, tell).run(scan, request.sources)
 
 
 def _make_pool(request: FleetRun, tell: Listener) -> Pool:

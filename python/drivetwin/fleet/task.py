@@ -153,11 +153,15 @@ class Limits:
     memory: int = 4 * 2**30
 
 
+IDENTIFY = "drivetwin.fleet.identify:identify_log"
+"""Function of a worker."""
+
+
 @dataclass(frozen=True)
 class WorkerSpec:
     """Specification of a worker: its function as `module:name`, and the limits of one log."""
 
-    function: str = "drivetwin.fleet.identify:identify_log"
+    function: str = IDENTIFY
     limits: Limits = field(default_factory=Limits)
 
 

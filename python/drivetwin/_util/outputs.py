@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of commands: declared by a marker at the parameter, checked before the computation."""
+"""Outputs of commands: declared by a marker, checked before the computation."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, get_type_hints
 
 from drivetwin._util.atomic import refuse_overwrite
 from drivetwin.errors import FileFormatError, InputError, Where
@@ -24,7 +23,7 @@ class Shape(StrEnum):
 
 @dataclass(frozen=True)
 class Output:
-    """Marker of a parameter that names an output, as metadata of its annotation.
+    """Marker of an argument that names an output.
 
     `endings` are the endings that a file may have, each with its kind; empty: any ending.
     """
@@ -72,17 +71,6 @@ def _check_place(path: Path) -> None:
         what = f"no permission to write in {nearest.resolve()}"
         remedy = "name another folder, or change its permissions"
         raise InputError(what, remedy, Where(file=str(path)))
-
-
-def find_outputs(command: Callable[..., None]) -> dict[str, Output]:
-    """Return the markers of a command's outputs by parameter."""
-    hints: dict[str, Any] = get_type_hints(command, include_extras=True)
-    return {
-        name: one
-        for name, hint in hints.items()
-        for one in getattr(hint, "__metadata__", ())
-        if isinstance(one, Output)
-    }
 
 
 def select_outputs(paths: Iterable[Path] | None, *endings: str) -> list[Path]:

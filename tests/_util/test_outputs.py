@@ -10,11 +10,11 @@ from typing import Any, get_type_hints
 
 import pytest
 
+from drivetwin._util.outputs import Output, Shape, select_outputs
 from drivetwin.cli import main
 from drivetwin.cli.app import COMMANDS
 from drivetwin.cli.command_group import CommandGroup, Entry, LazyCommands, build_command
-from drivetwin.cli.inputs import protect_inputs
-from drivetwin.cli.outputs import Output, Shape, find_outputs, select_outputs
+from drivetwin.cli.options import bind_command, find_outputs, get_request
 from drivetwin.errors import FileFormatError, InputError
 
 
@@ -41,7 +41,7 @@ def test_the_root_is_refused_by_every_output_before_the_computation(
     name: str, parameter: str, function: Any, marker: Output
 ) -> None:
     with pytest.raises(InputError) as caught:
-        protect_inputs(function)(**{parameter: Path("/")})
+        bind_command(function)(**{parameter: Path("/")})
     assert caught.value.where.file == "/", name
     assert marker.shape in ("file", "folder", "file or folder")
 
@@ -50,11 +50,11 @@ def test_every_option_that_writes_is_an_output() -> None:
     """Options that write are `-o`, and those whose help has the words."""
     unmarked = []
     for name, function in iterate_commands(COMMANDS):
-        marked, hints = find_outputs(function), get_type_hints(function)
+        marked, hints = find_outputs(function), get_type_hints(get_request(function))
         for option in build_command(name, function).params:
             text = (getattr(option, "help", None) or "").casefold()
             written = "-o" in option.opts or "write" in text.split()
-            takes_path = "Path" in str(hints[option.name])
+            takes_path = "Path" in str(hints.get(option.name))
             if written and takes_path and option.name not in marked:
                 unmarked.append(f"{name} {option.opts}")
     assert unmarked == []

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: MIT
+"""Requests: the one declaration of the arguments of a command.
+
+Command line, JSON Schema, checks, recorded settings and controls of a page derive from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, FrozenInstanceError, dataclass, field, fields
+from enum import Enum, StrEnum
+from pathlib import Path
+from typing import Any, ClassVar, dataclass_transform, get_type_hints
+
+from drivetwin._util.display_units import Display
+from drivetwin._util.outputs import Output, Shape
+from drivetwin.errors import InputError, Where
+
+_KEY = "argument"
+"""Key of the declaration in the metadata of a field."""
+_BARE = Display("")
+SECOND, METRE, MEBIBYTE = Display("s"), Display("m"), Display("MiB", 2.0**-20)
+
+
+class FileRole(StrEnum):
+    """Role of a file that a command reads, in words."""
+
+    LOG = "a log"
+    TWIN = "a twin"
+    RESULT = "a result of an identification"
+    CARD = "a vehicle card"
+    MAPPING = "a channel mapping"
+    OTHER = "another file"
+
+
+@dataclass(frozen=True)
+class Argument:
+    """Declaration of a field of a request.
+
+    The command line has `minimum`, `maximum` and values in the display unit `unit`; the field is
+    SI. `names` are the names on the command line, empty for a positional argument. `output` marks a
+    path that is written, `role` a file that is read. An argument that `decides` nothing may differ
+    between an interrupted run and the run that continues it.
+    """
+
+    help: str
+    names: tuple[str, ...] = ()
+    metavar: str | None = None
+    unit: Display = _BARE
+    minimum: float | None = None
+    maximum: float | None = None
+    role: FileRole | None = None
+    output: Output | None = None
+    decides: bool = True
+    shows_default: bool = True
+
+    @property
+    def placeholder(self) -> str | None:
+        """Word for the value in a help text, by default the unit."""
+        return self.metavar or self.unit.label.upper() or None
+
+    def to_display(self, value: Any) -> Any:
+        """Convert a number from SI; return other values unchanged."""
+        if self.unit.factor == 1.0 or value is None:
+            return value
+        return type(value)(value * self.unit.factor)
+
+    def to_si(self, value: Any) -> Any:
+        """Convert a number to SI; return other values unchanged."""
+        if self.unit.factor == 1.0 or value is None:
+            return value
+        return type(value)(value / self.unit.factor)
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise InputError for a number outside the limits; `value` in SI."""
+        if value is None:
+            return
+        shown, unit = self.to_display(value), f" {self.unit.label}".rstrip()
+        if self.minimum is not None and shown < self.minimum:
+            fault = f"below the minimum of {self.minimum:g}{unit}"
+        elif self.maximum is not None and shown > self.maximum:
+            fault = f"above the maximum of {self.maximum:g}{unit}"
+        else:
+            return
+        what = f"{name.replace('_', ' ')} is {shown:g}{unit}, {fault}"
+        raise InputError(what, "give a number within the limits", Where(key=name))
+
+
+REQUIRED: Any = MISSING
+"""Default of an option that has to be given."""
+
+
+def option(help: str, *names: str, default: Any = None, **described: Any) -> Any:
+    """Declare a field of a request as an option; `described` are fields of `Argument`.
+
+    Without `names` the option is called as the field.
+    """
+    return field(default=default, metadata={_KEY: Argument(help, names or ("",), **described)})
+
+
+def flag(help: str, *names: str, **described: Any) -> Any:
+    """Declare an option without a value."""
+    return option(help, *names, default=False, **described)
+
+
+def argument(help: str, metavar: str, *, default: Any = REQUIRED, **described: Any) -> Any:
+    """Declare a field of a request as a positional argument, as `option` does."""
+    declared = Argument(help, metavar=metavar, **described)
+    return field(default=default, metadata={_KEY: declared})
+
+
+def input_file(
+    help: str, metavar: str = "FILE", role: FileRole = FileRole.OTHER, default: Any = None
+) -> Any:
+    """Declare an option that names a file to read."""
+    return option(help, metavar=metavar, role=role, default=default)
+
+
+def output_folder(help: str, metavar: str = "DIR", default: Any = None) -> Any:
+    """Declare `-o`, a folder for the results."""
+    marker = Output(Shape.FOLDER)
+    return option(help, "-o", "--output", metavar=metavar, output=marker, default=default)
+
+
+def output_file(
+    help: str, metavar: str, endings: Mapping[str, str] | None = None, default: Any = None
+) -> Any:
+    """Declare `-o`, a file for the results; `endings` as in `Output`."""
+    marker = Output(endings=endings)
+    return option(help, "-o", "--output", metavar=metavar, output=marker, default=default)
+
+
+COMMANDS: dict[str, type[Request]] = {}
+"""Requests by the name of their command."""
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
+class Request:
+    """Base of requests, whose subclasses are frozen dataclasses with keyword arguments.
+
+    The request of a command names it: `class Reduce(Request, command="reduce")`.
+    Values are checked against the limits of their declarations. The methods of a dataclass are
+    stated here once: generating them for each command would slow down every start of the program.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __init_subclass__(cls, command: str = "") -> None:
+        if command:
+            COMMANDS[command] = cls
+        dataclass(init=False, repr=False, eq=False, match_args=False, kw_only=True)(cls)
+
+    def __init__(self, **given: Any) -> None:
+        for one in fields(self):
+            if one.name not in given and one.default_factory is not MISSING:
+                given[one.name] = one.default_factory()
+            elif given.setdefault(one.name, one.default) is MISSING:
+                raise TypeError(f"{type(self).__name__} needs {one.name!r}")
+        if unknown := given.keys() - self.__dataclass_fields__.keys():
+            raise TypeError(f"{type(self).__name__} has no {', '.join(sorted(unknown))}")
+        vars(self).update(given)
+        for name, declared in get_arguments(type(self)).items():
+            declared.check(name, getattr(self, name))
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise FrozenInstanceError(f"cannot assign to field {name!r}")
+
+    def __repr__(self) -> str:
+        listed = ", ".join(f"{name}={value!r}" for name, value in vars(self).items())
+        return f"{type(self).__name__}({listed})"
+
+    def select(self, base: type[Request]) -> dict[str, Any]:
+        """Return the arguments by name that a base of the request declares."""
+        return {name: getattr(self, name) for name in get_arguments(base)}
+
+    def describe_settings(self) -> dict[str, str]:
+        """Return the arguments that decide the result as texts by name, files excluded."""
+        return {
+            name.replace("_", " "): _spell(declared.to_display(getattr(self, name)))
+            for name, declared in get_arguments(type(self)).items()
+            if declared.decides and declared.role is None and declared.output is None
+        }
+
+    def list_files(self) -> dict[str, Path | None]:
+        """Return the files that are read by name; None for a file that is not given."""
+        found: dict[str, Path | None] = {}
+        for name, declared in get_arguments(type(self)).items():
+            label, paths = name.replace("_", " "), getattr(self, name)
+            if declared.role is not None and isinstance(paths, tuple):
+                found |= {f"{label} {number}": one for number, one in enumerate(paths, 1)}
+            elif declared.role is not None:
+                found[label] = paths
+        return found
+
+
+def get_arguments(request: type[Request]) -> dict[str, Argument]:
+    """Return the declarations of the fields of a request by name, in their order."""
+    return {one.name: one.metadata[_KEY] for one in fields(request) if _KEY in one.metadata}
+
+
+def build_request_schema(command: str) -> dict[str, Any]:
+    """Return the JSON Schema of the request of a command; numbers in SI.
+
+    Raises InputError for a command that does not exist.
+    """
+    from pydantic import Field as SchemaField
+    from pydantic import create_model
+
+    request = COMMANDS.get(command)
+    if request is None:
+        raise InputError(f"there is no command {command!r}", f"take one of {', '.join(COMMANDS)}")
+    hints = get_type_hints(request)
+    described: dict[str, Any] = {}
+    for one in fields(request):
+        declared = one.metadata.get(_KEY)
+        if declared is not None:
+            described[one.name] = (
+                hints[one.name],
+                SchemaField(
+                    ... if one.default is MISSING else one.default,
+                    description=declared.help,
+                    ge=declared.to_si(declared.minimum),
+                    le=declared.to_si(declared.maximum),
+                ),
+            )
+    schema: dict[str, Any] = create_model(request.__name__, **described).model_json_schema()
+    return schema
+
+
+def spell_option(name: str) -> str:
+    """Return the name of a field as the command line spells it."""
+    return f"--{name.replace('_', '-')}"
+
+
+def _spell(value: object) -> str:
+    return str(value.value) if isinstance(value, Enum) else str(value)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: MIT
+"""Operating point, policy and seed of a calibration, as command line and Python state them."""
+
+from __future__ import annotations
+
+from drivetwin._util.display_units import BAR, NM, RPM
+from drivetwin._util.request import METRE, SECOND, Request, option
+from drivetwin.calibration.policies.kind import PolicyKind
+
+
+class CalibrationOptions(Request):
+    """Operating point (None: from the twin), policy, hardware and seed of a calibration.
+
+    `engine_torque` [N m] and `engine_speed` [rad/s] are those at the shift request, `task` and
+    `engine_lag` [s] those of a closed slip loop. `system_pressure` [Pa] is by default the largest
+    that the twin's log has; `wheel_radius` [m].
+    """
+
+    engine_torque: float | None = option("Engine torque at the shift request.", unit=NM)
+    engine_speed: float | None = option("Engine speed at the shift request.", unit=RPM)
+    system_pressure: float | None = option("Pressure of a held element.", unit=BAR)
+    wheel_radius: float = option("Dynamic tyre radius.", unit=METRE, minimum=0.05, default=0.5)
+    policy: PolicyKind = option(
+        f"Unknowns: {PolicyKind.describe_all()}.", default=PolicyKind.CONTROLLER
+    )
+    task: float = option(
+        "Controller task (slip).", unit=SECOND, minimum=1e-3, maximum=0.1, default=0.01
+    )
+    engine_lag: float = option(
+        "Lag of the engine torque (slip).", unit=SECOND, minimum=0.0, maximum=1.0, default=0.05
+    )
+    seed: int = option("Seed of draws and search.", minimum=0, default=1)
