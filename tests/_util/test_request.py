@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import FrozenInstanceError, field, fields, replace
 from inspect import signature
 from pathlib import Path
@@ -10,11 +11,11 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-from drivetwin._util.display_units import RPM
 from drivetwin._util.request import (
     COMMANDS,
     MEBIBYTE,
     REQUIRED,
+    RPM,
     FileRole,
     Request,
     argument,
@@ -82,6 +83,7 @@ def test_numbers_go_through_the_display_unit_and_keep_their_type() -> None:
     assert (size, type(size)) == (1024, int)
     assert arguments["memory"].to_si(1024) == 2**30
     assert arguments["speed"].to_si(60.0) == pytest.approx(6.2832, rel=1e-5)
+    assert arguments["speed"].to_si(1500.0) == 1500.0 * math.pi / 30.0
     assert arguments["speed"].placeholder == "RPM"
     assert arguments["speed"].to_display(None) is None
 
@@ -89,7 +91,7 @@ def test_numbers_go_through_the_display_unit_and_keep_their_type() -> None:
 def test_settings_and_files_that_decide_a_result() -> None:
     made = Made(log=LOG, count=3, others=(Path("b"), Path("c")), again=True)
     assert made.describe_settings() == {
-        "speed": str(100.0 * RPM.factor),
+        "speed": str(100.0 * 30.0 / math.pi),
         "count": "3",
         "memory": "1024",
     }

@@ -6,20 +6,32 @@ Command line, JSON Schema, checks, recorded settings and controls of a page deri
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, FrozenInstanceError, dataclass, field, fields
 from enum import Enum, StrEnum
 from pathlib import Path
-from typing import Any, ClassVar, dataclass_transform, get_type_hints
+from typing import Any, ClassVar, NamedTuple, dataclass_transform, get_type_hints
 
-from drivetwin._util.display_units import Display
 from drivetwin._util.outputs import Output, Shape
 from drivetwin.errors import InputError, Where
 
 _KEY = "argument"
 """Key of the declaration in the metadata of a field."""
-_BARE = Display("")
-SECOND, METRE, MEBIBYTE = Display("s"), Display("m"), Display("MiB", 2.0**-20)
+
+
+class Unit(NamedTuple):
+    """Unit of numbers on the command line; a fraction, so that whole numbers convert exactly."""
+
+    label: str
+    numerator: float = 1.0
+    """SI value of `denominator` units."""
+    denominator: float = 1.0
+
+
+_BARE = Unit("")
+RPM, BAR, NM = Unit("rpm", math.pi, 30.0), Unit("bar", 1e5), Unit("Nm")
+SECOND, METRE, MEBIBYTE = Unit("s"), Unit("m"), Unit("MiB", 2.0**20)
 
 
 class FileRole(StrEnum):
@@ -46,7 +58,7 @@ class Argument:
     help: str
     names: tuple[str, ...] = ()
     metavar: str | None = None
-    unit: Display = _BARE
+    unit: Unit = _BARE
     minimum: float | None = None
     maximum: float | None = None
     role: FileRole | None = None
@@ -61,15 +73,15 @@ class Argument:
 
     def to_display(self, value: Any) -> Any:
         """Convert a number from SI; return other values unchanged."""
-        if self.unit.factor == 1.0 or value is None:
+        if self.unit.numerator == 1.0 or value is None:
             return value
-        return type(value)(value * self.unit.factor)
+        return type(value)(value * self.unit.denominator / self.unit.numerator)
 
     def to_si(self, value: Any) -> Any:
         """Convert a number to SI; return other values unchanged."""
-        if self.unit.factor == 1.0 or value is None:
+        if self.unit.numerator == 1.0 or value is None:
             return value
-        return type(value)(value / self.unit.factor)
+        return type(value)(value * self.unit.numerator / self.unit.denominator)
 
     def check(self, name: str, value: Any) -> None:
         """Raise InputError for a number outside the limits; `value` in SI."""

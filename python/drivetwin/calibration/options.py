@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin._util.display_units import BAR, NM, RPM
-from drivetwin._util.request import METRE, SECOND, Request, option
+from drivetwin._util.request import BAR, METRE, NM, RPM, SECOND, Request, option
 from drivetwin.calibration.policies.kind import PolicyKind
 
 
