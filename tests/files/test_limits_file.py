@@ -51,6 +51,7 @@ def test_reads_the_spread(tmp_path: Path) -> None:
         ("[spread]\ngain = 0.1\n", "limits"),
         ("[limits]\n[spread]\ngain = -1\n", r"spread.gain"),
         ("[limits]\n[spread]\ngian = 0.1\n", r"gian"),
+        ("[limits]\n[spread]\ndead_time = 0.1\n", r"unknown key 'dead_time'; write 'dead_time_s'"),
         ("limits = 3\n", "limits"),
         ("[limits\n", "no valid TOML"),
     ],

@@ -144,6 +144,10 @@ class Provenance:
     spread: Spread
 
 
+_STATED = ("unit", "start", "low", "high", "text")
+"""Attributes of a parameter of the policy that the file repeats."""
+
+
 def hash_file(path: Path) -> str:
     """Return the SHA-256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
@@ -174,18 +178,11 @@ def build_calibration_file(
                 "wheel_radius_m": task.maneuver.wheel_radius,
             },
             "parameters": {
-                one.name: {
-                    "value": value,
-                    "unit": one.unit,
-                    "start": one.start,
-                    "low": one.low,
-                    "high": one.high,
-                    "text": one.text,
-                }
+                one.name: {name: getattr(one, name) for name in _STATED} | {"value": value}
                 for one, value in values
             },
             "limits": {keys[one.metric, one.statistic]: one.bound for one in task.limits},
-            "spread": SpreadRecord.from_spread(origin.spread).model_dump(mode="json"),
+            "spread": SpreadRecord.from_result(origin.spread),
             "settings": asdict(task.settings),
             "front": build_front_records(front, task.policy),
             "map": build_map_records(mapped),

@@ -89,15 +89,7 @@ def build_fit_file(
         cost=found.cost,
         unknowns={
             name: UnknownRecord(
-                value=one.value,
-                unit=one.unit,
-                std_noise=one.std_noise,
-                ci95=one.ci95,
-                std_total=one.std_total,
-                ci95_total=one.ci95_total,
-                verdict=one.verdict,
-                method=one.method,
-                reason=one.reason,
+                **dict(ParameterRecord.from_result(one)),
                 minimum=values[name],
                 interval=found.intervals[name],
             )
@@ -108,7 +100,7 @@ def build_fit_file(
             for name, row in zip(names, found.correlation, strict=True)
         },
         fit=[_build_fits(one) for one in found.agreement],
-        starts=[StartRecord(cost=one.cost, iterations=one.iterations) for one in found.starts],
+        starts=[StartRecord.from_result(one) for one in found.starts],
         agreeing=found.agreeing,
         held_out=[
             HeldOutRecord(log=name, chi2=one.chi2, fit=_build_fits(one.agreement))
@@ -119,10 +111,7 @@ def build_fit_file(
 
 
 def _build_fits(agreement: Mapping[str, Any]) -> dict[str, FitRecord]:
-    return {
-        name: FitRecord(rmse=one.rmse, fit_percent=one.fit_percent)
-        for name, one in agreement.items()
-    }
+    return {name: FitRecord.from_result(one) for name, one in agreement.items()}
 
 
 def format_fit_file(file: FitFile) -> str:

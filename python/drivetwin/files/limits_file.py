@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -39,36 +39,23 @@ def build_limit_keys() -> dict[str, tuple[Metric, Statistic]]:
     return keys
 
 
-_KEYS = {
-    "contact_pressure": "contact_pressure_Pa",
-    "dead_time": "dead_time_s",
-    "kiss_pressure": "kiss_pressure_Pa",
-}
-"""Keys of `[spread]` that have a unit, by the names of `Spread`."""
-
-
 class SpreadRecord(Record):
     """Table `[spread]`: standard deviations between units."""
 
     gain: FiniteFloat = Field(default=Spread.gain, ge=0, lt=0.5)
     engine_torque: FiniteFloat = Field(default=Spread.engine_torque, ge=0, lt=0.5)
-    contact_pressure_Pa: FiniteFloat = Field(default=Spread.contact_pressure, ge=0)
-    dead_time_s: FiniteFloat = Field(default=Spread.dead_time, ge=0, lt=0.5)
+    contact_pressure: FiniteFloat = Field(
+        default=Spread.contact_pressure, ge=0, alias="contact_pressure_Pa"
+    )
+    dead_time: FiniteFloat = Field(default=Spread.dead_time, ge=0, lt=0.5, alias="dead_time_s")
     actuator_lag: FiniteFloat = Field(default=Spread.actuator_lag, ge=0, lt=0.5)
-    kiss_pressure_Pa: FiniteFloat = Field(default=Spread.kiss_pressure, ge=0)
+    kiss_pressure: FiniteFloat = Field(default=Spread.kiss_pressure, ge=0, alias="kiss_pressure_Pa")
     fill_time: FiniteFloat = Field(default=Spread.fill_time, ge=0, lt=0.5)
     engine_lag: FiniteFloat = Field(default=Spread.engine_lag, ge=0, lt=0.5)
 
-    @classmethod
-    def from_spread(cls, spread: Spread) -> SpreadRecord:
-        """Return the record of a spread."""
-        return cls(**{_KEYS.get(name, name): value for name, value in vars(spread).items()})
-
     def to_spread(self) -> Spread:
         """Return the spread of the record."""
-        return Spread(
-            **{one.name: getattr(self, _KEYS.get(one.name, one.name)) for one in fields(Spread)}
-        )
+        return Spread(**dict(self))
 
 
 class LimitsFile(Record):

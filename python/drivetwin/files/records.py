@@ -8,7 +8,15 @@ from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationInfo,
+    model_validator,
+)
 
 from drivetwin._util.plain_values import convert_nonfinite
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
@@ -44,6 +52,10 @@ def _close_interval(value: object) -> object:
 OptionalInterval = Annotated[Interval | None, BeforeValidator(_close_interval)]
 
 
+_BY_NAME = {"by": "name"}
+"""Context in which a record is built from the attributes of a result."""
+
+
 class Record(BaseModel):
     """Base of all records: closed key set, immutable."""
 
@@ -52,7 +64,17 @@ class Record(BaseModel):
     @classmethod
     def from_result(cls, result: object) -> Self:
         """Build the record and those of its parts from the attributes of the fields' names."""
-        return cls.model_validate(result, from_attributes=True)
+        return cls.model_validate(result, from_attributes=True, context=_BY_NAME)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_names(cls, source: Any, info: ValidationInfo) -> Any:
+        """Refuse the name of a field whose key in the file is another, such as one with unit."""
+        if isinstance(source, dict) and info.context is not _BY_NAME:
+            for name, one in cls.model_fields.items():
+                if one.alias is not None and name in source:
+                    raise ValueError(f"unknown key {name!r}; write {one.alias!r}")
+        return source
 
 
 class StribeckRecord(Record):

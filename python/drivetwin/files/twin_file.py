@@ -59,10 +59,10 @@ class ElementRecord(Record):
     kind: ElementKind
     i_c: FiniteFloat
     i_out: FiniteFloat
-    gain_m3: FiniteFloat = Field(gt=0)
-    P0_Pa: FiniteFloat
+    gain: FiniteFloat = Field(gt=0, alias="gain_m3")
+    P0: FiniteFloat = Field(alias="P0_Pa")
     peak: FiniteFloat = Field(ge=1)
-    drum_inertia_kgm2: FiniteFloat = Field(ge=0)
+    drum: FiniteFloat = Field(ge=0, alias="drum_inertia_kgm2")
 
     @field_validator("i_c", "i_out")
     @classmethod
@@ -128,8 +128,8 @@ class TransmissionRecord(Record):
 
     i_in: FiniteFloat = Field(gt=0)
     final_drive: FiniteFloat = Field(gt=0)
-    J_prime_range_kgm2: Interval
-    J_vehicle_range_kgm2: Interval
+    J_prime_range: Interval = Field(alias="J_prime_range_kgm2")
+    J_vehicle_range: Interval = Field(alias="J_vehicle_range_kgm2")
     gears: dict[str, GearRecord]
     elements: dict[str, ElementRecord]
     channels: dict[str, ChannelRecord] = Field(default_factory=dict)
@@ -272,12 +272,6 @@ _TWIN_FIELDS = (
 _GEARBOX_FIELDS = (
     *("i_in", "final_drive", "gears", "J_prime_range", "J_vehicle_range", "converter"),
 )
-_KEYS = {
-    "gain": "gain_m3", "P0": "P0_Pa", "drum": "drum_inertia_kgm2",
-    "J_prime_range": "J_prime_range_kgm2", "J_vehicle_range": "J_vehicle_range_kgm2",
-}  # fmt: skip
-"""Keys of the file by the attribute that they hold, where the two differ."""
-_NAMES = {key: name for name, key in _KEYS.items()}
 
 
 def load_twin(path: Path | str) -> Twin:
@@ -299,10 +293,11 @@ def build_twin_file(twin: Twin) -> TwinFile:
         | {
             "schema": TWIN_SCHEMA,
             "transmission": {
-                **_add_units({name: getattr(twin, name) for name in _GEARBOX_FIELDS}),
-                "elements": {name: _add_units(vars(one)) for name, one in twin.elements.items()},
+                **{name: getattr(twin, name) for name in _GEARBOX_FIELDS},
+                "elements": twin.elements,
                 "channels": {
-                    role: _flatten_channel(one) for role, one in twin.mapping.channels.items()
+                    role: {**vars(one.spec), "file_unit": one.file_unit}
+                    for role, one in twin.mapping.channels.items()
                 },
             },
             "log": _flatten_options(twin.mapping.options),
@@ -311,10 +306,6 @@ def build_twin_file(twin: Twin) -> TwinFile:
             "settings": to_plain_values(dict(twin.settings)),
         }
     )
-
-
-def _flatten_channel(channel: RememberedChannel) -> dict[str, Any]:
-    return {**vars(channel.spec), "file_unit": channel.file_unit}
 
 
 def _flatten_options(options: ReadOptions) -> dict[str, Any] | None:
@@ -331,24 +322,17 @@ def _flatten_options(options: ReadOptions) -> dict[str, Any] | None:
     }
 
 
-def _add_units(fields: dict[str, Any]) -> dict[str, Any]:
-    return {_KEYS.get(name, name): value for name, value in fields.items()}
-
-
 def restore_twin(content: TwinFile) -> Twin:
     """Build a twin from its records; `version` is that of the program that identified it."""
     gearbox, covariance = content.transmission, content.covariance
     same = {name: getattr(content, name) for name in _TWIN_FIELDS}
-    design = {name: getattr(gearbox, _KEYS.get(name, name)) for name in _GEARBOX_FIELDS}
+    design = {name: getattr(gearbox, name) for name in _GEARBOX_FIELDS}
     return Twin(
         **same
         | design
         | {
             "gears": {name: TwinGear(**dict(one)) for name, one in gearbox.gears.items()},
-            "elements": {
-                name: TwinElement(**{_NAMES.get(key, key): value for key, value in one})
-                for name, one in gearbox.elements.items()
-            },
+            "elements": {name: TwinElement(**dict(one)) for name, one in gearbox.elements.items()},
             "mapping": RememberedMapping(
                 {role: one.to_channel() for role, one in gearbox.channels.items()},
                 ReadOptions() if content.log is None else content.log.to_options(),

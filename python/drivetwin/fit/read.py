@@ -13,7 +13,6 @@ from drivetwin.channels.read_options import Column
 from drivetwin.channels.recognition import find_candidates
 from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.estimation.data.prepare_signal import prepare_signal
-from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.findings import Finding
 from drivetwin.fit.model_file import ModelChannels
 from drivetwin.fit.network_model import NetworkModel
@@ -37,7 +36,7 @@ def read_recording(
     specs = _find_columns(path, {**channels.inputs, **channels.outputs}, channels.roles)
     found, findings = read_channels(path, specs, quantities)
     signals = {name: prepare_signal(channel) for name, channel in found.items()}
-    inputs = {name: _to_signal(signals[name]) for name in channels.inputs}
+    inputs = {name: Signal(signals[name].time, signals[name].values) for name in channels.inputs}
     outputs = {
         name: Measured(one.time, one.values, channels.sigma.get(name, one.sigma))
         for name in channels.outputs
@@ -76,7 +75,3 @@ def _pick_column(
         raise MappingError(what, "name the column: source in place of role", where)
     spec = make_spec(found[0], columns)
     return replace(stated, source=spec.source, group=spec.group)
-
-
-def _to_signal(one: MeasuredSignal) -> Signal:
-    return Signal(one.time, one.values)

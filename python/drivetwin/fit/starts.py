@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -146,8 +145,4 @@ def _find_largest_torque(
     found = [record.inputs[name].values for name in inputs if name in record.inputs]
     torques = ("shaft_torque", "torque", "friction_torque")
     found += [one.values for one in record.outputs if outputs[one.name][0] in torques]
-    return max((_largest(values) for values in found), default=0.0)
-
-
-def _largest(values: FloatArray | Any) -> float:
-    return float(np.max(np.abs(values)))
+    return max((float(np.max(np.abs(values))) for values in found), default=0.0)

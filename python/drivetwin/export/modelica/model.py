@@ -12,7 +12,7 @@ from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import ROTATIONAL, Component, Names, Part
 from drivetwin.export.modelica.elements import build_part
 from drivetwin.export.modelica.friction import GROUND
-from drivetwin.export.modelica.helpers import HELPERS
+from drivetwin.export.modelica.helpers import read_helper
 from drivetwin.export.modelica.inputs import (
     Inputs,
     format_equations,
@@ -64,7 +64,7 @@ def format_package(
     texts = [
         f"package {plain} {format_string(note or name)}",
         "  extends Modelica.Icons.Package;\n",
-        *(HELPERS[helper] for helper in helpers),
+        *map(read_helper, helpers),
         _format_driveline(parts, names, ends),
         *([] if run is None else [_format_shift(elements, parts, names, run)]),
         f'  annotation(uses(Modelica(version="{MSL_VERSION}")));',

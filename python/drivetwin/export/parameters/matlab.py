@@ -79,7 +79,10 @@ def _parse_m(text: str, source: str) -> ParameterSet:
         if not value.startswith("["):
             scalars.append(Scalar(label, parse_finite(value, source, label), unit, about))
             continue
-        values = tuple(parse_finite(word, source, label) for word in _split_words(value))
+        values = tuple(
+            parse_finite(word, source, label)
+            for word in value.strip("[]").replace(",", " ").split()
+        )
         if points := _BREAKPOINTS.fullmatch(about):
             axes[points[2]] = Axis(points[1], values, unit)
         else:
@@ -95,10 +98,6 @@ def _parse_m(text: str, source: str) -> ParameterSet:
         if label in axes
     ]
     return ParameterSet(name, tuple(scalars), tuple(curves), skipped=tuple(skipped))
-
-
-def _split_words(row: str) -> list[str]:
-    return row.strip("[]").replace(",", " ").split()
 
 
 CODEC = Codec(_write_m, _parse_m, to_flat_name, to_ascii_line, _make_breakpoints_name)

@@ -60,13 +60,9 @@ def read_bus_frames(mdf: Any, origin: float) -> Frames | None:
     )
 
 
-def _get_channel_names(group: Any) -> frozenset[str]:
-    return frozenset(str(channel.name) for channel in group.channels)
-
-
 def _read_group_frames(mdf: Any, number: int) -> Frames | None:
     """The frames of one group; parts that the logger left out have their usual meaning."""
-    names = _get_channel_names(mdf.groups[number])
+    names = frozenset(str(channel.name) for channel in mdf.groups[number].channels)
 
     def part(name: str) -> NDArray[Any] | None:
         if f"{DATA_FRAME}.{name}" not in names:

@@ -17,7 +17,7 @@ from drivetwin.logs.formats.can.driveline import load_driveline_messages
 from drivetwin.logs.formats.can.gvret import is_gvret, read_gvret
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.trc import is_trc, read_trc
-from drivetwin.logs.formats.frames import Frames, Message
+from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.formats.j1939.matching import match_groups
 from drivetwin.logs.raw import LogFormat, Recording
 
@@ -61,12 +61,9 @@ BUS_TEXT_FORMAT = LogFormat(open_bus_text, (".asc", ".trc", ".log"), recognises=
 
 def decode_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
     """Decode frames by the databases stated; raises MissingChannelError, MissingExtraError."""
-    stated = _select_messages(options.bus.databases)
+    stated = (
+        read_database(options.bus.databases) if options.bus.databases else load_driveline_messages()
+    )
     messages, notes = match_groups(frames, stated, load_driveline_messages)
     frames = replace(frames, warnings=(*frames.warnings, *notes))
     return BusRecording(frames, messages, options.bus, path)
-
-
-def _select_messages(databases: tuple[Path, ...]) -> tuple[Message, ...]:
-    """Messages of the stated databases, else the built-in ones of J1939."""
-    return read_database(databases) if databases else load_driveline_messages()

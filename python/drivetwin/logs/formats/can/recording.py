@@ -334,7 +334,10 @@ def _collect_multi_packet(
         ]
         for bus, sender in sorted({(one.bus, one.sender) for one in mine}):
             own = [one for one in mine if (one.bus, one.sender) == (bus, sender)]
-            width = max(max(len(one.payload) for one in own), _get_longest_payload(message))
+            width = max(
+                max(len(one.payload) for one in own),
+                max((signal.end for signal in message.signals), default=0),
+            )
             padded = b"".join(one.payload.ljust(width, b"\xff") for one in own)
             yield Track(
                 message,
@@ -345,7 +348,3 @@ def _collect_multi_packet(
                 np.frombuffer(padded, np.uint8).reshape(-1, width),
                 np.array([len(one.payload) for one in own], np.intp),
             )
-
-
-def _get_longest_payload(message: Message) -> int:
-    return max((signal.end for signal in message.signals), default=0)
