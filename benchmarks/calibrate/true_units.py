@@ -12,10 +12,9 @@ import numpy as np
 
 from benchmarks.calibrate.true_vehicle import MadeVehicle
 from benchmarks.estimation.vehicles import draw_errors, misread_channels
-from drivetwin.calibration.closed_loop import Control
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics
-from drivetwin.calibration.profiles import Profiles
+from drivetwin.calibration.profiles import Control, Profiles
 from drivetwin.calibration.scenarios import scale_units
 from drivetwin.calibration.spread import Spread
 from drivetwin.channels.pressure_roles import get_command_element

@@ -29,9 +29,9 @@ from benchmarks.estimation.vehicles import (
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.model import ActuatorModel
-from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, compute_metrics
+from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.channels.pressure_roles import make_command_role
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import BAR

@@ -23,9 +23,9 @@ import numpy as np
 from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle, measure_true_shift
 from benchmarks.estimation.vehicles import SHIFT
 from drivetwin.calibration.calibrate import Assessment, calibrate
-from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import DrivetwinError

@@ -12,8 +12,7 @@ from pathlib import Path
 import plotly.graph_objects as go
 
 from drivetwin.cli import main
-from drivetwin.fit.fit import fit_network
-from drivetwin.fit.holdout import predict
+from drivetwin.fit.fit import fit_network, predict
 from drivetwin.fit.model_file import read_model
 from drivetwin.fit.read import read_recording
 from drivetwin.report.fit import render_fit

@@ -12,13 +12,13 @@ import pytest
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration import evaluate
 from drivetwin.calibration.calibrate import Task, draw_for
-from drivetwin.calibration.closed_loop import ClosedLoop, compute_nominal_profiles
 from drivetwin.calibration.identified_range import simulate_nominal
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Outcome, list_outputs
 from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Space
+from drivetwin.calibration.profiles import ClosedLoop, compute_nominal_profiles
 from drivetwin.calibration.scenarios import Purpose, collect_scenarios
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE

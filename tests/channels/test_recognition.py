@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.name_table import normalise_name
+from drivetwin.channels.names import normalise_name
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.recognition import find_hints, infer_candidates
 

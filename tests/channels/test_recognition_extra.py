@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.name_table import load_name_table
+from drivetwin.channels.names import load_name_table
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.recognition import find_candidates, infer_candidates
 from drivetwin.channels.roles import is_extra

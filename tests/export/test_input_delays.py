@@ -18,7 +18,7 @@ from drivetwin.export.fmu.build import BuildOptions, build_fmu
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.fmu.variables import list_variables
 from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
-from drivetwin.export.modelica.dual_clutch import format_modelica
+from drivetwin.export.modelica.model import format_modelica
 from drivetwin.export.subject import Subject, build_note
 from drivetwin.export.targets import FmiVersion, InputKind
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray, Signal

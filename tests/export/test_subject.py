@@ -13,7 +13,7 @@ from drivetwin.export.c.write import generate_twin_source
 from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.variables import Role, list_variables
 from drivetwin.export.input_delays import InputDelays
-from drivetwin.export.modelica.dual_clutch import format_modelica
+from drivetwin.export.modelica.model import format_modelica
 from drivetwin.export.subject import build_note, build_subject, compute_steady_start
 from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import RoadLoad

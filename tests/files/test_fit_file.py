@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from drivetwin.files.fit_file import FitFile, build_fit_file, format_fit_file
 from drivetwin.findings import Code, report
-from drivetwin.fit.holdout import predict
+from drivetwin.fit.fit import predict
 from drivetwin.fit.synthesize import ModelName
 from tests.support.fits import fit_log, make_log
 

@@ -6,8 +6,7 @@ from __future__ import annotations
 import re
 
 from drivetwin.findings import Code, report
-from drivetwin.fit.fit import fit_network
-from drivetwin.fit.holdout import predict
+from drivetwin.fit.fit import fit_network, predict
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.fit.unknown import Unknown
 from drivetwin.report.fit import render_fit

@@ -10,7 +10,6 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, calibrate
-from drivetwin.calibration.closed_loop import ClosedLoop, Control
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import METRICS, Metric, Outcome, compute_metrics
 from drivetwin.calibration.objective import Limit
@@ -18,6 +17,7 @@ from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.knots import build_knot_policy
 from drivetwin.calibration.policy import Policy, Space
+from drivetwin.calibration.profiles import ClosedLoop, Control
 from drivetwin.calibration.scenarios import Draw, Scenarios, collect_scenarios
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws

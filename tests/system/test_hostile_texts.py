@@ -29,7 +29,7 @@ from drivetwin.errors import InputError, Where
 from drivetwin.export.c.write import generate_twin_source
 from drivetwin.export.fmu.describe import Header, build_description
 from drivetwin.export.fmu.variables import list_variables
-from drivetwin.export.modelica.text import format_string, make_identifier
+from drivetwin.export.modelica.component import format_string, make_identifier
 from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.export.subject import Subject

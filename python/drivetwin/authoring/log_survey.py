@@ -14,7 +14,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped, make_spec, select_free
-from drivetwin.channels.name_table import load_name_table, normalise_name
+from drivetwin.channels.names import load_name_table, normalise_name
 from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.recognition import WHOLE_WORD, infer_candidates

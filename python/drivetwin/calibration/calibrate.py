@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.calibration.certificate import Certificate, certify
-from drivetwin.calibration.closed_loop import Control, compute_nominal_profiles
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.keep_limits import TOLERANCE, Repair
 from drivetwin.calibration.maneuver import Maneuver
@@ -23,7 +22,7 @@ from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
 from drivetwin.calibration.policy import Policy, Space
 from drivetwin.calibration.polish import Run, polish
-from drivetwin.calibration.profiles import Profiles
+from drivetwin.calibration.profiles import Control, Profiles, compute_nominal_profiles
 from drivetwin.calibration.scenarios import Draw, Purpose, Scenarios, draw_scenarios
 from drivetwin.calibration.search import Candidate, search_minima
 from drivetwin.calibration.settings import CalibrationSettings

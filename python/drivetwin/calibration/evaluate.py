@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.closed_loop import ClosedLoop, Control
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics, list_outputs
+from drivetwin.calibration.profiles import ClosedLoop, Control
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import BatchRequest, Keep
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Profiles of a shift: engine torque and clutch pressures over time."""
+"""Control of a shift: profiles of engine torque and pressures, or a controller behind actuators."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.errors import SimulationError
 from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.shift_control import (
+    INPUTS,
+    ControlledNetwork,
+    ControlledUnit,
+    ShiftController,
+    simulate_network_controlled,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,3 +54,40 @@ class Profiles:
                 for one in (self.engine_torque, self.offgoing, self.oncoming)
             )
         )
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """Controller, and the actuators of the nominal unit."""
+
+    controller: ShiftController
+    unit: ControlledUnit
+
+
+Control = Profiles | ClosedLoop
+"""Control of a shift."""
+
+
+def compute_nominal_profiles(maneuver: Maneuver, control: Control) -> Profiles:
+    """Return engine torque and pressures at the clutches of the nominal driveline.
+
+    Raises SimulationError where its run fails.
+    """
+    if isinstance(control, Profiles):
+        return control
+    start = maneuver.start
+    plant = ControlledNetwork(maneuver.elements, start, [control.unit], {})
+    batch = simulate_network_controlled(
+        plant, [control.controller], maneuver.time, [maneuver.body.drive], with_inputs=True
+    )
+    if batch.failed:
+        raise SimulationError(
+            f"the shift of the nominal driveline failed: {batch.failed[0]}",
+            "give another start of the policy, or another operating point",
+        )
+    columns = dict(zip(INPUTS, batch.inputs[0, 0], strict=True))
+    return Profiles(
+        engine_torque=Signal(maneuver.time, columns["engine_torque"]),
+        offgoing=Signal(maneuver.time, columns["pressure.offgoing"]),
+        oncoming=Signal(maneuver.time, columns["pressure.oncoming"]),
+    )

@@ -13,7 +13,7 @@ from pydantic import Field
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
-from drivetwin.channels.name_table import normalise_name
+from drivetwin.channels.names import normalise_name
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES

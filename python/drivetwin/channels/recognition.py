@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from functools import cache
 from itertools import chain
 
-from drivetwin.channels.name_table import NameTable, load_name_table, normalise_name
+from drivetwin.channels.names import NameTable, load_name_table, normalise_name
 from drivetwin.channels.pressure_roles import get_element, make_command_role, make_pressure_role
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.roles import EXTRA_ROLES, get_extra_quantity, get_quantity, is_extra

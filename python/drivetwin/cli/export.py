@@ -96,7 +96,7 @@ def export(request: Export, *, as_json: bool) -> None:
                     **_report_reduction(subject, experiment, as_json),
                 }
             case Target.MODELICA:
-                from drivetwin.export.modelica.dual_clutch import write_modelica
+                from drivetwin.export.modelica.model import write_modelica
 
                 subject, experiment = _load_subject(model, request)
                 write_modelica(subject, experiment, path)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from drivetwin.findings import Finding
-    from drivetwin.fit.holdout import HeldOut
+    from drivetwin.fit.fit import HeldOut
     from drivetwin.fit.recording import Recording
     from drivetwin.fit.result import ModelFit
 
@@ -52,8 +52,7 @@ def fit(request: Fit, *, as_json: bool) -> None:
     verdicts, the agreement of simulation and recordings, and the findings. The fitted model is
     written as a model file.
     """
-    from drivetwin.fit.fit import fit_network
-    from drivetwin.fit.holdout import predict
+    from drivetwin.fit.fit import fit_network, predict
     from drivetwin.fit.model_file import format_model, read_model
 
     logs, hold_out = request.logs, request.hold_out

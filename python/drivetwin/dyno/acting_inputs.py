@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin._util.first_order_lag import apply_lag
+from drivetwin._util.signal_processing import apply_lag
 from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.nominal import NominalRun, compute_friction_work
 from drivetwin.simulation.dual_clutch import FloatArray, ShiftElement, Signal, Trajectory

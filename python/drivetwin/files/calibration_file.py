@@ -23,8 +23,7 @@ from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Policy
 from drivetwin.calibration.spread import Spread
 from drivetwin.files.limits_file import SpreadRecord, build_limit_keys
-from drivetwin.files.read import read_record
-from drivetwin.files.records import Record, SchemaName
+from drivetwin.files.records import Record, SchemaName, read_record
 
 
 class PointFigures(Record):

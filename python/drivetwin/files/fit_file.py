@@ -22,7 +22,7 @@ from drivetwin.files.records import (
     SchemaName,
 )
 from drivetwin.findings import Finding
-from drivetwin.fit.holdout import HeldOut
+from drivetwin.fit.fit import HeldOut
 from drivetwin.fit.result import ModelFit
 
 FIT_SCHEMA = "drivetwin/fit-1"

@@ -18,7 +18,6 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.multi_log import LogShare
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.validation import HeldOut, Outcome
-from drivetwin.files.read import read_record
 from drivetwin.files.records import (
     ActuatorRecord,
     FindingRecord,
@@ -31,6 +30,7 @@ from drivetwin.files.records import (
     Record,
     SchemaName,
     SuggestionRecord,
+    read_record,
 )
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.shift_kind import ShiftKind

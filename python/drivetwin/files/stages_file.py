@@ -14,8 +14,7 @@ from pydantic import Field, FiniteFloat
 from drivetwin._util.atomic import write_text
 from drivetwin.calibration.stages import Stage
 from drivetwin.errors import InputError, Where
-from drivetwin.files.read import read_record
-from drivetwin.files.records import Record, SchemaName
+from drivetwin.files.records import Record, SchemaName, read_record
 
 STAGES_SCHEMA = "drivetwin/calibration-stages-1"
 

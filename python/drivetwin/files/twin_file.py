@@ -21,7 +21,6 @@ from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, Reme
 from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
 from drivetwin.errors import InputError, ResultFileError
 from drivetwin.estimation.result.method import Method
-from drivetwin.files.read import read_record
 from drivetwin.files.records import (
     ActuatorRecord,
     CovarianceRecord,
@@ -32,6 +31,7 @@ from drivetwin.files.records import (
     ParameterRecord,
     Record,
     SchemaName,
+    read_record,
 )
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.converter_map import Converter

@@ -1,25 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Fit of a network to recordings."""
+"""Fit of a network to recordings, and prediction of those that took no part in it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError
+from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.fit.network_model import NetworkModel
-from drivetwin.fit.plant import Plant
 from drivetwin.fit.recording import NetworkRecord, Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
 from drivetwin.fit.search import Problem, search
 from drivetwin.fit.starts import drop_redundant_speeds, guess_start, list_starts
-from drivetwin.fit.term import NetworkTerm
+from drivetwin.fit.term import NetworkTerm, Plant
 from drivetwin.fit.unknown import SoughtNumber, require_known_places, resolve_unknown
 from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
 from drivetwin.simulation.input_value import make_input
@@ -174,3 +175,60 @@ def _require_inputs(model: NetworkModel, recording: Recording) -> None:
         what = f"the recording has no input {', '.join(map(repr, missing))}"
         known = ", ".join(recording.inputs) or "none"
         raise InputError(what, f"record it, or give a constant; inputs of the recording: {known}")
+
+
+_HELD = 1e-4
+"""Spread of the unknowns in a prediction over that of the fit [ratio]: only starts move."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Prediction of one recording by the values of a fit: agreement by output, Q per sample by the
+    sensors' noise and that of the inputs."""
+
+    agreement: Mapping[str, SignalFit]
+    chi2: float
+
+
+def predict(found: ModelFit, recordings: Sequence[Recording]) -> tuple[HeldOut, ...]:
+    """Predict recordings with the values of a fit; only their starts are adapted.
+
+    Parameters
+    ----------
+    found
+        Fit.
+    recordings
+        Recordings that took no part in it.
+
+    Returns
+    -------
+    tuple of HeldOut
+        Predictions in the order of the recordings.
+
+    Raises
+    ------
+    IdentificationError
+        Where a recording cannot be simulated.
+    """
+    held = []
+    for recording in recordings:
+        problem, point, sought = build_problem(found.fitted, [recording])
+        count = len(sought)
+        mean, precision = problem.prior.mean.copy(), problem.prior.precision.copy()
+        mean[:count] = found.minimum.point.values[:count]
+        spread = np.sqrt(np.diag(found.covariance)[:count])
+        precision[:count, :count] = np.diag((_HELD * spread) ** -2.0)
+        values = np.concatenate([mean[:count], point.values[count:]])
+        prior = replace(problem.prior, mean=mean, precision=precision)
+        problem, point = replace(problem, prior=prior), point.replace_values(values)
+        rough = minimise(problem, point, rough=True)
+        end = rough and minimise(problem.update_weighting(rough.point), rough.point)
+        if not end:
+            raise IdentificationError(
+                "a recording that was held out cannot be simulated with the values of the fit",
+                "check that it is of the same driveline, and its start",
+            )
+        part = end.problem.parts[0]
+        cost = end.normal.cost - prior.compute_prior_cost(end.point.values)
+        held.append(HeldOut(part.compare(end.point), cost / end.problem.size))
+    return tuple(held)

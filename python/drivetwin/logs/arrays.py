@@ -19,8 +19,7 @@ from drivetwin.channels.names import is_time_name
 from drivetwin.channels.roles import FOR_SHIFTS
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import RawChannel, RawLog
+from drivetwin.logs.raw import RawChannel, RawLog, describe_origin, find_origin, subtract_origin
 from drivetwin.logs.read import Demands, assemble_log
 from drivetwin.vehicle.card import VehicleCard
 

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from drivetwin._util.display_units import spell_unit
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitCheck, LimitState
-from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.front import Front
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import OperatingMap
+from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.findings import Finding
 from drivetwin.report.figures.calibration import (
     build_profile_panels,

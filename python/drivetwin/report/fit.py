@@ -16,7 +16,7 @@ from drivetwin.channels.shiftlog import Quantity
 from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Finding
-from drivetwin.fit.holdout import HeldOut
+from drivetwin.fit.fit import HeldOut
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.term import NetworkTerm

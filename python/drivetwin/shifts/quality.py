@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.low_pass import filter_zero_phase
+from drivetwin._util.signal_processing import filter_zero_phase
 from drivetwin.channels.pressure_roles import make_command_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds

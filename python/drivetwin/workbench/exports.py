@@ -67,7 +67,7 @@ def _write_product(work: SessionState, wanted: Target, path: Path) -> None:
             subject, experiment = _get_subject(work)
             build_fmu(subject, path, BuildOptions(experiment=experiment))
         case Target.MODELICA:
-            from drivetwin.export.modelica.dual_clutch import write_modelica
+            from drivetwin.export.modelica.model import write_modelica
 
             write_modelica(*_get_subject(work), path)
         case _:

@@ -17,7 +17,7 @@ from drivetwin.report.style import ACCENT, MUTED
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
-from drivetwin.workbench.plot_events import parse_number
+from drivetwin.workbench.zoom import parse_number
 
 LEAST_PHASE = 5e-3
 """Shortest phase [s] that can be set by hand; only the torque phase may be empty."""

@@ -18,6 +18,10 @@ from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.channels.mapping_file import find_project_mapping
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.files import format_card, format_log
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
@@ -30,7 +34,6 @@ from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.identifying import Task, identify_all
 from drivetwin.workbench.mapping import Corrections, Entry, apply_entries
 from drivetwin.workbench.phases import Boundary
-from drivetwin.workbench.sample import write_sample
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
 from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
 from drivetwin.workbench.workspace_folder import Folder
@@ -431,3 +434,15 @@ def _make_request(
         beside=mapping is None and project is not None,
         corrections=corrections,
     )
+
+
+LOG, CARD = "sample.csv", "sample.card.toml"
+
+
+def write_sample(folder: Path) -> tuple[Path, Path]:
+    """Write log and vehicle card of the sample into a folder; return their paths."""
+    made = run(load_scenario(ScenarioName.PAPER_STEPS), seed=1)
+    log, card = folder / LOG, folder / CARD
+    log.write_text(format_log(made), encoding="utf-8", newline="\n")
+    card.write_text(format_card(made.scenario), encoding="utf-8", newline="\n")
+    return log, card

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -13,7 +14,18 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display
 from drivetwin.report.decimate import decimate_around
 from drivetwin.report.figures.stack import Curve, Panel
-from drivetwin.workbench.plot_events import parse_number
+
+
+def parse_number(value: object) -> float | None:
+    """Return a finite number; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
 
 View = tuple[float, float]
 """First and last time [s] of a figure."""

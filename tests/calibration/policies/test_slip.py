@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.calibrate import calibrate
-from drivetwin.calibration.closed_loop import compute_nominal_profiles
 from drivetwin.calibration.identified_range import simulate_nominal
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit
 from drivetwin.calibration.policy import Space
+from drivetwin.calibration.profiles import compute_nominal_profiles
 from drivetwin.calibration.scenarios import Draw, Purpose, draw_scenarios
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws

@@ -13,6 +13,7 @@ from drivetwin.export.modelica.component import (
     Modifiers,
     Names,
     Part,
+    format_matrix,
     format_values,
 )
 from drivetwin.export.modelica.friction import (
@@ -23,7 +24,6 @@ from drivetwin.export.modelica.friction import (
 )
 from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR, SPRING_TABLE, TYRE, VISCOUS
 from drivetwin.export.modelica.losses import add_planetary_losses, build_loss_gear
-from drivetwin.export.modelica.text import format_matrix
 from drivetwin.simulation.network import Element
 
 _COMPONENTS = f"{ROTATIONAL}.Components"

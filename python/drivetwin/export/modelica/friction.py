@@ -19,11 +19,11 @@ from drivetwin.export.modelica.component import (
     Flanges,
     Names,
     Part,
+    format_matrix,
     format_values,
 )
 from drivetwin.export.modelica.helpers import SLIP_INERTIA
 from drivetwin.export.modelica.losses import add_drag
-from drivetwin.export.modelica.text import format_matrix
 from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.simulation.network import Element

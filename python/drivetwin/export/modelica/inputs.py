@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from drivetwin.errors import InputError
-from drivetwin.export.modelica.text import format_matrix
+from drivetwin.export.modelica.component import format_matrix
 from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.network import Sine

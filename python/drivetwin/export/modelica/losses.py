@@ -8,9 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from drivetwin.errors import InputError
-from drivetwin.export.modelica.component import Component, Names, Part, format_values
+from drivetwin.export.modelica.component import Component, Names, Part, format_matrix, format_values
 from drivetwin.export.modelica.helpers import DRAG, LOSS_GEAR, LOSS_PLANETARY
-from drivetwin.export.modelica.text import format_matrix
 from drivetwin.simulation.network import Element
 
 

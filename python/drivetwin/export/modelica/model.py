@@ -1,15 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""A package of Modelica text: the driveline, the helpers it takes, and a run of it."""
+"""A package of Modelica text: the driveline of a twin, the helpers it takes, and a run of it.
+
+The run has as many initial equations as the driveline has independent speeds and angles.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from drivetwin._util.atomic import write_text
 from drivetwin.errors import InputError
-from drivetwin.export.modelica.component import ROTATIONAL, Component, Names, Part
+from drivetwin.export.modelica.component import (
+    ROTATIONAL,
+    Component,
+    Names,
+    Part,
+    format_string,
+    make_identifier,
+    make_identifiers,
+)
 from drivetwin.export.modelica.elements import build_part
 from drivetwin.export.modelica.friction import GROUND
 from drivetwin.export.modelica.helpers import read_helper
@@ -19,10 +35,17 @@ from drivetwin.export.modelica.inputs import (
     format_table,
     select_sampled,
 )
-from drivetwin.export.modelica.start import build_initial_equations
-from drivetwin.export.modelica.text import format_string, make_identifier, make_identifiers
 from drivetwin.export.parameters.content import format_number
+from drivetwin.export.subject import Subject
+from drivetwin.simulation.driveline import build_driveline
+from drivetwin.simulation.driveline_start import build_start
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray, Signal
+from drivetwin.simulation.element_schema import list_ports
 from drivetwin.simulation.network import Element, Start
+
+if TYPE_CHECKING:
+    from drivetwin.export.fmu.experiment import Experiment
+
 
 MSL_VERSION = "4.0.0"
 _FLANGE = f"{ROTATIONAL}.Interfaces.Flange_a"
@@ -180,3 +203,144 @@ def _format_shift(
         "end Shift;\n",
     ]
     return "\n".join(f"  {line}" for line in lines)
+
+
+_COMPLIANT = ("spring_damper", "spring_table", "backlash")
+
+
+class _Independent:
+    """Linearly independent rows over the nodes; dependent rows are dropped."""
+
+    def __init__(self, rows: Iterable[FloatArray], size: int) -> None:
+        self._rows = np.zeros((0, size))
+        for row in rows:
+            self.add_independent(row)
+
+    def add_independent(self, row: FloatArray) -> bool:
+        """Add a row if it is independent of the earlier ones; return True if it was added."""
+        joined = np.vstack([self._rows, row])
+        if int(np.linalg.matrix_rank(joined)) == self._rows.shape[0]:
+            return False
+        self._rows = joined
+        return True
+
+
+def build_initial_equations(
+    elements: Sequence[Element],
+    start: Start,
+    flanges: Mapping[str, str],
+    rests: Mapping[str, str],
+    twists: Mapping[str, str],
+) -> list[str]:
+    """Equations that set speeds and angles at the start, in terms of component variables.
+
+    `flanges` are the angle of each node, `rests` the slip of each friction element and `twists` the
+    relative angle (b less a) of each compliance, as expressions. Elements that start locked go
+    before stated speeds; of those, as many are set as are independent.
+    """
+    nodes = sorted(
+        {node for element in elements for node in list_ports(element).values()} - {GROUND}
+    )
+    index = {node: place for place, node in enumerate(nodes)}
+    rigid = [
+        _build_row(pairs, index) for element in elements for pairs in _list_constraints(element)
+    ]
+    by_name = {str(element["name"]): element for element in elements}
+    _refuse_unknown(start, rests)
+
+    speeds = _Independent(rigid, len(nodes))
+    lines = [
+        f"{rests[name]} = 0;"
+        for name in start.locked
+        if speeds.add_independent(_build_row(_get_slip_row(by_name[name]), index))
+    ]
+    lines += [
+        f"der({flanges[node]}) = {format_number(speed)};"
+        for node, speed in start.speeds.items()
+        if node in index and speeds.add_independent(_build_row(((node, 1.0),), index))
+    ]
+    angles = _Independent(rigid, len(nodes))
+    lines += [
+        f"{twists[str(element['name'])]} = "
+        f"{format_number(-start.twists.get(str(element['name']), 0.0))};"
+        for element in elements
+        if element["type"] in _COMPLIANT
+        and angles.add_independent(_build_row(_get_slip_row(element), index))
+    ]
+    lines += [
+        f"{flanges[node]} = 0;"
+        for node in nodes
+        if angles.add_independent(_build_row(((node, 1.0),), index))
+    ]
+    return lines
+
+
+def _refuse_unknown(start: Start, rests: Mapping[str, str]) -> None:
+    unknown = [name for name in start.locked if name not in rests]
+    if unknown:
+        raise InputError(
+            f"{', '.join(map(repr, unknown))} cannot start locked: no friction element",
+            f"lock friction elements only: {', '.join(rests) or 'there are none'}",
+        )
+
+
+def _get_slip_row(element: Element) -> tuple[tuple[str, float], ...]:
+    """Slip over the node speeds; that of a road load is the speed of its node."""
+    if element["type"] == "road_load":
+        return ((element["node"], 1.0),)
+    return ((element["a"], 1.0), (element["b"], -1.0))
+
+
+def _list_constraints(element: Element) -> Iterator[tuple[tuple[str, float], ...]]:
+    """Kinematic constraints of an element: coefficients of node speeds whose sum is zero."""
+    match element["type"]:
+        case "gear":
+            yield (element["a"], 1.0), (element["b"], -element["ratio"])
+        case "planetary":
+            z = element["z"]
+            yield (element["sun"], 1.0), (element["ring"], z), (element["carrier"], -(1.0 + z))
+        case "prescribed_speed":
+            yield ((element["node"], 1.0),)
+
+
+def _build_row(pairs: Iterable[tuple[str, float]], index: Mapping[str, int]) -> FloatArray:
+    row = np.zeros(len(index))
+    for node, factor in pairs:
+        if node != GROUND:
+            row[index[node]] += factor
+    return row
+
+
+def format_modelica(
+    subject: Subject,
+    inputs: Mapping[str, Signal] | None = None,
+    time: tuple[float, float] | None = None,
+) -> str:
+    """Package of a subject; with `inputs` (engine torque and pressures by element) over `time` [s]
+    also the model of its run from the subject's start."""
+    run = None
+    if inputs is not None and time is not None:
+        acting = subject.delays.torque_line
+        torque = replace(inputs[ENGINE_TORQUE], delay=inputs[ENGINE_TORQUE].delay + acting)
+        start = build_start(subject.model, subject.parts, subject.start, torque, time[0])
+        run = Run(inputs, start, time)
+    lines = subject.delays
+    delays = {
+        ENGINE_TORQUE: lines.torque_line,
+        **{element.name: lines.pressure_line for element in subject.model.elements},
+    }
+    network = build_driveline(subject.model, subject.parts)
+    return format_package(subject.name, network, run, note=subject.note, delays=delays)
+
+
+def write_modelica(subject: Subject, experiment: Experiment | None, path: Path) -> None:
+    """Write the package, with the run of an experiment where there is one; whole or not at all."""
+    if experiment is None:
+        text = format_modelica(subject)
+    else:
+        names = (ENGINE_TORQUE, *(element.name for element in subject.model.elements))
+        columns = zip(names, experiment.inputs.T, strict=True)
+        inputs = {name: Signal(experiment.time, column) for name, column in columns}
+        span = float(experiment.time[0]), float(experiment.time[-1])
+        text = format_modelica(subject, inputs, span)
+    write_text(path, text)

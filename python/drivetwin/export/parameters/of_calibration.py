@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from drivetwin.calibration.calibrate import Calibration
-from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.operating_map import OperatingMap
+from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.simulation.dual_clutch import Signal
 

@@ -28,9 +28,9 @@ from drivetwin.channels.read_options import Column, ReadOptions, TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, TimeError, Where
-from drivetwin.logs.formats.logger_heads import unpack_clock
+from drivetwin.logs.formats.cell_text import is_time_text, parse_time_texts
 from drivetwin.logs.formats.long_table import find_long_layout, read_long
-from drivetwin.logs.formats.table_columns import TableColumns, parse_table_columns
+from drivetwin.logs.formats.table_columns import TableColumns, parse_table_columns, unpack_clock
 from drivetwin.logs.formats.table_head import TableHead, find_table_head, is_remark_name
 from drivetwin.logs.formats.table_scan import (
     Numbers,
@@ -41,9 +41,15 @@ from drivetwin.logs.formats.table_scan import (
     number_lines,
 )
 from drivetwin.logs.formats.text_file import TextFile, open_text
-from drivetwin.logs.formats.time_text import is_time_text, parse_time_texts
-from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import LogFormat, RawChannel, Recording, Window
+from drivetwin.logs.raw import (
+    LogFormat,
+    RawChannel,
+    Recording,
+    Window,
+    describe_origin,
+    find_origin,
+    subtract_origin,
+)
 
 _MOST_CELLS = 4 * 10**7
 """Cells that are kept at a time: all of most logs, eleven columns of one hour at 1 kHz."""

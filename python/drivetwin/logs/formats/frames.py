@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
+from drivetwin.logs.raw import describe_origin, find_origin, subtract_origin
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,13 @@ from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor, is_time_unit, is_unit
 from drivetwin.errors import FileFormatError, TimeError, Where
-from drivetwin.logs.formats.cell_text import Meaning, classify_text, is_number
+from drivetwin.logs.formats.cell_text import (
+    Meaning,
+    classify_text,
+    is_number,
+    is_time_text,
+    parse_time_texts,
+)
 from drivetwin.logs.formats.table_head import TableHead, is_remark_name
 from drivetwin.logs.formats.table_scan import (
     FIRST_TEXT,
@@ -33,10 +39,8 @@ from drivetwin.logs.formats.table_scan import (
     number_lines,
 )
 from drivetwin.logs.formats.text_file import TextFile
-from drivetwin.logs.formats.time_text import is_time_text, parse_time_texts
-from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.quality.clock_drift import is_clock
-from drivetwin.logs.raw import RawChannel, RawLog
+from drivetwin.logs.raw import RawChannel, RawLog, describe_origin, find_origin, subtract_origin
 
 _NAME_WORDS = frozenset(
     (

@@ -27,8 +27,14 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, MissingChannelError, ReaderFailureError, Where
 from drivetwin.logs.formats.mat_signals import Signals, find_signals
 from drivetwin.logs.formats.parser_limits import compute_parser_limits
-from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import LogFormat, RawLog, Recording
+from drivetwin.logs.raw import (
+    LogFormat,
+    RawLog,
+    Recording,
+    describe_origin,
+    find_origin,
+    subtract_origin,
+)
 
 _KIND = "a MATLAB file"
 _PLAIN = (

@@ -28,8 +28,16 @@ from drivetwin.logs.formats.can.open import decode_recording
 from drivetwin.logs.formats.cell_text import parse_numbers, select_numbers
 from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.formats.mdf_integrity import check_blocks
-from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import Joined, LogFormat, RawChannel, Recording, Window
+from drivetwin.logs.raw import (
+    Joined,
+    LogFormat,
+    RawChannel,
+    Recording,
+    Window,
+    describe_origin,
+    find_origin,
+    subtract_origin,
+)
 
 _KIND = "an MDF file"
 _FRAGMENT = 1 << 23

@@ -18,8 +18,15 @@ from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where
-from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
-from drivetwin.logs.raw import LogFormat, RawChannel, Recording, Window
+from drivetwin.logs.raw import (
+    LogFormat,
+    RawChannel,
+    Recording,
+    Window,
+    describe_origin,
+    find_origin,
+    subtract_origin,
+)
 
 _KIND = "a Parquet file"
 _UNIT_KEYS = ("unit", "units", "Unit")

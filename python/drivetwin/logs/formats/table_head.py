@@ -21,9 +21,8 @@ from drivetwin.channels.names import is_time_name, split_name_and_unit
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.units import find_unit, is_unit
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.cell_text import Meaning, classify_text, is_number
+from drivetwin.logs.formats.cell_text import Meaning, classify_text, is_number, is_time_text
 from drivetwin.logs.formats.text_file import EXPORT
-from drivetwin.logs.formats.time_text import is_time_text
 
 COMMENT_MARKS = ("#", "%", "//")
 BLANKS = " "

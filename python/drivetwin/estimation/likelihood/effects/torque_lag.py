@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.first_order_lag import apply_lag
+from drivetwin._util.signal_processing import apply_lag
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint

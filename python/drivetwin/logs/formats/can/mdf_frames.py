@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.logs.formats.frames import FD_LENGTHS, PAYLOAD, Frames
-from drivetwin.logs.origin import subtract_origin
+from drivetwin.logs.raw import subtract_origin
 
 DATA_FRAME = "CAN_DataFrame"
 """Name of the record of a data frame; its parts follow after a dot."""

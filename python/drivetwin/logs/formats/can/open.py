@@ -12,8 +12,7 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.logs.formats.can.asc import is_asc, read_asc
 from drivetwin.logs.formats.can.blf import read_blf
 from drivetwin.logs.formats.can.candump import is_candump, read_candump
-from drivetwin.logs.formats.can.database import read_database
-from drivetwin.logs.formats.can.driveline import load_driveline_messages
+from drivetwin.logs.formats.can.database import load_driveline_messages, read_database
 from drivetwin.logs.formats.can.gvret import is_gvret, read_gvret
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.trc import is_trc, read_trc

@@ -7,8 +7,7 @@ from importlib.resources import as_file, files
 
 import pytest
 
-from drivetwin.logs.formats.can.database import read_database
-from drivetwin.logs.formats.can.driveline import load_driveline_messages
+from drivetwin.logs.formats.can.database import load_driveline_messages, read_database
 
 
 def test_equal_to_what_cantools_reads() -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.fit.fit import fit_network
-from drivetwin.fit.holdout import predict
+from drivetwin.fit.fit import fit_network, predict
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.fit.unknown import Unknown
 from tests.support.fits import fit_log, make_log, make_small, record_two_sided

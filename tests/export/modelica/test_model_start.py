@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.export.modelica.start import build_initial_equations
+from drivetwin.export.modelica.model import build_initial_equations
 from drivetwin.simulation.network import Element, Start
 
 ELEMENTS: list[Element] = [

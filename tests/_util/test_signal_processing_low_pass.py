@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
-from drivetwin._util.low_pass import filter_zero_phase
+from drivetwin._util.signal_processing import filter_zero_phase
 
 
 @settings(max_examples=50, derandomize=True)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.export.modelica.text import (
+from drivetwin.export.modelica.component import (
     format_matrix,
     format_string,
     make_identifier,

@@ -11,7 +11,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.export.fmu.experiment import Experiment
-from drivetwin.export.modelica.dual_clutch import format_modelica, write_modelica
+from drivetwin.export.modelica.model import format_modelica, write_modelica
 from drivetwin.export.subject import Subject
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,

@@ -9,7 +9,7 @@ import unicodedata
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.name_table import load_name_table, normalise_name
+from drivetwin.channels.names import load_name_table, normalise_name
 from drivetwin.channels.roles import EXTRA_ROLES, ROLES
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from drivetwin.logs.formats.frames import build_frames
-from drivetwin.logs.origin import describe_origin, find_origin, subtract_origin
+from drivetwin.logs.raw import describe_origin, find_origin, subtract_origin
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
