@@ -35,18 +35,18 @@ def infer_candidates(
     """
     columns = [column for column in columns if not column.silent]
     table = load_name_table()
-    forms = {
+    patterns = {
         **{
-            role: _list_forms(pattern, table)
+            role: _list_patterns(pattern, table)
             for role, pattern in table.patterns.items()
             if not is_extra(role)
         },
         **{
-            make_pressure_role(element): _list_pressure_forms(element, kind, table)
+            make_pressure_role(element): _list_pressure_patterns(element, kind, table)
             for element, kind in elements.items()
         },
         **{
-            make_command_role(element): _list_command_forms(element, kind, table)
+            make_command_role(element): _list_command_patterns(element, kind, table)
             for element, kind in elements.items()
         },
     }
@@ -62,7 +62,7 @@ def infer_candidates(
     added = {role: "|".join(some) for role, some in own.items()}
     found = {
         role: _select_first_match(spelled, filter(None, (added.get(role), *some)))
-        for role, some in forms.items()
+        for role, some in patterns.items()
     }
     chosen = {
         role: _drop_secondary(prefer_filled(candidates))
@@ -110,17 +110,17 @@ def _drop_secondary(candidates: list[Column]) -> list[Column]:
 
 
 def _select_first_match(
-    spellings: Iterable[Sequence[tuple[Column, str]]], forms: Iterable[str]
+    spellings: Iterable[Sequence[tuple[Column, str]]], patterns: Iterable[str]
 ) -> list[Column]:
-    """Return the columns that match the first pattern of `forms` that matches any column.
+    """Return the columns that match the first pattern of `patterns` that matches any column.
 
     Of the `spellings` of the columns the second, the last part of a name like `log.EngTrq`, counts
     only where no whole name matches.
     """
-    forms = tuple(forms)
+    patterns = tuple(patterns)
     for texts in filter(None, spellings):
-        for form in map(re.compile, forms):
-            if found := [column for column, text in texts if form.fullmatch(text)]:
+        for pattern in map(re.compile, patterns):
+            if found := [column for column, text in texts if pattern.fullmatch(text)]:
                 return found
     return []
 
@@ -155,50 +155,50 @@ def _list_element_words(elements: Iterable[str]) -> Iterator[str]:
         yield from (label, re.sub(r"\D", "", label))
 
 
-def _list_forms(pattern: str, table: NameTable) -> list[str]:
+def _list_patterns(pattern: str, table: NameTable) -> list[str]:
     """List the expressions of a role's names: plain, then with words before and after."""
     before, after = table.make_alternatives("before"), table.make_alternatives("after")
     return [pattern, f"({before})*({pattern})({after})*"]
 
 
-def _list_pressure_forms(element: str, kind: str, table: NameTable) -> list[str]:
+def _list_pressure_patterns(element: str, kind: str, table: NameTable) -> list[str]:
     """List the expressions of a pressure: full name or kind and number first, number last."""
     label = re.escape(normalise_name(element))
     digits = re.sub(r"\D", "", label)
     pressure, words = table.make_alternatives("pressure"), table.make_alternatives(kind)
     state = f"({table.make_alternatives('state')})*"
-    forms = []
+    patterns = []
     if label:
-        forms.append(f"({pressure}){state}({label}){state}|({label})({pressure}){state}")
+        patterns.append(f"({pressure}){state}({label}){state}|({label})({pressure}){state}")
     if digits:
         numbered = f"({words})0*{digits}"
-        forms.append(f"({pressure}){state}({numbered}){state}|({numbered})({pressure}){state}")
+        patterns.append(f"({pressure}){state}({numbered}){state}|({numbered})({pressure}){state}")
         # Compounds name kind and pressure before number or label, in whole words: no `Kp2`.
         compound = "".join(
             f"({table.make_alternatives(one, WHOLE_WORD)})" for one in (kind, "pressure")
         )
-        forms.append(f"{compound}({label}|0*{digits}){state}")
-        forms.append(f"({pressure})({words})({label}){state}")
-        forms.append(f"({pressure})0*{digits}{state}")
-    return forms
+        patterns.append(f"{compound}({label}|0*{digits}){state}")
+        patterns.append(f"({pressure})({words})({label}){state}")
+        patterns.append(f"({pressure})0*{digits}{state}")
+    return patterns
 
 
-def _list_command_forms(element: str, kind: str, table: NameTable) -> list[str]:
+def _list_command_patterns(element: str, kind: str, table: NameTable) -> list[str]:
     """List the expressions of a commanded pressure: full name, then kind and number, with a word
     for it."""
     label = re.escape(normalise_name(element))
     digits = re.sub(r"\D", "", label)
     pressure, command = table.make_alternatives("pressure"), table.make_alternatives("command")
     numbered = [f"({table.make_alternatives(kind)})0*{digits}"] if digits else []
-    forms = []
+    patterns = []
     for one in ([label] if label else []) + numbered:
         named = f"({pressure})({one})|({one})({pressure})"
-        forms.append(f"({named})({command})|({command})({named})|({pressure})({command})({one})")
-    return forms
+        patterns.append(f"({named})({command})|({command})({named})|({pressure})({command})({one})")
+    return patterns
 
 
 Spelled = Sequence[tuple[Column, str]]
-"""Columns with their names in the form of `normalise_name`."""
+"""Columns with their names as `normalise_name` returns them."""
 
 _ENGINES = {"motor_torque": "engine_torque", "motor_speed": "engine_speed"}
 """Roles of the engine whose names, such as `MotTrq`, may be those of the electric motor."""
@@ -216,7 +216,7 @@ def add_extra_candidates(
     wholes
         All columns.
     own
-        Names of the user by role, in the form of `normalise_name`.
+        Names of the user by role, as `normalise_name` returns them.
     """
     extra = find_extra(wholes)
     for role, names in own.items():
@@ -272,12 +272,12 @@ def _list_roles(text: str, is_temperature: bool) -> list[str]:
     """List the extra roles of a name."""
     table = load_name_table()
     roles = [role for role in EXTRA_ROLES if re.fullmatch(_surround(table.patterns[role]), text)]
-    for form in _get_shaft_forms():
-        if match := re.fullmatch(form, text):
+    for pattern in _get_shaft_patterns():
+        if match := re.fullmatch(pattern, text):
             place = "".join(one or "" for one in match.groups())
             return [*roles, f"shaft_torque.{re.sub('^shaft(?=.)', '', place)}"]
-    for form in _get_temperature_forms(any_place=is_temperature):
-        if match := re.fullmatch(form, text):
+    for pattern in _get_temperature_patterns(any_place=is_temperature):
+        if match := re.fullmatch(pattern, text):
             return [*roles, f"temperature.{match['place']}"]
     return roles
 
@@ -290,7 +290,7 @@ def _surround(pattern: str) -> str:
 
 
 @cache
-def _get_shaft_forms() -> tuple[str, ...]:
+def _get_shaft_patterns() -> tuple[str, ...]:
     """Return expressions of torques of shafts: torque first, shaft first; groups are the place."""
     table = load_name_table()
     torque, shaft = _list_longest_first("plain_torque"), _list_longest_first("shaft")
@@ -304,7 +304,7 @@ def _get_shaft_forms() -> tuple[str, ...]:
 
 
 @cache
-def _get_temperature_forms(*, any_place: bool) -> tuple[str, ...]:
+def _get_temperature_patterns(*, any_place: bool) -> tuple[str, ...]:
     """Return expressions of temperatures: word first, place first.
 
     A place of any name needs a unit of temperature.
@@ -313,11 +313,11 @@ def _get_temperature_forms(*, any_place: bool) -> tuple[str, ...]:
     words, places = _list_longest_first("temperature"), _list_longest_first("place")
     state = f"(?:{table.make_alternatives('state')})*"
     listed = f"(?P<place>(?:{places})+[0-9]*)"
-    forms = [f"(?:{words}|t){listed}{state}", f"{listed}(?:{words}|t){state}"]
+    patterns = [f"(?:{words}|t){listed}{state}", f"{listed}(?:{words}|t){state}"]
     if any_place:
         free = "(?P<place>[a-z][a-z0-9]*?)"
-        forms += [f"(?:{words}){free}{state}", f"{free}(?:{words}){state}"]
-    return tuple(forms)
+        patterns += [f"(?:{words}){free}{state}", f"{free}(?:{words}){state}"]
+    return tuple(patterns)
 
 
 def _list_longest_first(kind: str) -> str:

@@ -50,7 +50,7 @@ class InputKind(StrEnum):
 
 
 class Target(StrEnum):
-    """A form of the twin for other programs: its name, and a label and a text for people.
+    """A format of the twin for other programs: its name, and a label and a text for people.
 
     `ending` is that of its files, by default the name.
     """

@@ -162,7 +162,7 @@ class GroupRecord(Record):
 
 
 class CauseRecord(Record):
-    """Departure from the model that the log shows; `size` and `std` in the unit of the effect."""
+    """Effect beyond the model that the log shows; `size` and `std` in the unit of the effect."""
 
     group: GroupRecord
     evidence: FiniteFloat

@@ -226,13 +226,13 @@ def _compute_chi2(minimum: OptimizeResult[Problem]) -> float:
 def _judge(one: SoughtNumber, coordinate: float, std: float) -> Estimate:
     """Return the estimate of an unknown from its coordinate and its standard deviation."""
     value = one.to_value(coordinate)
-    told = one.name, value, value * std if one.is_positive else std
+    numbers = one.name, value, value * std if one.is_positive else std
     if one.unknown.std is None:
-        return assess(*told, METHOD, spec=one.spec)
+        return assess(*numbers, METHOD, spec=one.spec)
     # The prior of a positive number is relative: its spread at the estimate.
     scale = value / one.unknown.value if one.is_positive else 1.0
     prior = PriorValue(one.unknown.value, one.unknown.std * scale)
-    return assess_with_prior(told, prior, WITH_PRIOR, declared=one.spec)
+    return assess_with_prior(numbers, prior, WITH_PRIOR, declared=one.spec)
 
 
 def _collect_findings(

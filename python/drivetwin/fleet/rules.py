@@ -109,8 +109,8 @@ class RulesFile(StrictModel):
 
     def get_unit(self, source: Source) -> str:
         """Id of the unit: the list's column `unit`, else the pattern's find, else the folder."""
-        if UNIT in source.told:
-            return source.told[UNIT]
+        if UNIT in source.stated:
+            return source.stated[UNIT]
         if self.unit is None:
             return source.path.parent.name
         found = re.search(self.unit, source.path.as_posix())
@@ -130,7 +130,7 @@ class RulesFile(StrictModel):
                 match = re.search(table.pattern, source.path.as_posix())
                 text = None if match is None else match[1]
             elif table.column is not None:
-                text = source.told.get(table.column)
+                text = source.stated.get(table.column)
             if text is not None:
                 found[name] = parse_field_value(name, text)
         return found

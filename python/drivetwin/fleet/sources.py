@@ -24,7 +24,7 @@ class Source:
     """A file, and its list entries by column."""
 
     path: Path
-    told: Mapping[str, str] = field(default_factory=dict)
+    stated: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ def _read_list(path: Path) -> Iterator[Source]:
                         f"give all {len(columns)} columns of the first line in every line",
                         Where(file=str(path)),
                     )
-                told = {k: v for k, v in row.items() if k and v and k != _PATH}
-                yield Source((path.parent / row[_PATH]).absolute(), told)
+                stated = {k: v for k, v in row.items() if k and v and k != _PATH}
+                yield Source((path.parent / row[_PATH]).absolute(), stated)
     except (OSError, UnicodeDecodeError, csv.Error) as fault:
         raise InputError(
             f"the list cannot be read: {fault}",

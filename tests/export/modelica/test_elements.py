@@ -82,5 +82,5 @@ def test_the_element_becomes(text: str, line: str) -> None:
 
 
 def test_another_type_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(InputError, match="no Modelica form"):
+    with pytest.raises(InputError, match="no Modelica translation"):
         _text("magnet", node="a")

@@ -24,8 +24,8 @@ from drivetwin.export.parameters.files import (
 )
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.parameters.template import (
-    AxisForm,
-    EntryForm,
+    AxisRule,
+    EntryRule,
     Template,
     apply_template,
     read_template,
@@ -135,7 +135,7 @@ def test_a_unit_other_than_the_templates_is_refused(template: Template) -> None:
 def test_a_value_for_what_was_not_identified_is_converted() -> None:
     own = collect_parameters(twin())
     assert "te_delay" not in {one.name for one in own.entries}
-    template = Template({"te_delay": EntryForm(label="Eng_tDly_C", unit="ms")})
+    template = Template({"te_delay": EntryRule(label="Eng_tDly_C", unit="ms")})
     content = ParameterSet("", (Scalar("Eng_tDly_C", 20.0, "ms"),))
     (restored,) = restore_entries(content, own, template).scalars
     assert restored == Scalar("te_delay", 0.02, "s")
@@ -149,15 +149,15 @@ def test_others_are_kept_if_asked_for(template: Template) -> None:
     assert restore_entries(content, own, template).entries == own.entries
 
 
-WRONG: dict[str, tuple[str, EntryForm]] = {
-    "no such parameter; did you mean 'eta'": ("etta", EntryForm(label="a")),
-    "no known unit of Pa, such as Pa": ("P0.B3", EntryForm(label="a", unit="rpm")),
-    "no known unit of N.m/rad": ("k_o", EntryForm(label="a", unit="Nm/deg")),
-    "none is named": ("eta", EntryForm(label="a", in_si=2.0)),
-    "a number has no axis": ("eta", EntryForm(label="a", axis=AxisForm(name="x"))),
-    "exceed the known range": ("mu.B3", EntryForm(label="a", axis=AxisForm(points=[0.0, 1e4]))),
-    "do not increase": ("mu.B3", EntryForm(label="a", axis=AxisForm(points=[1.0, 1.0]))),
-    "no known unit of rad/s": ("mu.B3", EntryForm(label="a", axis=AxisForm(unit="bar"))),
+WRONG: dict[str, tuple[str, EntryRule]] = {
+    "no such parameter; did you mean 'eta'": ("etta", EntryRule(label="a")),
+    "no known unit of Pa, such as Pa": ("P0.B3", EntryRule(label="a", unit="rpm")),
+    "no known unit of N.m/rad": ("k_o", EntryRule(label="a", unit="Nm/deg")),
+    "none is named": ("eta", EntryRule(label="a", in_si=2.0)),
+    "a number has no axis": ("eta", EntryRule(label="a", axis=AxisRule(name="x"))),
+    "exceed the known range": ("mu.B3", EntryRule(label="a", axis=AxisRule(points=[0.0, 1e4]))),
+    "do not increase": ("mu.B3", EntryRule(label="a", axis=AxisRule(points=[1.0, 1.0]))),
+    "no known unit of rad/s": ("mu.B3", EntryRule(label="a", axis=AxisRule(unit="bar"))),
 }
 
 
@@ -198,7 +198,7 @@ def test_ssv_has_si_units_only(template: Template) -> None:
 
 
 def test_a_label_that_a_format_cannot_hold_is_refused() -> None:
-    template = Template({"eta": EntryForm(label="Gbx.eta")})
+    template = Template({"eta": EntryRule(label="Gbx.eta")})
     content = apply_template(collect_parameters(twin()), template)
     require_labels(content, template, ParameterFormat.DCM)
     with pytest.raises(InputError, match=r"m files cannot hold the labels Gbx\.eta"):
@@ -215,7 +215,7 @@ def labelled(draw: st.DrawFn) -> tuple[ParameterSet, Template]:
     scalars, curves, forms = [], [], {}
     for k in range(draw(st.integers(1, 4))):
         scalars.append(Scalar(f"s.{k}", draw(_NUMBERS), "Pa"))
-        forms[f"s.{k}"] = EntryForm(label=f"L_{k}", unit="u", in_si=draw(_SIZES))
+        forms[f"s.{k}"] = EntryRule(label=f"L_{k}", unit="u", in_si=draw(_SIZES))
     for k in range(draw(st.integers(0, 2))):
         points = sorted(draw(st.sets(st.integers(-1000, 1000), min_size=2, max_size=9)))
         values = tuple(draw(_NUMBERS) for _ in points)
@@ -224,7 +224,7 @@ def labelled(draw: st.DrawFn) -> tuple[ParameterSet, Template]:
         axis: dict[str, Any] = {"name": f"A_{k}", "unit": "v", "in_si": along, "beyond": "hold"}
         if draw(st.booleans()):
             axis["points"] = [points[0] / along, points[-1] / along]
-        forms[f"c.{k}"] = EntryForm(label=f"M_{k}", axis=AxisForm(**axis))
+        forms[f"c.{k}"] = EntryRule(label=f"M_{k}", axis=AxisRule(**axis))
     return ParameterSet("set", tuple(scalars), tuple(curves)), Template(forms)
 
 

@@ -37,7 +37,7 @@ def build_part(element: Element, names: Names) -> Part:
         translate = _TRANSLATIONS[element["type"]]
     except KeyError:
         raise InputError(
-            f"elements of type {element['type']!r} have no Modelica form",
+            f"elements of type {element['type']!r} have no Modelica translation",
             f"use {', '.join(_TRANSLATIONS)}",
         ) from None
     return translate(element, names)

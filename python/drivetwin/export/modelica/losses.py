@@ -17,7 +17,7 @@ def build_loss_gear(element: Element, names: Names) -> Part:
     """Build a gear with a table of losses. Raises InputError if it has a loss law beside it."""
     if element.get("loss") is not None:
         raise InputError(
-            f"{element['name']}: a gear with both 'loss' and 'losses' has no Modelica form",
+            f"{element['name']}: a gear with both 'loss' and 'losses' has no Modelica translation",
             "export it with one of them, or put the table on a gear of ratio 1 beside it",
         )
     modifiers = (*format_values(ratio=element["ratio"]), _format_losses(element["losses"]))

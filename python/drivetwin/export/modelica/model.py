@@ -76,7 +76,7 @@ def format_package(
 
     Inputs of the driveline are `u_<input>`, in SI; the nodes `ends` get flanges `flange_<node>` to
     connect it by. `delays` [s] stand between inputs of the driveline, by name, and the parts that
-    take them. Raises InputError for an element that has no Modelica form and for a name that
+    take them. Raises InputError for an element that has no Modelica translation and for a name that
     would stand for two things.
     """
     _refuse_doubles(str(element["name"]) for element in elements)

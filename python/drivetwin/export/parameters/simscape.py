@@ -18,7 +18,7 @@ _RENAMED = {
     "J_out": "J_output",
 }
 _CLUTCH_FIELDS = ("gain", "P0", "peak", "mu_c", "mu_s", "v_s", "mu_v")
-"""Parameters with a block-specific form: the geometry, and the friction law as a table."""
+"""Parameters that blocks state in another way: the geometry, and the friction law as a table."""
 
 
 def convert_to_simscape_blocks(own: ParameterSet, elements: tuple[str, ...]) -> ParameterSet:

@@ -41,7 +41,7 @@ _AxisName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length
 _Size = Annotated[float, Field(gt=0.0)]
 
 
-class AxisForm(StrictModel):
+class AxisRule(StrictModel):
     """Axis of a curve in a file; what is None stays as it is.
 
     `in_si` is one `unit` in SI. `beyond` holds the last value outside the known range, or refuses
@@ -55,26 +55,26 @@ class AxisForm(StrictModel):
     beyond: Literal["refuse", "hold"] = "refuse"
 
 
-class EntryForm(StrictModel):
+class EntryRule(StrictModel):
     """Number or curve in a file; what is None stays as it is. `in_si` is one `unit` in SI."""
 
     label: _Label
     unit: str | None = None
     in_si: _Size | None = None
     text: str | None = None
-    axis: AxisForm | None = None
+    axis: AxisRule | None = None
 
 
 class _TemplateTable(StrictModel):
     keep_others: bool = False
-    parameters: dict[str, EntryForm]
+    parameters: dict[str, EntryRule]
 
 
 @dataclass(frozen=True)
 class Template:
-    """Form of the entries of a parameter file by own name; `keep_others` writes all others too."""
+    """Rules for entries of a parameter file by own name; `keep_others` writes all others too."""
 
-    entries: Mapping[str, EntryForm]
+    entries: Mapping[str, EntryRule]
     keep_others: bool = False
     source: str = ""
 
@@ -101,10 +101,10 @@ def apply_template(
     own = {one.name: one for one in parameters.entries}
     written: dict[str, Scalar | Curve] = {}
     faults: list[Fault] = []
-    for name, form in template.entries.items():
+    for name, rule in template.entries.items():
         try:
             if name in own:
-                written[name] = _convert(own[name], form)
+                written[name] = _convert(own[name], rule)
             elif name not in unvalued:
                 what = f"no such parameter{suggest_spelling(name, [*own, *unvalued])}"
                 raise InputError(what, "")
@@ -122,7 +122,7 @@ def apply_template(
 
 def require_labels(content: ParameterSet, template: Template, kind: ParameterFormat) -> None:
     """Raise InputError for labels that the format cannot hold as they are."""
-    labels = {form.label for form in template.entries.values()}
+    labels = {rule.label for rule in template.entries.values()}
     pairs = zip(content.entries, CODECS[kind].legal(content).entries, strict=True)
     wrong = [old.name for old, new in pairs if old.name in labels and new.name != old.name]
     if wrong:
@@ -140,23 +140,23 @@ def restore_entries(content: ParameterSet, own: ParameterSet, template: Template
     of `own`, without rounding and with all points of a curve. Entries without a label of the
     template stay as they are. Raises InputError for a unit other than the template's.
     """
-    names = {form.label: name for name, form in template.entries.items()}
+    names = {rule.label: name for name, rule in template.entries.items()}
     before = {one.name: one for one in own.entries}
     shown = {one.name: one for one in apply_template(own, template, template.entries).entries}
     restored: list[Scalar | Curve] = []
     for entry in content.entries:
         name = names.get(entry.name, entry.name)
-        form, known = template.entries.get(name), before.get(name)
-        if entry.name not in names or form is None:
+        rule, known = template.entries.get(name), before.get(name)
+        if entry.name not in names or rule is None:
             restored.append(entry)
             continue
-        _check_units(entry, form)
+        _check_units(entry, rule)
         if known is not None and _is_unedited(entry, shown.get(entry.name)):
             restored.append(known)
         elif isinstance(entry, Scalar) and not isinstance(known, Curve):
-            restored.append(_restore_scalar(entry, form, known, name))
+            restored.append(_restore_scalar(entry, rule, known, name))
         elif isinstance(entry, Curve) and isinstance(known, Curve):
-            restored.append(_restore_curve(entry, form, known))
+            restored.append(_restore_curve(entry, rule, known))
         else:
             restored.append(replace(entry, name=name))
     return replace(
@@ -166,32 +166,32 @@ def restore_entries(content: ParameterSet, own: ParameterSet, template: Template
     )
 
 
-def _convert(own: Scalar | Curve, form: EntryForm) -> Scalar | Curve:
-    """Return one entry in the form of the template."""
-    size = _get_size(form.unit, form.in_si, own.unit)
-    unit = own.unit if form.unit is None else parse_tool_unit(form.unit)
-    text = to_one_line(f"{own.text} ({own.name})" if form.text is None else form.text)
+def _convert(own: Scalar | Curve, rule: EntryRule) -> Scalar | Curve:
+    """Return one entry by the rule of the template."""
+    size = _get_size(rule.unit, rule.in_si, own.unit)
+    unit = own.unit if rule.unit is None else parse_tool_unit(rule.unit)
+    text = to_one_line(f"{own.text} ({own.name})" if rule.text is None else rule.text)
     if isinstance(own, Scalar):
-        if form.axis is not None:
+        if rule.axis is not None:
             raise InputError("a number has no axis", "")
-        return Scalar(form.label, own.value / size, unit, text)
-    axis, values = _convert_axis(own, form.axis or AxisForm())
-    return Curve(form.label, axis, tuple((values / size).tolist()), unit, text)
+        return Scalar(rule.label, own.value / size, unit, text)
+    axis, values = _convert_axis(own, rule.axis or AxisRule())
+    return Curve(rule.label, axis, tuple((values / size).tolist()), unit, text)
 
 
-def _convert_axis(own: Curve, form: AxisForm) -> tuple[Axis, FloatArray]:
-    """Return the axis in the form of the template, and the values of the curve at its points."""
-    size = _get_size(form.unit, form.in_si, own.axis.unit)
-    name = form.name or own.axis.name
-    unit = own.axis.unit if form.unit is None else parse_tool_unit(form.unit)
+def _convert_axis(own: Curve, rule: AxisRule) -> tuple[Axis, FloatArray]:
+    """Return the axis by the rule of the template, and the values of the curve at its points."""
+    size = _get_size(rule.unit, rule.in_si, own.axis.unit)
+    name = rule.name or own.axis.name
+    unit = own.axis.unit if rule.unit is None else parse_tool_unit(rule.unit)
     known = np.array(own.axis.points)
-    points = known / size if form.points is None else np.array(form.points)
+    points = known / size if rule.points is None else np.array(rule.points)
     if np.any(np.diff(points) <= 0.0):
         raise InputError("the points of the axis do not increase", "")
     low, high = known[0] / size, known[-1] / size
     margin = _PRECISION * max(abs(low), abs(high))
     outside = points[0] < low - margin or points[-1] > high + margin
-    if form.beyond == "refuse" and outside:
+    if rule.beyond == "refuse" and outside:
         raise InputError(
             f"points {points[0]:g} to {points[-1]:g} exceed the known range {low:g} to {high:g} "
             f'{unit}; beyond = "hold" keeps the last value',
@@ -217,27 +217,27 @@ def _get_size(unit: str | None, in_si: float | None, si: str) -> float:
     raise InputError(f"unit {unit!r} is no known unit of {si}{usual}; 'in_si' states its size", "")
 
 
-def _restore_scalar(entry: Scalar, form: EntryForm, before: Scalar | None, name: str) -> Scalar:
+def _restore_scalar(entry: Scalar, rule: EntryRule, before: Scalar | None, name: str) -> Scalar:
     """Return an edited number under its own name and in SI."""
     unit = get_parameter_spec(name).unit if before is None else before.unit
-    value = entry.value * _get_size(form.unit, form.in_si, unit)
+    value = entry.value * _get_size(rule.unit, rule.in_si, unit)
     return Scalar(name, value, unit, entry.text)
 
 
-def _restore_curve(entry: Curve, form: EntryForm, before: Curve) -> Curve:
+def _restore_curve(entry: Curve, rule: EntryRule, before: Curve) -> Curve:
     """Return an edited curve under its own name and in SI."""
-    size = _get_size(form.unit, form.in_si, before.unit)
-    table = form.axis or AxisForm()
+    size = _get_size(rule.unit, rule.in_si, before.unit)
+    table = rule.axis or AxisRule()
     along = _get_size(table.unit, table.in_si, before.axis.unit)
     axis = replace(before.axis, points=tuple(point * along for point in entry.axis.points))
     return replace(before, axis=axis, values=tuple(value * size for value in entry.values))
 
 
-def _check_units(entry: Scalar | Curve, form: EntryForm) -> None:
+def _check_units(entry: Scalar | Curve, rule: EntryRule) -> None:
     """Raise InputError where a file states another unit than the template."""
-    pairs = [(entry.unit, form.unit)]
-    if isinstance(entry, Curve) and form.axis is not None:
-        pairs.append((entry.axis.unit, form.axis.unit))
+    pairs = [(entry.unit, rule.unit)]
+    if isinstance(entry, Curve) and rule.axis is not None:
+        pairs.append((entry.axis.unit, rule.axis.unit))
     for stated, wanted in pairs:
         expected = None if wanted is None else parse_tool_unit(wanted)
         if expected is not None and stated not in ("1", expected, to_ascii_line(expected)):

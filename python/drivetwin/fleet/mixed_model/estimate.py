@@ -76,8 +76,8 @@ def list_missing_estimates(
     A parameter has none if too few logs determine it, or if all have the card's design value.
     """
     names = store.read_rows(RowKind.PARAMETER).column("name").to_pylist()
-    told = {one.parameter for one in found}
-    return [name for name in dict.fromkeys(wanted or names) if name not in told]
+    judged = {one.parameter for one in found}
+    return [name for name in dict.fromkeys(wanted or names) if name not in judged]
 
 
 @dataclass(frozen=True, eq=False)

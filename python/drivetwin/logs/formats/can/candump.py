@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reader of candump text: the human-readable form, and the compact one of `candump -L`."""
+"""Reader of candump text: the human-readable pattern, and the compact one of `candump -L`."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ _BACKWARD, _ENOUGH = 0.1, 100
 def is_candump(head: bytes) -> bool:
     """Return True if the first bytes of a file are candump text."""
     lines = [line for line in head.splitlines()[:60] if line.strip()]
-    forms = (_LINE, _OTHER, _BARE)
-    fitting = sum(any(form.match(line) for form in forms) for line in lines)
+    patterns = (_LINE, _OTHER, _BARE)
+    fitting = sum(any(pattern.match(line) for pattern in patterns) for line in lines)
     return fitting > 0 and fitting >= len(lines) // 2
 
 
@@ -97,5 +97,5 @@ def _parse_seconds(stamp: bytes) -> float | None:
 
 
 def _drop_flags(packed: bytes) -> bytes:
-    """The data of the compact form; a CAN FD frame has a second `#` and a digit of flags first."""
+    """The data of a compact line; a CAN FD frame has a second `#` and a digit of flags first."""
     return packed[2:] if packed.startswith(b"#") else packed

@@ -214,11 +214,12 @@ class BusRecording:
                 if signal.spn != torque.REFERENCE:
                     continue
                 try:
-                    told = self._decode_signal(track, signal).values
+                    torques = self._decode_signal(track, signal).values
                 except DamagedChannelError:
                     continue
-                if np.ptp(told) == 0.0 and told[0] > 0.0:
-                    return float(told[0]), f"reference torque {told[0]:g} N·m from {track.group}"
+                if np.ptp(torques) == 0.0 and torques[0] > 0.0:
+                    size = float(torques[0])
+                    return size, f"reference torque {size:g} N·m from {track.group}"
         return None, (
             "percent torque stays in percent, the bus has no reference torque (EC1); state it in "
             "the channel mapping: bus = { reference_torque_Nm = ... }"
@@ -278,9 +279,9 @@ def _describe_sender(track: Track) -> tuple[int | None, int]:
 def _mark_echoes(tracks: Sequence[Track]) -> list[Track]:
     """Mark messages of other senders if the engine or transmission also sends the message."""
     own = (ENGINE, TRANSMISSION)
-    told = {(one.message.name, one.bus) for one in tracks if one.sender in own}
+    responsible = {(one.message.name, one.bus) for one in tracks if one.sender in own}
     return [
-        replace(one, aside=one.sender not in own and (one.message.name, one.bus) in told)
+        replace(one, aside=one.sender not in own and (one.message.name, one.bus) in responsible)
         for one in tracks
     ]
 
