@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The chains of blocks of an MDF file, walked before a parser that would follow them anywhere.
+"""The chains of blocks of an MDF 4 file, walked before a parser that would follow them anywhere.
 
 Blocks point at each other by file position. One flipped bit makes a chain end outside the file or
 run in a circle, on which a trusting parser fails late, never ends, or asks for endless memory.
@@ -33,28 +33,18 @@ the fifth on.
 _FIXED, _VIRTUAL = (0, 2, 4, 5), (3, 6)
 """Kinds of channels whose numbers stand in the record, and of those without numbers."""
 
-_LINKS3: dict[bytes, dict[int, bytes]] = {
-    b"HD": {4: b"DG"},
-    b"DG": {4: b"DG", 8: b"CG"},
-    b"CG": {4: b"CG", 8: b"CN"},
-    b"CN": {4: b"CN"},
-}
-"""By block: offsets of its links and what they lead to, MDF 3."""
-
-
-_SIZE3 = {b"HD": 164, b"DG": 24, b"CG": 26, b"CN": 190}
-"""Bytes of each MDF 3 block that are looked at."""
-
 
 def check_blocks(path: Path) -> None:
-    """Raise FileFormatError where the blocks of an MDF file do not form sound chains."""
+    """Raise FileFormatError where the blocks of an MDF 4 file do not form sound chains.
+
+    Those of MDF 3 are left to asammdf, which notices their damage.
+    """
     size = path.stat().st_size
     if size < _HEADER4 + 64:
         raise _make_fault(path, f"it ends after {size} bytes")
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        version = int.from_bytes(data[28:30], "little") or int.from_bytes(data[28:30], "big")
-        walk = _check_chains4(data) if 400 <= version < 500 else _check_chains3(data)
-        for problem in walk:
+        is_version4 = 400 <= int.from_bytes(data[28:30], "little") < 500
+        for problem in _check_chains4(data) if is_version4 else ():
             raise _make_fault(path, problem)
 
 
@@ -205,54 +195,3 @@ def _measure_block_data(data: mmap.mmap, place: int) -> int | str:
     if block.body + 24 + packed > len(data) or original > _MOST_INFLATION * packed + 1024:
         return f"packed data at byte {place} claim {original} bytes from {packed}"
     return int(original)
-
-
-def _check_chains3(data: mmap.mmap) -> Iterator[str]:
-    """Problems of the chains of an MDF 3 file."""
-    order = ">" if data[24:26] not in (b"\0\0", b"  ") else "<"
-    seen: set[int] = set()
-    waiting = [(_HEADER4, b"HD", 0)]
-    while waiting:
-        place, expected, record = waiting.pop()
-        if place in seen or place + _SIZE3[expected] > len(data):
-            yield f"blocks at byte {place} of {len(data)} form a circle or end outside"
-            return
-        seen.add(place)
-        if data[place : place + 2] != expected:
-            yield f"no {expected.decode()} block at byte {place}"
-            return
-        if expected == b"DG":
-            yield from _check_data_group3(data, place, order)
-        if expected == b"CG":
-            record = struct.unpack_from(f"{order}H", data, place + 20)[0]
-        if expected == b"CN":
-            yield from _check_channel3(data, place, order, record)
-        for offset, block in _LINKS3[expected].items():
-            target = struct.unpack_from(f"{order}I", data, place + offset)[0]
-            if target:
-                waiting.append((target, block, record))
-
-
-def _check_channel3(data: mmap.mmap, place: int, order: str, record: int) -> Iterator[str]:
-    """A channel must lie inside the record of its group."""
-    length = struct.unpack_from(f"{order}H", data, place + 2)[0]
-    first, bits = struct.unpack_from(f"{order}HH", data, place + 186)
-    if length >= 228 and place + 228 <= len(data):
-        first += 8 * struct.unpack_from(f"{order}H", data, place + 226)[0]
-    if first + bits > 8 * record:
-        yield f"the channel at byte {place} lies outside its record of {record} bytes"
-
-
-def _check_data_group3(data: mmap.mmap, place: int, order: str) -> Iterator[str]:
-    """The records of a data group must lie inside the file."""
-    group, _, start = struct.unpack_from(f"{order}III", data, place + 8)
-    marks = struct.unpack_from(f"{order}H", data, place + 22)[0]
-    needed = 0
-    places: set[int] = set()
-    while group and group not in places and group + _SIZE3[b"CG"] <= len(data):
-        places.add(group)
-        width, records = struct.unpack_from(f"{order}HI", data, group + 20)
-        needed += records * (width + marks)
-        group = struct.unpack_from(f"{order}I", data, group + 4)[0]
-    if start + needed > len(data):
-        yield f"records need {needed} bytes from byte {start}, the file has {len(data)}"
