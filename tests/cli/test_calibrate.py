@@ -124,7 +124,7 @@ def test_a_slip_loop_is_calibrated_behind_actuators(
     assert main(["calibrate", str(source), *given, *SHORT]) == 0
     content = read_calibration_file(out / "calibration.toml")
     assert content.policy == "slip"
-    assert content.spread.dead_time_s == 0.002
+    assert content.spread.dead_time == 0.002
     assert "integral_gain" in content.parameters
     assert "are commands of the controller" in (out / "calibration.toml").read_text()
     assert "of the nominal unit" in (out / "report.html").read_text(encoding="utf-8")

@@ -75,15 +75,14 @@ class ChannelTable(StrictModel):
 
     def to_spec(self) -> ChannelSpec:
         """Return the table as the mapping uses it."""
-        return ChannelSpec(
-            source=self.source,
-            unit=self.unit,
-            sign=self.sign,
-            scale=self.scale,
-            offset=self.offset,
-            time_shift=self.time_shift_s,
-            group=self.group,
-        )
+        values = dict(self)
+        return ChannelSpec(time_shift=values.pop("time_shift_s"), **values)
+
+    @classmethod
+    def from_spec(cls, spec: ChannelSpec) -> ChannelTable:
+        """Return the table of a channel of a mapping."""
+        values = dict(vars(spec))
+        return cls(time_shift_s=values.pop("time_shift"), **values)
 
 
 class TimeTable(StrictModel):

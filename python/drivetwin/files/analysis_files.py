@@ -76,17 +76,9 @@ def format_friction(one: ShapedFriction) -> str:
 
 def format_departures(found: tuple[Departure, ...]) -> str:
     """`departures.json`: drag of open clutches, and μ that goes with pressure or temperature."""
+    names = ("kind", "element", "value", "std", "plausible", "text")
     rows = [
-        {
-            "kind": one.kind,
-            "element": one.element,
-            "unit": UNITS[one.kind],
-            "value": one.value,
-            "std": one.std,
-            "plausible": one.plausible,
-            "text": one.text,
-        }
-        for one in found
+        {name: getattr(one, name) for name in names} | {"unit": UNITS[one.kind]} for one in found
     ]
     return _format_json({"departures": rows})
 

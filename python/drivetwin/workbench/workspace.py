@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -14,7 +13,6 @@ from pydantic import Field, ValidationError, field_validator
 from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin._util.toml import StrictModel, format_key_path
 from drivetwin._util.version import get_program_version
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
 from drivetwin.errors import RefusedError, Where
@@ -99,10 +97,6 @@ class WorkspaceFile(StrictModel):
             raise ValueError("a log is listed twice")
         return logs
 
-    def to_locks(self) -> dict[str, Lock]:
-        """Locks by parameter id."""
-        return {name: Lock(one.kind, one.value, one.std) for name, one in self.locks.items()}
-
 
 def save_workspace(work: SessionState, path: Path, folder: Folder) -> None:
     """Write the workspace; the file appears whole or not at all.
@@ -121,10 +115,7 @@ def save_workspace(work: SessionState, path: Path, folder: Folder) -> None:
         logs=[_make_log_entry(one, path.parent, folder) for one in work.logs],
         card=_make_file_entry(work.card, path.parent, folder),
         log=work.at,
-        locks={
-            name: LockEntry(kind=one.kind, value=one.value, std=one.std)
-            for name, one in work.locks.items()
-        },
+        locks={name: LockEntry(**vars(one)) for name, one in work.locks.items()},
         twins={
             method: {name: build_twin_file(twin) for name, twin in one.twins.items()}
             for method, one in work.results.items()
@@ -174,8 +165,8 @@ def restore_workspace(content: WorkspaceFile, work: SessionState) -> SessionStat
         for shift, times in entry.phases.items():
             work = work.apply_moves(shift, times)
     work = work.hold_out([frozenset(entry.held) for entry in content.logs])
-    for name, lock in content.to_locks().items():
-        work = work.set_lock(name, lock)
+    for name, lock in content.locks.items():
+        work = work.set_lock(name, Lock(**dict(lock)))
     results = {
         method: Outcome(method, {name: restore_twin(twin) for name, twin in twins.items()})
         for method, twins in content.twins.items()
@@ -209,7 +200,7 @@ def _make_log_entry(one: OpenLog, beside: Path, folder: Folder) -> LogEntry:
     return LogEntry(
         file=_make_file_entry(one.source, beside, folder),
         channels={
-            role: _make_channel_table(spec) for role, spec in one.corrections.channels.items()
+            role: ChannelTable.from_spec(spec) for role, spec in one.corrections.channels.items()
         },
         ignored=list(one.corrections.ignored),
         time_unit=one.corrections.time_unit,
@@ -242,16 +233,3 @@ def _is_workspace(path: Path) -> bool:
     except RefusedError:
         return False
     return True
-
-
-def _make_channel_table(spec: ChannelSpec) -> ChannelTable:
-    values: Mapping[str, object] = {
-        "source": spec.source,
-        "group": spec.group,
-        "unit": spec.unit,
-        "sign": spec.sign,
-        "scale": spec.scale,
-        "offset": spec.offset,
-        "time_shift_s": spec.time_shift,
-    }
-    return ChannelTable.model_validate(values)
