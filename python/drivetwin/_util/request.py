@@ -130,15 +130,18 @@ def input_file(
 
 def output_folder(help: str, metavar: str = "DIR", default: Any = None) -> Any:
     """Declare `-o`, a folder for the results."""
-    marker = Output(Shape.FOLDER)
-    return option(help, "-o", "--output", metavar=metavar, output=marker, default=default)
+    return output_file(help, metavar, default=default, shape=Shape.FOLDER)
 
 
 def output_file(
-    help: str, metavar: str, endings: Mapping[str, str] | None = None, default: Any = None
+    help: str,
+    metavar: str,
+    endings: Mapping[str, str] | None = None,
+    default: Any = None,
+    shape: Shape = Shape.FILE,
 ) -> Any:
     """Declare `-o`, a file for the results; `endings` as in `Output`."""
-    marker = Output(endings=endings)
+    marker = Output(shape, endings)
     return option(help, "-o", "--output", metavar=metavar, output=marker, default=default)
 
 

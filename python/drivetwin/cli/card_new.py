@@ -7,8 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin._util.outputs import Output
-from drivetwin._util.request import REQUIRED, Request, flag, option, spell_option
+from drivetwin._util.request import REQUIRED, Request, flag, option, output_file, spell_option
 from drivetwin.cli.arguments import find_mapping, mapping_option
 from drivetwin.cli.output import (
     print_findings,
@@ -29,14 +28,7 @@ if TYPE_CHECKING:
 class NewCardFiles(Request):
     """Files of `card new`."""
 
-    output: Path = option(
-        "File of the new card.",
-        "-o",
-        "--output",
-        metavar="CARD.toml",
-        output=Output(),
-        default=REQUIRED,
-    )
+    output: Path = output_file("File of the new card.", "CARD.toml", default=REQUIRED)
     from_log: Path | None = option(
         "Log of the vehicle; its data fill in entries.", "--from", metavar="LOG"
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.outputs import Output, Shape
-from drivetwin._util.request import REQUIRED, flag, input_file, option
+from drivetwin._util.request import REQUIRED, flag, input_file, option, output_file
 from drivetwin.cli.arguments import TwinInput, mapping_option, read_twin_log
 from drivetwin.cli.output import print_json, print_line, print_paragraph, show_step
 from drivetwin.errors import InputError, Where
@@ -25,12 +25,8 @@ class Export(TwinInput, command="export"):
     """Arguments of `export`."""
 
     to: Target = option("Form of the export.", default=REQUIRED)
-    output: Path | None = option(
-        "File, or folder for c; default: ./TWIN.FORM.",
-        "-o",
-        "--output",
-        metavar="PATH",
-        output=Output(Shape.EITHER),
+    output: Path | None = output_file(
+        "File, or folder for c; default: ./TWIN.FORM.", "PATH", shape=Shape.EITHER
     )
     names: Names = option(
         "For parameter files: naming convention of the parameters.", default=Names.DRIVETWIN

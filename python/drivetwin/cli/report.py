@@ -122,13 +122,11 @@ def _assign_names(made: Sequence[Path]) -> dict[str, Path]:
 
 
 def _load_candidate(name: str, source: Path) -> Candidate:
-    from drivetwin.cli.file_kinds import find_twin
     from drivetwin.files.result_file import load_result
-    from drivetwin.files.twin_file import load_twin
     from drivetwin.report.find_reports import Candidate
 
     if source.suffix == ".toml":
-        return Candidate.from_twin(name, load_twin(find_twin(source)))
+        return Candidate.from_twin(name, _load_twin(source))
     return Candidate.from_result(name, load_result(source / RESULT if source.is_dir() else source))
 
 
