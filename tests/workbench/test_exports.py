@@ -15,7 +15,8 @@ from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import Method
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
-from drivetwin.export.targets import Target
+from drivetwin.export.targets import FmiVersion, Target
+from drivetwin.export.write import ExportOptions
 from drivetwin.files.twin_file import load_twin
 from drivetwin.workbench.exports import Record, make_product
 from drivetwin.workbench.identifying import Outcome
@@ -26,17 +27,17 @@ from drivetwin.workbench.views.export import RECORDS
 
 @pytest.mark.parametrize("target", [Target(one.value) for one in ParameterFormat])
 def test_parameter_files_are_read_back(identified: Session, tmp_path: Path, target: Target) -> None:
-    product = make_product(identified.work, target, tmp_path)
+    product = make_product(identified.work, ExportOptions(to=target), tmp_path)
     path = tmp_path / product.name
     path.write_bytes(product.content)
     assert any(entry.name.startswith("k_o") for entry in read_parameters(path).entries)
 
 
 def test_c_sources_come_as_an_archive(identified: Session, tmp_path: Path) -> None:
-    product = make_product(identified.work, Target.C, tmp_path)
+    product = make_product(identified.work, ExportOptions(to=Target.C), tmp_path)
     names = zipfile.ZipFile(io.BytesIO(product.content)).namelist()
     assert {"dt_twin.c", "dt_model.h"} <= set(names)
-    assert make_product(identified.work, Target.C, tmp_path) == product
+    assert make_product(identified.work, ExportOptions(to=Target.C), tmp_path) == product
 
 
 @pytest.mark.parametrize(
@@ -45,7 +46,14 @@ def test_c_sources_come_as_an_archive(identified: Session, tmp_path: Path) -> No
 def test_models_of_the_shift(
     identified: Session, tmp_path: Path, target: Target, says: bytes
 ) -> None:
-    assert says in make_product(identified.work, target, tmp_path).content
+    assert says in make_product(identified.work, ExportOptions(to=target), tmp_path).content
+
+
+def test_chosen_options_decide_the_file(identified: Session, tmp_path: Path) -> None:
+    fmi = ExportOptions(to=Target.FMU, fmi=FmiVersion.FMI3)
+    packed = io.BytesIO(make_product(identified.work, fmi, tmp_path).content)
+    described = zipfile.ZipFile(packed).read("modelDescription.xml")
+    assert b'fmiVersion="3.0"' in described
 
 
 def test_every_file_has_a_button() -> None:
@@ -72,7 +80,7 @@ def test_the_report_is_a_page(identified: Session, tmp_path: Path) -> None:
 
 
 def test_nothing_to_export_is_told(tmp_path: Path) -> None:
-    for wanted in (*Target, *Record):
+    for wanted in (*(ExportOptions(to=one) for one in Target), *Record):
         with pytest.raises(InputError):
             make_product(SessionState(), wanted, tmp_path)
 

@@ -60,7 +60,7 @@ class Target(StrEnum):
     ending: str
 
     C = "c", "C sources", "C99 model of the shift for a controller, as an archive"
-    FMU = "fmu", "FMU", "co-simulation, FMI 2.0, sources inside"
+    FMU = "fmu", "FMU", "co-simulation, sources inside"
     MODELICA = "modelica", "Modelica", "the shift in components of the Standard Library", "mo"
     SSV = "ssv", "SSV", "parameter values for SSP and FMUs"
     CDFX = "cdfx", "CDFX", "calibration data, ASAM CDF"

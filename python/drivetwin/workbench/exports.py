@@ -8,19 +8,15 @@ import zipfile
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from drivetwin.errors import InputError
 from drivetwin.estimation.identification import Identification
 from drivetwin.export.targets import Target
+from drivetwin.export.write import ExportedModel, ExportOptions, write_export
 from drivetwin.files.twin_file import save_twin
 from drivetwin.workbench import jobs, what_if
 from drivetwin.workbench.identifying import render_log_report
 from drivetwin.workbench.session_state import SessionState
-
-if TYPE_CHECKING:
-    from drivetwin.export.fmu.experiment import Experiment
-    from drivetwin.export.subject import Subject
 
 REPORT_LIMIT = 120.0
 """Time limit [s] for writing a report."""
@@ -44,7 +40,7 @@ class Product:
     content: bytes
 
 
-def make_product(work: SessionState, wanted: Target | Record, scratch: Path) -> Product:
+def make_product(work: SessionState, wanted: ExportOptions | Record, scratch: Path) -> Product:
     """Make one file from what is shown; `scratch` is a folder of our own.
 
     Raises InputError where the session has nothing of the kind, and the errors of the writers.
@@ -52,38 +48,20 @@ def make_product(work: SessionState, wanted: Target | Record, scratch: Path) -> 
     stem = Path(work.log.name).stem if work.log is not None else "twin"
     if isinstance(wanted, Record):
         return Product(f"{stem}.{wanted.value}", _make_record(work, wanted, scratch))
-    if wanted is Target.C:
-        return Product(f"{stem}.c.zip", _collect_sources(work, scratch))
-    path = scratch / f"{stem}.{wanted.ending}"
-    _write_product(work, wanted, path)
+    path = scratch / f"{stem}.{wanted.to.ending}"
+    write_export(work.require_twin(), wanted, path, lambda: _load_model(work))
+    if wanted.to is Target.C:
+        return Product(f"{path.name}.zip", _pack_folder(path))
     return Product(path.name, _read_file(path))
 
 
-def _write_product(work: SessionState, wanted: Target, path: Path) -> None:
-    match wanted:
-        case Target.FMU:
-            from drivetwin.export.fmu.build import BuildOptions, build_fmu
-
-            subject, experiment = _get_subject(work)
-            build_fmu(subject, path, BuildOptions(experiment=experiment))
-        case Target.MODELICA:
-            from drivetwin.export.modelica.model import write_modelica
-
-            write_modelica(*_get_subject(work), path)
-        case _:
-            from drivetwin.export.parameters.files import ParameterFormat, write_parameters
-            from drivetwin.export.parameters.of_twin import collect_parameters
-
-            content = collect_parameters(work.require_twin())
-            write_parameters(content, path, ParameterFormat(wanted.value))
-
-
-def _get_subject(work: SessionState) -> tuple[Subject, Experiment | None]:
-    """The model of the shift that is shown, started as it was measured."""
+def _load_model(work: SessionState) -> ExportedModel:
+    """Load the model of the shift that is shown, started as it was measured."""
     from drivetwin.export.fmu.measured import build_measured_subject
 
     twin, shift = work.require_twin(), work.require_shift()
-    return build_measured_subject(twin, work.require_log(), (shift.start_gear, shift.end_gear))
+    gears = shift.start_gear, shift.end_gear
+    return ExportedModel(*build_measured_subject(twin, work.require_log(), gears))
 
 
 def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
@@ -131,17 +109,12 @@ def _get_evidence(work: SessionState) -> Identification:
     return found
 
 
-def _collect_sources(work: SessionState, scratch: Path) -> bytes:
-    """The C sources as one archive; equal twins give equal bytes."""
-    from drivetwin.export.c import write_c
-
-    folder = scratch / "c"
-    folder.mkdir(exist_ok=True)
-    paths = write_c(_get_subject(work)[0], folder)
+def _pack_folder(folder: Path) -> bytes:
+    """Pack the C sources as one archive and remove them; equal twins give equal bytes."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in paths:
-            archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes())
+        for path in sorted(folder.iterdir()):
+            archive.writestr(zipfile.ZipInfo(path.name), _read_file(path))
     return packed.getvalue()
 
 

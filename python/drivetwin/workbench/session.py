@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from drivetwin._util.atomic import write_bytes, write_text
+from drivetwin._util.request import Request
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.channels.mapping_file import find_project_mapping
@@ -74,6 +75,8 @@ class Session:
     form: CardForm | None = None
     preview: tuple[ColumnKey, Preview] | None = None
     view: View | None = None
+    choices: dict[type[Request], Mapping[str, Any]] = field(default_factory=dict)
+    """Values chosen in the forms of requests, by argument."""
     used: float = field(default_factory=time.monotonic)
     users: int = 0
     """Number of requests that act on the session at present."""

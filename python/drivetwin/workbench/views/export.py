@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from typing import Any
 
 from dash import ALL, Input, Output, ctx, dcc, html, no_update
@@ -11,10 +12,12 @@ from dash.development.base_component import Component
 
 from drivetwin.errors import RefusedError
 from drivetwin.export.targets import Target
+from drivetwin.export.write import ExportOptions
 from drivetwin.workbench.exports import Record, make_product
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import get_triggered_part
+from drivetwin.workbench.views.request_form import build_choices, register_choices
 
 RECORDS = {
     Record.REPORT: ("Report", "one offline page with all evidence"),
@@ -32,6 +35,7 @@ def layout() -> list[Component]:
             "The result that is shown in the step Model, as identified: sliders do not change it."
         ),
         html.H3("The twin for other programs"),
+        ui.make_row(*build_choices(ExportOptions)),
         _build_group({one.value: (one.label, one.text) for one in Target}),
         html.H3("Files of drivetwin"),
         _build_group({record.value: text for record, text in RECORDS.items()}),
@@ -55,14 +59,17 @@ def _build_group(entries: dict[str, tuple[str, str]]) -> Component:
 
 
 def register(page: ui.Page) -> None:
-    """Register the callback that writes the requested file."""
+    """Register the callbacks of the choices and of the buttons."""
+
+    register_choices(page, ExportOptions)
 
     @page.callback(Output("download", "data"), Input({"export": ALL, "at": ALL}, "n_clicks"))
     def hand_over(session: Session, clicks: list[int | None]) -> Any:
         """Write the file and send it to the browser."""
         if not ctx.triggered_id or not any(clicks):
             return no_update
-        wanted = _parse_choice(get_triggered_part("export"))
+        choices = session.choices.get(ExportOptions, {})
+        wanted = _parse_choice(get_triggered_part("export"), choices)
         product = make_product(session.work, wanted, session.scratch)
         if wanted is not Record.MAPPING:
             session.note_export()
@@ -72,9 +79,9 @@ def register(page: ui.Page) -> None:
         return {"content": content, "filename": product.name, "base64": True}
 
 
-def _parse_choice(name: str) -> Target | Record:
+def _parse_choice(name: str, choices: Mapping[str, Any]) -> ExportOptions | Record:
     if name in set(Record):
         return Record(name)
     if name in set(Target):
-        return Target(name)
+        return ExportOptions(**{**choices, "to": Target(name)})
     raise RefusedError("there is no such export", "press one of the buttons")

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""Export of a twin to any target, for the command line and the workbench."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from drivetwin._util.request import REQUIRED, Request, input_file, option
+from drivetwin.export.targets import FmiVersion, Names, Platform, Target
+
+if TYPE_CHECKING:
+    from drivetwin.export.fmu.experiment import Experiment
+    from drivetwin.export.parameters.content import ParameterSet
+    from drivetwin.export.subject import Subject
+    from drivetwin.twin.twin import Twin
+
+
+class ExportOptions(Request):
+    """Target of an export and its options."""
+
+    to: Target = option("Form of the export.", default=REQUIRED)
+    names: Names = option(
+        "For parameter files: naming convention of the parameters.", default=Names.DRIVETWIN
+    )
+    powertrain: str | None = option(
+        "For parameter files: add the torque converter of this powertrain (TOML or built-in).",
+        metavar="FILE",
+    )
+    template: Path | None = input_file(
+        "For parameter files: template with labels, units, axes and breakpoints (TOML)."
+    )
+    fmi: FmiVersion = option("For fmu: version of the standard.", default=FmiVersion.FMI2)
+    platforms: tuple[Platform, ...] = option(
+        "For fmu: target platform, built by zig; repeatable.", "--platform", default=()
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedModel:
+    """Content of an export of the model: the shift, and the initial state from a log."""
+
+    subject: Subject
+    experiment: Experiment | None
+
+
+def write_export(
+    twin: Twin, options: ExportOptions, path: Path, load: Callable[[], ExportedModel]
+) -> ExportedModel | ParameterSet:
+    """Write a twin to a file, or to a folder for C sources, and return the content.
+
+    `load` is called for targets that contain the model of a shift. Raises the typed errors of
+    `load` and of the writers.
+    """
+    match options.to:
+        case Target.C:
+            from drivetwin.export.c import write_c
+
+            write_c((model := load()).subject, path)
+        case Target.FMU:
+            from drivetwin.export.fmu.build import BuildOptions, build_fmu
+
+            model = load()
+            build = BuildOptions(options.fmi, options.platforms, model.experiment)
+            build_fmu(model.subject, path, build)
+        case Target.MODELICA:
+            from drivetwin.export.modelica.model import write_modelica
+
+            model = load()
+            write_modelica(model.subject, model.experiment, path)
+        case _:
+            return _write_parameters(twin, options, path)
+    return model
+
+
+def _write_parameters(twin: Twin, options: ExportOptions, path: Path) -> ParameterSet:
+    """Write a parameter file, in the form of a template if one is given; return its contents."""
+    from drivetwin.drive import load_powertrain
+    from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+    from drivetwin.export.parameters.of_twin import collect_parameters
+    from drivetwin.export.parameters.template import apply_template, read_template, require_labels
+
+    powertrain = options.powertrain
+    converter = None if powertrain is None else load_powertrain(powertrain).converter
+    content = collect_parameters(twin, options.names, converter)
+    kind = ParameterFormat(options.to.value)
+    if options.template is not None:
+        form = read_template(options.template)
+        unvalued = [one.id for one in twin.parameters.values() if one.value is None]
+        content = apply_template(content, form, unvalued)
+        require_labels(content, form, kind)
+    write_parameters(content, path, kind)
+    return content
