@@ -71,6 +71,10 @@ def test_writes_all_files_with_equal_values(folder: Path) -> None:
     assert content.shift == "2-3"
     assert content.limits == {"shift_time_s": 1.1, "mean_friction_energy_J": 90000.0}
     assert list(content.inputs) == ["twin.toml"]
+    options = content.settings["options"]
+    assert (options["draws"], options["engine torque"], options["policy"]) == (
+        "60", "1400.0", "controller"
+    )  # fmt: skip
     for suffix in ("csv", "dcm", "cdfx"):
         read = read_parameters(folder / f"calibration.{suffix}")
         values = {one.name: one.value for one in read.scalars}

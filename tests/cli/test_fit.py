@@ -64,6 +64,7 @@ def test_json_is_the_result_file(folder: Path, capsys: pytest.CaptureFixture[str
     assert printed == read_json(folder / "out" / "fit.json")
     file = FitFile.model_validate_json(json.dumps(printed))
     assert file.logs == ["k0.csv"]
+    assert file.settings == {"seed": "0"}
     assert [one.log for one in file.held_out] == ["other.csv"]
     for output, fit in file.held_out[0].fit.items():
         assert fit.fit_percent == pytest.approx(file.fit[0][output].fit_percent, abs=1.0)

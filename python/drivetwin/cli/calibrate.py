@@ -101,13 +101,13 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
     model = _load_valid_twin(request.twin)
     task, correction = _build_request(request, model)
     model = model if correction is None else correction.twin
-    output, sources = request.output, (request.twin, *request.from_logs)
+    output = request.output
     stages = _open_stages(request)
     results = _calibrate(model, task, (request.grid, request.front), stages)
     found = results[0]
     findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
     with show_step(f"writing {output}"):
-        _write_results(output, results, findings, (model, task, sources))
+        _write_results(request, results, findings, (model, task))
     stages.remove()
     infeasible = _find_excess(found, output)
     if as_json:
@@ -286,10 +286,10 @@ def _load_start(path: Path | None, policy: PolicyKind) -> dict[str, float]:
 
 
 def _write_results(
-    output: Path,
+    request: Calibrate,
     results: Results,
     findings: tuple[Finding, ...],
-    origin: tuple[Twin, Request, tuple[Path, ...]],
+    origin: tuple[Twin, Request],
 ) -> None:
     from drivetwin._util.atomic import write_text
     from drivetwin._util.version import get_program_version
@@ -306,19 +306,21 @@ def _write_results(
     from drivetwin.files.twin_file import save_twin
     from drivetwin.report.calibration import render_calibration
 
-    (found, front, mapped), (twin, request, sources) = results, origin
-    label = "-".join(request.gears)
+    (found, front, mapped), (twin, task) = results, origin
+    sources = (request.twin, *request.from_logs)
+    label = "-".join(task.gears)
     provenance = Provenance(
         get_program_version(),
         twin.name,
         label,
         request.policy,
         {one.name: hash_file(one) for one in sources},
-        request.spread,
+        task.spread,
+        request.describe_settings(),
     )
     name = f"{twin.name} {label}"
     content = collect_calibration(found, name, mapped)
-    with write_atomically(output) as folder:
+    with write_atomically(request.output) as folder:
         write_calibration_file(
             folder / CALIBRATION, build_calibration_file(found, provenance, front, mapped)
         )

@@ -23,6 +23,7 @@ from drivetwin.cli.output import (
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from drivetwin.files.fit_file import FitFile
     from drivetwin.findings import Finding
     from drivetwin.fit.fit import HeldOut
     from drivetwin.fit.recording import Recording
@@ -57,7 +58,7 @@ def fit(request: Fit, *, as_json: bool) -> None:
 
     logs, hold_out = request.logs, request.hold_out
     network, channels = read_model(request.model)
-    answer = _Answer([one.name for one in logs])
+    answer = _Answer([one.name for one in logs], request.describe_settings())
     with show_step(f"reading {len(logs)} recordings"):
         recordings = list(_read_recordings(answer, logs, network, channels))
         held = list(_read_recordings(answer, hold_out, network, channels))
@@ -70,7 +71,7 @@ def fit(request: Fit, *, as_json: bool) -> None:
     if request.output is not None:
         files = _write_outputs(request.output, answer, format_model(found.fitted, channels))
     if as_json:
-        print_json(answer.to_document())
+        print_json(answer.build_file().model_dump(mode="json", by_alias=True))
         return
     _print_answer(answer)
     for file in files:
@@ -82,17 +83,18 @@ class _Answer:
     """Everything that the command found."""
 
     logs: Sequence[str]
+    settings: Mapping[str, str]
     remarks: tuple[Finding, ...] = ()
     found: ModelFit | None = None
     held_out: Mapping[str, HeldOut] | None = None
 
-    def to_document(self) -> dict[str, Any]:
-        """Return the content of the result file."""
+    def build_file(self) -> FitFile:
+        """Build the result file."""
         from drivetwin.files.fit_file import build_fit_file
 
         assert self.found is not None
-        file = build_fit_file(self.found, self.logs, self.held_out or {}, self.remarks)
-        return file.model_dump(mode="json", by_alias=True)
+        held_out = self.held_out or {}
+        return build_fit_file(self.found, self.logs, held_out, self.remarks, self.settings)
 
 
 def _read_recordings(
@@ -109,14 +111,13 @@ def _read_recordings(
 def _write_outputs(folder: Path, answer: _Answer, model: str) -> tuple[Path, ...]:
     """Write result, fitted model and report, all or none."""
     from drivetwin.cli.atomic_outputs import write_texts
-    from drivetwin.files.fit_file import build_fit_file, format_fit_file
+    from drivetwin.files.fit_file import format_fit_file
     from drivetwin.report.fit import render_fit
 
     assert answer.found is not None
     held_out = answer.held_out or {}
-    file = build_fit_file(answer.found, answer.logs, held_out, answer.remarks)
     texts = {
-        RESULT: format_fit_file(file),
+        RESULT: format_fit_file(answer.build_file()),
         MODEL: model,
         REPORT: render_fit(answer.found, answer.logs, held_out, answer.remarks),
     }

@@ -133,7 +133,10 @@ class CalibrationFile(Record):
 
 @dataclass(frozen=True)
 class Provenance:
-    """Origin of a calibration: program version, twin, shift `2-3`, policy, inputs with SHA-256."""
+    """Origin of a calibration: program version, twin, shift `2-3`, policy, inputs with SHA-256.
+
+    `options` are those of the command, by name, as texts.
+    """
 
     version: str
     twin: str
@@ -141,6 +144,7 @@ class Provenance:
     policy: PolicyKind
     inputs: dict[str, str]
     spread: Spread
+    options: dict[str, str]
 
 
 _STATED = ("unit", "start", "low", "high", "text")
@@ -182,7 +186,7 @@ def build_calibration_file(
             },
             "limits": {keys[one.metric, one.statistic]: one.bound for one in task.limits},
             "spread": SpreadRecord.from_result(origin.spread),
-            "settings": asdict(task.settings),
+            "settings": {**asdict(task.settings), "options": origin.options},
             "front": build_front_records(front, task.policy),
             "map": build_map_records(mapped),
         }

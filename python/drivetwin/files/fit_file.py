@@ -67,6 +67,7 @@ class FitFile(Record):
     fit: list[dict[str, FitRecord]]
     starts: list[StartRecord]
     agreeing: int
+    settings: dict[str, str] = Field(default_factory=dict)
     held_out: list[HeldOutRecord] = Field(default_factory=list)
     findings: list[FindingRecord]
 
@@ -76,8 +77,12 @@ def build_fit_file(
     logs: Sequence[str],
     held_out: Mapping[str, HeldOut],
     remarks: Sequence[Finding] = (),
+    settings: Mapping[str, str] | None = None,
 ) -> FitFile:
-    """Build the file of a fit to `logs`, with predictions by log and `remarks` of the reader."""
+    """Build the file of a fit to `logs`, with predictions by log and `remarks` of the reader.
+
+    `settings` are the options of the command, by name.
+    """
     names = [one.name for one in found.sought]
     values = found.values
     return FitFile(
@@ -102,6 +107,7 @@ def build_fit_file(
         fit=[_build_fits(one) for one in found.agreement],
         starts=[StartRecord.from_result(one) for one in found.starts],
         agreeing=found.agreeing,
+        settings=dict(settings or {}),
         held_out=[
             HeldOutRecord(log=name, chi2=one.chi2, fit=_build_fits(one.agreement))
             for name, one in held_out.items()
