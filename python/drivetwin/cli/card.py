@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from drivetwin._util.request import Request, argument, flag
+from drivetwin._util.request import FileRole, Request, argument, flag
 from drivetwin.cli.arguments import find_mapping, mapping_option
 from drivetwin.cli.card_new import new
 from drivetwin.cli.command_group import CommandGroup
@@ -34,7 +34,7 @@ IMPLAUSIBLE = 3
 class CheckCard(Request, command="card check"):
     """Arguments of `card check`."""
 
-    card_file: Path = argument("Vehicle card (TOML).", "CARD")
+    card_file: Path = argument("Vehicle card (TOML).", "CARD", role=FileRole.OTHER)
     log: Path | None = argument(
         "Log of the vehicle: CSV, MDF, MAT, Parquet, bus log.", "LOG", default=None
     )

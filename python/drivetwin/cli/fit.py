@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drivetwin._util.request import Request, argument, input_file, option, output_folder
+from drivetwin._util.request import FileRole, Request, argument, input_file, option, output_folder
 from drivetwin.cli.arguments import logs_argument
 from drivetwin.cli.output import (
     make_table,
@@ -36,7 +36,9 @@ RESULT, MODEL, REPORT = "fit.json", "model.toml", "report.html"
 class Fit(Request, command="fit"):
     """Arguments of `fit`."""
 
-    model: Path = argument("Model file (TOML); see 'drivetwin schema model'.", "MODEL")
+    model: Path = argument(
+        "Model file (TOML); see 'drivetwin schema model'.", "MODEL", role=FileRole.OTHER
+    )
     logs: tuple[Path, ...] = logs_argument("Recordings of any format.")
     hold_out: tuple[Path, ...] = input_file(
         "Predict a recording with the fit.", metavar="LOG", default=()
