@@ -112,7 +112,7 @@ def _format_card(box: Gearbox) -> str:
     return tomlkit.dumps(
         {
             "name": box.name,
-            "final_drive": drive.i_f,
+            "final_drive": drive.final_drive,
             "gears": [
                 {"name": name, "ratio": ratio, "elements": [f"K{name}"]}
                 for name, ratio in ratios.items()

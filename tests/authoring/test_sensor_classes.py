@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from drivetwin.authoring.sensor_classes import list_classes, parse_sensor, read_sensor_classes
-from drivetwin.plausibility.settings import PLAUSIBILITY
+from drivetwin.vehicle.card_fields import get_card_field
 
 ROLES = {"engine_torque": "torque", "wheel_speed": "speed", "pressure": "pressure"}
 
@@ -15,7 +15,7 @@ def test_every_class_has_a_source_and_a_limit() -> None:
     for one in read_sensor_classes().values():
         assert len(one.source) > 20
         assert one.gain_limit or one.offset_limit or one.offset_limit_share
-        assert one.gain_limit / 3**0.5 <= PLAUSIBILITY.gain_tolerance
+        assert one.gain_limit / 3**0.5 <= get_card_field("sensors", "gain_tolerance").usual[1]
 
 
 @pytest.mark.parametrize("role", ROLES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from enum import Enum
+from enum import Enum, StrEnum
 from typing import Any
 
 from drivetwin.authoring.stated_number import StatedNumber
@@ -43,6 +43,15 @@ class Answer:
 UNKNOWN = Answer(None, Origin.UNKNOWN)
 
 Answers = Mapping[Key, Answer]
+
+
+class GainForm(StrEnum):
+    """Form in which the gain of an element is stated."""
+
+    GAIN = "gain"  # one number
+    AREA = "area"  # with area and effective radius
+    DIAMETERS = "diameters"  # which both follow from
+    UNKNOWN = "unknown"  # assumed from a usual μ
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,29 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from drivetwin._util.toml import format_key, format_text, parse_toml, raise_faults
 from drivetwin._util.visible_text import escape_line
-from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Origin, get_value, list_gears
+from drivetwin.authoring.answers import (
+    UNKNOWN,
+    Answer,
+    Answers,
+    GainForm,
+    Origin,
+    get_value,
+    list_elements,
+    list_gears,
+)
 from drivetwin.authoring.converter import KEY, format_converter
-from drivetwin.authoring.element_text import format_elements
-from drivetwin.authoring.entries import format_entry, format_range
+from drivetwin.authoring.element_questions import describe_product, find_form
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.sensor_classes import SensorAnswer, get_offset_unit
+from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.errors import CardError
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.check import check_card
 
 
@@ -48,7 +59,7 @@ def format_card(
     parts = [
         _format_head(answers, survey, draft=draft),
         _format_gears(answers, survey),
-        format_elements(answers, survey, estimates or LogEstimates()),
+        _format_elements(answers, survey, estimates or LogEstimates()),
         format_converter(answers),
         _format_inertia(answers),
         _format_sensors(answers),
@@ -72,15 +83,10 @@ def _format_head(answers: Answers, survey: LogSurvey | None, *, draft: bool) -> 
         yield f"# Draft{source}: confirm entries marked 'guess:', fill in the commented ones."
     if survey is not None and survey.remark:
         yield f"# The log gives no ratios: {escape_line(survey.remark)}"
-    yield from format_entry("name", answers.get(("name",), UNKNOWN), "")
+    yield from _format_field(answers, "name")
     yield 'loss_law = "paper"  # or "dissipative": how gears lose power when torque reverses'
-    i_in = answers.get(("i_in",), Answer(1.0, Origin.DEFAULT))
-    yield from format_entry("i_in", i_in, "input gear: engine over gearbox input speed [-]")
-    yield from format_entry(
-        "final_drive",
-        answers.get(("final_drive",), UNKNOWN),
-        "i_f: output over wheel speed, hub reduction included [-]",
-    )
+    yield from _format_field({("i_in",): Answer(1.0, Origin.DEFAULT), **answers}, "i_in")
+    yield from _format_field(answers, "final_drive")
 
 
 def _format_gears(answers: Answers, survey: LogSurvey | None) -> Iterator[str]:
@@ -92,36 +98,80 @@ def _format_gears(answers: Answers, survey: LogSurvey | None) -> Iterator[str]:
         for line in ("[[gears]]", 'name = "..."', "ratio = ...", 'elements = ["..."]'):
             yield f"# {line}"
         return
-    notes = {part: answers[("gears", part)] for part in ("names", "ratios", "elements")}
     for gear in gears:
         yield "[[gears]]"
-        yield from format_entry("name", _take(notes["names"], gear.name), "")
-        yield from format_entry("ratio", _take(notes["ratios"], gear.ratio), "")
-        yield from format_entry("elements", _take(notes["elements"], [gear.element]), "")
+        for part, value in (
+            ("names", gear.name), ("ratios", gear.ratio), ("elements", [gear.element]),
+        ):  # fmt: skip
+            answer = replace(answers[("gears", part)], value=value)
+            yield from _format_field({("gears", part): answer}, "gears", part)
         yield ""
     if survey is not None and survey.has_input_slip and get_value(answers, *KEY) is None:
         yield "# Engine and input speed slip: the torque converter is open. Shifts with it open"
         yield "# need its map as [converter]; see docs/reference/vehicle-card.md."
 
 
-def _take(answer: Answer, value: object) -> Answer:
-    """Return one value of a list with the origin of the list."""
-    return Answer(value, answer.origin, answer.note)
+def _format_elements(
+    answers: Answers, survey: LogSurvey | None, estimates: LogEstimates
+) -> Iterator[str]:
+    """Write the tables of all shift elements."""
+    elements = list_elements(answers)
+    if not elements:
+        yield "# One table [elements.<name>] for each element: kind, gain, P0_bar."
+    for name in elements:
+        yield ""
+        yield from _format_element(answers, name, survey, estimates)
+
+
+def _format_element(
+    answers: Answers, name: str, survey: LogSurvey | None, estimates: LogEstimates
+) -> Iterator[str]:
+    yield f"[elements.{format_key(name)}]"
+    yield from _format_field(answers, "elements", name, "kind")
+    # Ratios are needed of a clutch.
+    is_clutch = get_value(answers, "elements", name, "kind") == "clutch"
+    for part in ("i_c", "i_out"):
+        if is_clutch or get_value(answers, "elements", name, part) is not None:
+            yield from _format_field(answers, "elements", name, part)
+    yield from _format_field(answers, "elements", name, "P0_bar")
+    if survey is not None and get_value(answers, "elements", name, "P0_bar") is None:
+        yield f"# {escape_line(survey.name)} does not show it: P0 is guessed only where the output"
+        yield "# torque begins to fall in a power-on upshift to the gear of the element."
+    yield from _format_gain(answers, name, estimates)
+    product = estimates.products.get(name)
+    if product is not None:
+        shift = escape_line(product.shift)
+        yield f"# Shift {shift}: {describe_product(product.low, product.high)}."
+    for part in ("peak", "drum_inertia_kgm2"):
+        if ("elements", name, part) in answers:
+            yield from _format_field(answers, "elements", name, part)
+
+
+def _format_gain(answers: Answers, name: str, estimates: LogEstimates) -> Iterator[str]:
+    """Write the gain as one number or by its parts; commented where nothing is stated of it."""
+    form = find_form(answers, name)
+    if form is GainForm.UNKNOWN:
+        assumed, note = estimates.assume_gain(name)
+        yield "# N·D·A·r is unknown: μ is given for this assumed gain, μ·gain does not depend on it"
+        entry = f"{{ value = {assumed.value:.3g}, std = {assumed.std:.3g}, assumed = true }}"
+        yield f"gain_m3 = {entry}  # assumed: {escape_line(note)}"
+        return
+    if form is GainForm.GAIN:
+        yield from _format_field(answers, "elements", name, "gain_m3")
+        return
+    if form is None:
+        yield "# The gain N·D·A·r as one number, about 0.005 for a car's clutch, 0.03 for a truck's"
+        yield "# [m³], or by its parts. Remove the leading # of the lines that you fill in."
+        yield "# gain_m3 = ..."
+    for part in ("surfaces", "derating", "area_m2", "radius_m"):
+        yield from _format_field(answers, "elements", name, part)
 
 
 def _format_inertia(answers: Answers) -> Iterator[str]:
     yield ""
     yield "[inertia]"
-    for part, key, meaning in (
-        ("J_prime", "J_prime_kgm2", "plausible range of J′ at the engine, at engine speed [kg·m²]"),
-        ("J_vehicle", "J_vehicle_kgm2", "plausible range of J3 at the wheel [kg·m²]"),
-    ):
-        yield from format_range(key, answers.get(("inertia", part), UNKNOWN), meaning)
-    yield from format_entry(
-        "J_out_kgm2",
-        answers.get(("inertia", "J_out"), UNKNOWN),
-        "output side before the elastic shaft, clutch drums excluded [kg·m²]; optional",
-    )
+    for part in ("J_prime", "J_vehicle", "J_out"):
+        yield from _format_field(answers, "inertia", part)
 
 
 def _format_sensors(answers: Answers) -> Iterator[str]:
@@ -194,3 +244,31 @@ def _format_spec(spec: ChannelSpec) -> Iterator[str]:
     for key, number, usual in numbers:
         if number != usual:
             yield f"{key} = {number!r}"
+
+
+def _format_field(answers: Answers, *key: str) -> Iterator[str]:
+    """Write the entry of a field below its comment; an unknown one as a comment to fill in."""
+    field, answer = get_card_field(*key), answers.get(key, UNKNOWN)
+    if field.comment:
+        yield f"# {field.comment}"
+    if answer.value is None:
+        yield f"# {field.entry} = ...{_format_note(answer)}"
+    else:
+        yield f"{field.entry} = {_format_value(answer.value)}{_format_note(answer)}"
+
+
+def _format_value(value: object) -> str:
+    """Write a value in TOML; a stated number in its own digits."""
+    if isinstance(value, StatedNumber):
+        return value.entry
+    if isinstance(value, str):
+        return format_text(value)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_format_value, value))}]"
+    return repr(value)
+
+
+def _format_note(answer: Answer) -> str:
+    if answer.origin is Origin.GUESS:
+        return f"  # guess: {escape_line(answer.note)}"
+    return f"  # {escape_line(answer.note)}" if answer.note else ""

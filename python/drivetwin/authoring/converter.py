@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The map of the torque converter on a new card: question, parser and text."""
+"""The map of the torque converter on a new card: parser and text."""
 
 from __future__ import annotations
 
@@ -7,29 +7,13 @@ from collections.abc import Iterator
 
 from pydantic import ValidationError
 
-from drivetwin.authoring.answers import UNKNOWN, Answers, Key, get_value
-from drivetwin.authoring.log_survey import LogSurvey
+from drivetwin.authoring.answers import Answers, Key, get_value
 from drivetwin.authoring.parsing import parse_number, split_list
-from drivetwin.authoring.question import Question
 from drivetwin.vehicle.converter import ConverterTable
 
 KEY: Key = ("converter",)
 _ENTRIES = ("speed_ratio", "torque_ratio", "pump_torque_at_1000rpm_Nm")
 """Entries of the card, in the order of the parts of a point."""
-
-
-def make_converter_question(survey: LogSurvey | None) -> Question:
-    """Make the question for the map; what the log shows of the converter is part of its meaning."""
-    seen = ""
-    if survey is not None and survey.has_input_slip:
-        seen = f" {survey.name} has shifts with the converter open, which need the map."
-    return Question(
-        KEY, "--converter NU:MU:TORQUE,...", "Map of the torque converter, or none",
-        "Points NU:MU:TORQUE of speed ratio (turbine over pump), torque ratio and pump torque at "
-        "1000 rpm [N·m], as 0:1.9:900, 0.8:1.1:640, 1:1:0; shifts with the lock-up closed need "
-        f"none.{seen}",
-        parse_converter, default=UNKNOWN, shown="none",
-    )  # fmt: skip
 
 
 def parse_converter(text: str) -> tuple[tuple[float, float, float], ...] | None:

@@ -17,10 +17,11 @@ from drivetwin.channels.units import BAR
 from drivetwin.errors import DrivetwinError
 from drivetwin.plausibility.friction import FrictionProduct, find_products
 from drivetwin.plausibility.inertias import estimate_engine_inertia, estimate_vehicle_inertia
-from drivetwin.plausibility.settings import PLAUSIBILITY, Limits
+from drivetwin.plausibility.settings import Limits
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.torque_onset import locate_torque_dip, smooth_channel
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.distribution import (
     describe_assumed_gain,
     describe_fill_pressure,
@@ -131,12 +132,20 @@ def make_provisional_card(answers: Answers) -> VehicleCard:
         final_drive=PriorValue(get_value(answers, "final_drive", default=1.0)),
         gears=tuple(Gear(one.name, PriorValue(one.ratio), (one.element,)) for one in gears),
         elements={gear.element: _make_element(answers, gear.element, gear.ratio) for gear in gears},
-        J_prime_range=get_value(answers, "inertia", "J_prime", default=PLAUSIBILITY.engine_inertia),
+        J_prime_range=get_value(
+            answers, "inertia", "J_prime", default=get_card_field("inertia", "J_prime").usual
+        ),
         J_vehicle_range=get_value(
-            answers, "inertia", "J_vehicle", default=PLAUSIBILITY.vehicle_inertia
+            answers, "inertia", "J_vehicle", default=get_card_field("inertia", "J_vehicle").usual
         ),
         J_out=None if J_out is None else J_out.to_prior(describe_inertia),
     )
+
+
+def _get_range(answers: Answers, part: str) -> Limits:
+    """Return the range of an inertia, the usual one as long as it is unknown."""
+    stated: Limits | None = get_value(answers, "inertia", part)
+    return get_card_field("inertia", part).usual if stated is None else stated
 
 
 def _make_element(answers: Answers, name: str, ratio: float) -> ElementSpec:

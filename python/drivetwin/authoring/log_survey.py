@@ -30,6 +30,7 @@ from drivetwin.plausibility.ratios import find_held_ratios
 from drivetwin.plausibility.settings import PLAUSIBILITY
 from drivetwin.shifts.kinematics import GearboxSpeeds, resample_geared
 from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import ElementSpec, PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -227,7 +228,7 @@ def _is_command(column: Column) -> bool:
 
 
 def _find_gears(log: ShiftLog, speeds: GearboxSpeeds, labels: Sequence[str]) -> list[LogGear]:
-    low, high = PLAUSIBILITY.ratio
+    low, high = get_card_field("gears", "ratios").usual
     gears = []
     moving = speeds.output > ShiftSettings().min_output_speed
     ratio = np.divide(

@@ -8,28 +8,21 @@ from dataclasses import dataclass, field
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin.authoring.answers import Answer, Key
-from drivetwin.authoring.converter import KEY
 from drivetwin.authoring.derive import GEOMETRY, derive_answers
-from drivetwin.authoring.element_questions import ELEMENT_PARTS
+from drivetwin.authoring.parsing import Parser
+from drivetwin.authoring.question import make_parser
 from drivetwin.authoring.questions import SENSOR_ROLES, Sources, iterate_questions
 from drivetwin.errors import InputError, Where
+from drivetwin.vehicle.card_fields import list_single_options, read_card_fields
 
-ORDER: dict[str, Key] = {
-    "--name": ("name",),
-    "--gearbox": ("gearbox",),
-    "--ratios": ("gears", "ratios"),
-    "--gears": ("gears", "names"),
-    "--elements": ("gears", "elements"),
-    "--input-gear": ("i_in",),
-    "--final-drive": ("final_drive",),
-    "--converter": KEY,
-    "--engine-inertia": ("inertia", "J_prime"),
-    "--vehicle-inertia": ("inertia", "J_vehicle"),
-    "--mass": ("vehicle", "mass"),
-    "--wheel-radius": ("vehicle", "radius"),
-    "--output-inertia": ("inertia", "J_out"),
-}
+ORDER: dict[str, Key] = {option: field.key for option, field in list_single_options().items()}
 """Options that each replace one question, in the order in which they are read."""
+ELEMENT_PARTS: dict[str, Parser] = {
+    field.key[1]: make_parser(field)
+    for field in read_card_fields().values()
+    if field.key[0] == "elements" and field.parser and field.key[1] != "form"
+}
+"""Parts of an element that may be stated, each with its parser."""
 
 
 @dataclass(frozen=True)

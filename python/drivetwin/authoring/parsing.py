@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 
 from drivetwin._util.toml import MAX_EXPONENT, is_extreme
 
@@ -31,21 +31,25 @@ def parse_number(text: str) -> float:
     return value
 
 
-def make_number_parser(
-    low: float = 0.0, high: float = 1e12, *, zero: bool = False, unit: str = ""
-) -> Callable[[str], float]:
-    """Return a parser of numbers above `low` (with `zero` from it on) and up to `high`."""
+def parse_bounded(
+    text: str, low: float = 0.0, high: float = 1e12, *, zero: bool = False, unit: str = ""
+) -> float:
+    """Parse a number above `low` (with `zero` from it on) and up to `high`."""
+    value = parse_number(text)
+    shown = f" {unit}" if unit else ""
+    if value < low or (value == low and not zero):
+        raise ValueError(f"{value:g}{shown} is not {'at least' if zero else 'above'} {low:g}")
+    if value > high:
+        raise ValueError(f"{value:g}{shown} is above {high:g}, the largest value that can be")
+    return value
 
-    def parse(text: str) -> float:
-        value = parse_number(text)
-        shown = f" {unit}" if unit else ""
-        if value < low or (value == low and not zero):
-            raise ValueError(f"{value:g}{shown} is not {'at least' if zero else 'above'} {low:g}")
-        if value > high:
-            raise ValueError(f"{value:g}{shown} is above {high:g}, the largest value that can be")
-        return value
 
-    return parse
+def parse_count(text: str, high: float) -> int:
+    """Parse a whole number above zero and up to `high`."""
+    value = parse_bounded(text, high=high)
+    if value != int(value):
+        raise ValueError(f"{value:g} is no whole number")
+    return int(value)
 
 
 def split_list(text: str) -> list[str]:
@@ -70,29 +74,25 @@ def parse_name(text: str) -> str:
     return name
 
 
-def make_names_parser(count: int | None) -> Callable[[str], tuple[str, ...]]:
-    """Return a parser of `count` different names."""
-
-    def parse(text: str) -> tuple[str, ...]:
-        names = tuple(parse_name(part) for part in split_list(text))
-        if count is not None and len(names) != count:
-            raise ValueError(f"{len(names)} names for {count} gears: give one for each gear")
-        twice = next((name for name in names if names.count(name) > 1), None)
-        if twice is not None:
-            raise ValueError(f"{twice!r} is named twice: each gear has its own")
-        if not names:
-            raise ValueError("no name is given")
-        return names
-
-    return parse
+def parse_names(text: str, count: int | None = None) -> tuple[str, ...]:
+    """Parse different names, as many as `count` states."""
+    names = tuple(parse_name(part) for part in split_list(text))
+    if count is not None and len(names) != count:
+        raise ValueError(f"{len(names)} names for {count} gears: give one for each gear")
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"{twice!r} is named twice: each gear has its own")
+    if not names:
+        raise ValueError("no name is given")
+    return names
 
 
 def _split_pair(text: str, separators: str, example: str) -> list[float]:
     """Split one or two numbers; a comma between digits is refused, for it may be a decimal one."""
     if re.search(r"\d\s*,\s*\d", text):
         raise ValueError(f"{text.strip()!r} has a comma: write a decimal point, or {example}")
-    parse = make_number_parser(zero=True)
-    parts = [parse(part) for part in re.split(rf"\s*(?:{separators})\s*", text.strip())]
+    texts = re.split(rf"\s*(?:{separators})\s*", text.strip())
+    parts = [parse_bounded(part, zero=True) for part in texts]
     if len(parts) not in (1, 2):
         raise ValueError(f"give one number, or {example}")
     return parts
@@ -107,29 +107,11 @@ def parse_range(text: str, spread: float = 2.0) -> tuple[float, float]:
     return low, high
 
 
-def make_choice_parser(choices: Iterable[str]) -> Callable[[str], str]:
-    """Return a parser of one of the `choices`; an unambiguous beginning is enough."""
-    known = list(choices)
-
-    def parse(text: str) -> str:
-        wanted = text.strip().casefold()
-        exact = [one for one in known if one.casefold() == wanted]
-        found = exact or [one for one in known if wanted and one.casefold().startswith(wanted)]
-        if len(found) != 1:
-            raise ValueError(f"{text.strip()!r} is not one of {', '.join(known)}")
-        return found[0]
-
-    return parse
-
-
-def parse_surfaces(text: str) -> int:
-    """Parse a number of friction surfaces."""
-    value = make_number_parser(high=200.0)(text)
-    if value != int(value):
-        raise ValueError(f"{value:g} is no whole number")
-    return int(value)
-
-
-def parse_share(text: str) -> float:
-    """Parse a share above 0 and up to 1."""
-    return make_number_parser(high=1.0)(text)
+def parse_choice(text: str, choices: Sequence[str]) -> str:
+    """Parse one of the `choices`; an unambiguous beginning is enough."""
+    wanted = text.strip().casefold()
+    exact = [one for one in choices if one.casefold() == wanted]
+    found = exact or [one for one in choices if wanted and one.casefold().startswith(wanted)]
+    if len(found) != 1:
+        raise ValueError(f"{text.strip()!r} is not one of {', '.join(choices)}")
+    return found[0]

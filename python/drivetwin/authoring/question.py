@@ -1,13 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""A question whose answer becomes an entry of a vehicle card."""
+"""Questions whose answers become entries of a vehicle card, from the fields of the card."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
-from drivetwin.authoring.answers import Answer, Key
-from drivetwin.authoring.parsing import Parser
-from drivetwin.authoring.stated_number import StatedNumber
+from drivetwin.authoring.answers import Answer, GainForm, Key
+from drivetwin.authoring.parsing import (
+    Parser,
+    parse_bounded,
+    parse_choice,
+    parse_count,
+    parse_name,
+    parse_range,
+)
+from drivetwin.authoring.stated_number import (
+    StatedNumber,
+    parse_clutch_ratio,
+    parse_ratio,
+    parse_ratios,
+    parse_stated,
+)
+from drivetwin.vehicle.card_fields import CardField, get_card_field
 
 
 @dataclass(frozen=True)
@@ -35,7 +51,7 @@ class Question:
         """Return the default as a user would type it; empty without one."""
         if self.shown or self.default is None or self.default.value is None:
             return self.shown
-        separator = ".." if self.key[-1] in ("J_prime", "J_vehicle") else ","
+        separator = ".." if get_card_field(*self.key).parser == "range" else ","
         return format_value(self.default.value, separator)
 
     def answer(self, text: str) -> Answer:
@@ -63,3 +79,78 @@ def format_value(value: object, separator: str = ",") -> str:
     if isinstance(value, tuple):
         return separator.join(format_value(one) for one in value)
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def make_question(
+    key: Key, parse: Parser | None = None, *, hint: str = "", element: str = "", **details: Any
+) -> Question:
+    """Make the question of the card's field at `key`.
+
+    Parameters
+    ----------
+    key : Key
+        Place of the answer.
+    parse : Parser or None
+        Parser of an answer in place of that of the field.
+    hint : str
+        Text added to the meaning.
+    element : str
+        Name of the shift element that the question is about; empty where it has none yet.
+    **details : Any
+        `default`, `shown` and `choices` of the question; all others are words for the braces in
+        the texts of the field.
+
+    Returns
+    -------
+    Question
+        The question.
+    """
+    field = get_card_field(*key)
+    own = {name: details.pop(name) for name in ("default", "shown", "choices") if name in details}
+    words = {"name": element or "NAME", "element": element or "the element", **details}
+    option, prompt, meaning = (
+        text.format_map(words) for text in (field.option, field.prompt, field.meaning)
+    )
+    parse = parse or make_parser(field)
+    return Question(
+        key, option, prompt, meaning + hint, parse, field.unit, **{"choices": field.choices, **own}
+    )
+
+
+def make_parser(field: CardField) -> Parser:
+    """Return the parser of an answer for a field."""
+    match field.parser:
+        case "number":
+            return partial(parse_bounded, **_get_limits(field))
+        case "stated":
+            return partial(parse_stated, **_get_limits(field))
+        case "gain":
+            return partial(parse_gain, **_get_limits(field))
+        case "count":
+            return partial(parse_count, high=field.high)
+        case "ratio":
+            return partial(parse_ratio, high=field.high)
+        case "choice":
+            return partial(parse_choice, choices=field.choices)
+        case name:
+            return _PARSERS[name]
+
+
+def _get_limits(field: CardField) -> dict[str, Any]:
+    return {"low": field.low, "high": field.high, "zero": field.zero, "unit": field.unit}
+
+
+_PARSERS: dict[str, Parser] = {
+    "name": parse_name,
+    "ratios": parse_ratios,
+    "clutch_ratio": parse_clutch_ratio,
+    "range": parse_range,
+}
+"""Parsers without limits of a field."""
+
+
+def parse_gain(text: str, **limits: Any) -> StatedNumber | GainForm:
+    """Parse a gain [m^3] as VALUE or VALUE+-STD, or `unknown`."""
+    if text.strip().casefold() == GainForm.UNKNOWN:
+        return GainForm.UNKNOWN
+    return parse_stated(text, **limits)

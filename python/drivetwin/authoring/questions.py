@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, Origin, get_value
-from drivetwin.authoring.converter import make_converter_question
+from drivetwin.authoring.converter import KEY, parse_converter
 from drivetwin.authoring.element_questions import iterate_element_questions
 from drivetwin.authoring.gearboxes import (
     GearboxFit,
@@ -18,26 +19,15 @@ from drivetwin.authoring.gearboxes import (
 )
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
-from drivetwin.authoring.parsing import (
-    Parser,
-    make_choice_parser,
-    make_names_parser,
-    parse_name,
-    parse_range,
-)
-from drivetwin.authoring.question import Question
+from drivetwin.authoring.parsing import parse_choice, parse_names, parse_range
+from drivetwin.authoring.question import Question, make_question
 from drivetwin.authoring.sensor_classes import (
     get_offset_unit,
     list_classes,
     parse_sensor,
     read_sensor_classes,
 )
-from drivetwin.authoring.stated_number import (
-    StatedNumber,
-    make_stated_parser,
-    parse_ratio,
-    parse_ratios,
-)
+from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.channels.pressure_roles import get_pressure_element
 from drivetwin.errors import CardError
 from drivetwin.gearbox import list_builtin_gearboxes
@@ -67,15 +57,11 @@ def iterate_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
 
     Questions on elements need the gears; without them one stands for all, without a name.
     """
-    default = Answer(sources.name, Origin.DEFAULT)
-    yield Question(
-        ("name",), "--name NAME", "Name of the vehicle",
-        "Reports and results contain the name.", parse_name, default=default,
-    )  # fmt: skip
+    yield make_question(("name",), default=Answer(sources.name, Origin.DEFAULT))
     yield from _iterate_gear_questions(answers, sources)
     yield from iterate_element_questions(answers, sources.survey, sources.estimates)
     yield from _iterate_drive_questions(sources)
-    yield make_converter_question(sources.survey)
+    yield _make_converter_question(sources.survey)
     yield from _iterate_inertia_questions(answers, sources)
     yield from _iterate_sensor_questions(sources)
 
@@ -90,11 +76,9 @@ def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Ques
         f"{100.0 * one.difference:.2g} %."
         for one in fits
     )
-    yield Question(
-        ("gearbox",), "--gearbox NAME", "Built-in gearbox, or none",
-        f"A built-in gearbox gives ratios and elements: {', '.join(known)}.{fitting}",
-        _parse_gearbox,
-        default=Answer(None, Origin.DEFAULT), shown="none", choices=("none", *known),
+    yield make_question(
+        ("gearbox",), _parse_gearbox, hint=fitting, default=Answer(None, Origin.DEFAULT),
+        shown="none", choices=("none", *known), known=", ".join(known),
     )  # fmt: skip
     box = get_value(answers, "gearbox")
     if box is not None:
@@ -102,32 +86,20 @@ def _iterate_gear_questions(answers: Answers, sources: Sources) -> Iterator[Ques
         yield _make_box_gears_question(box, fit, list_stated_elements(answers))
         return
     note = "" if survey is None else f"ratios of input to output speed held in {survey.name}"
-    yield Question(
-        ("gears", "ratios"), "--ratios LOW,...,HIGH", "Ratios of the gears, from low to high",
-        "A ratio is input speed over output speed of the gearbox, without input gear and final "
-        "drive; list the gears whose shifts are identified.",
-        parse_ratios,
-        default=Answer(held, Origin.GUESS, note) if len(held) > 1 else None,
-    )  # fmt: skip
+    guess = Answer(held, Origin.GUESS, note) if len(held) > 1 else None
+    yield make_question(("gears", "ratios"), default=guess)
     ratios = get_value(answers, "gears", "ratios", default=())
+    count = len(ratios) or None
     names = _guess_names(ratios, sources)
-    yield Question(
-        ("gears", "names"), "--gears NAME,...", "Names of these gears",
-        "Each gear has a name of its own, as 2 and 3.",
-        make_names_parser(len(ratios) or None), default=names,
-    )  # fmt: skip
-    yield Question(
-        ("gears", "elements"), "--elements NAME,...", "Shift element of each gear",
-        "The element is the clutch or brake that engages when its gear does and opens in the shift "
-        "to the next; name one for each gear, as B2,B3.",
-        _make_elements_parser(len(ratios) or None, list_stated_elements(answers)),
-        default=_guess_elements(answers, survey),
-    )  # fmt: skip
+    yield make_question(("gears", "names"), partial(parse_names, count=count), default=names)
+    parse = partial(_parse_elements, count=count, stated=list_stated_elements(answers))
+    default = _guess_elements(answers, survey)
+    yield make_question(("gears", "elements"), parse, default=default)
 
 
 def _parse_gearbox(text: str) -> str | None:
     """Parse the name of a built-in gearbox that has a shift between clutches or brakes."""
-    name = make_choice_parser([*list_builtin_gearboxes(), "none"])(text)
+    name = parse_choice(text, [*list_builtin_gearboxes(), "none"])
     if name == "none":
         return None
     try:
@@ -149,22 +121,17 @@ def _refuse_unnamed(stated: tuple[str, ...], names: tuple[str, ...]) -> None:
         raise ValueError(f"--element names {other!r}; the elements are {', '.join(names)}")
 
 
-def _make_elements_parser(count: int | None, stated: tuple[str, ...]) -> Parser:
-    parse_names = make_names_parser(count)
-
-    def parse(text: str) -> tuple[str, ...]:
-        names = parse_names(text)
-        _refuse_unnamed(stated, names)
-        return names
-
-    return parse
+def _parse_elements(text: str, count: int | None, stated: tuple[str, ...]) -> tuple[str, ...]:
+    names = parse_names(text, count)
+    _refuse_unnamed(stated, names)
+    return names
 
 
 def _make_box_gears_question(box: str, fit: GearboxFit | None, stated: tuple[str, ...]) -> Question:
     known = list_forward_gears(box)
 
     def parse(text: str) -> tuple[str, ...]:
-        names = make_names_parser(None)(text)
+        names = parse_names(text)
         try:
             elements = reduce_gears(box, names)
         except CardError as fault:
@@ -176,11 +143,11 @@ def _make_box_gears_question(box: str, fit: GearboxFit | None, stated: tuple[str
     if fit is not None:
         default = Answer(fit.gears, Origin.GUESS, "gears with the ratios of the log")
     listed = ", ".join(f"{gear} ({ratio:.4g})" for gear, ratio in known.items())
-    return Question(
-        ("gears", "names"), "--gears NAME,...", f"Gears of {box}, two or more neighbours",
-        f"The card describes the shifts between these gears; {box} has {listed}.",
-        parse, default=default,
-    )  # fmt: skip
+    return replace(
+        make_question(("gears", "names"), parse, default=default),
+        prompt=f"Gears of {box}, two or more neighbours",
+        meaning=f"The card describes the shifts between these gears; {box} has {listed}.",
+    )
 
 
 def _guess_names(ratios: tuple[float, ...], sources: Sources) -> Answer | None:
@@ -233,21 +200,20 @@ def _iterate_drive_questions(sources: Sources) -> Iterator[Question]:
         default = Answer(StatedNumber.measure(survey.input_gear), Origin.GUESS, note)
     elif survey is not None:
         default = Answer(1.0, Origin.GUESS, f"no input gear; {survey.name} does not show one")
-    yield Question(
-        ("i_in",), "--input-gear RATIO", "Ratio of the input gear",
-        "Engine speed over gearbox input speed with the lock-up closed; 1 without an input gear.",
-        lambda text: parse_ratio(text, high=100.0), default=default,
-    )  # fmt: skip
+    yield make_question(("i_in",), default=default)
     final = None
     if survey is not None and survey.final_drive is not None:
         measured = StatedNumber.measure(survey.final_drive)
         final = Answer(measured, Origin.GUESS, f"output over wheel speed in {survey.name}")
-    yield Question(
-        ("final_drive",), "--final-drive RATIO", "Ratio of the final drive",
-        "Output speed over wheel speed, hub reduction included; 1 where the gear ratios include it "
-        "or where it is unknown and inertias count at the output shaft.",
-        parse_ratio, default=final,
-    )  # fmt: skip
+    yield make_question(("final_drive",), default=final)
+
+
+def _make_converter_question(survey: LogSurvey | None) -> Question:
+    """Make the question for the map; what the log shows of the converter is part of its meaning."""
+    seen = ""
+    if survey is not None and survey.has_input_slip:
+        seen = f" {survey.name} has shifts with the converter open, which need the map."
+    return make_question(KEY, parse_converter, hint=seen, default=UNKNOWN, shown="none")
 
 
 def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Question]:
@@ -256,44 +222,21 @@ def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Q
     note = (
         "" if survey is None else f"torque balance of {survey.name}, for i_in {i_in:g}, η 0.7 to 1"
     )
-    yield Question(
-        ("inertia", "J_prime"), "--engine-inertia LOW..HIGH", "Range of the inertia at the engine",
-        "J′ is engine, flywheel, converter and gearbox input together, at engine speed: 0.1 to 0.6 "
-        "for a car, 4 to 40 for a truck; of one value the range is half to twice of it.",
-        parse_range, "kg·m²", _widen(estimates.J_prime, note),
-    )  # fmt: skip
+    yield make_question(("inertia", "J_prime"), default=_widen(estimates.J_prime, note))
     guess = _widen(
         estimates.J_vehicle, "" if survey is None else f"torque balance of {survey.name}"
     )
     if ("inertia", "J_vehicle") not in answers or ("vehicle", "mass") in answers:
-        yield Question(
-            ("vehicle", "mass"), "--mass KG (or --vehicle-inertia LOW..HIGH)",
-            "Mass of the vehicle",
-            "Mass during the recording, load included, as LOW..HIGH; one value counts ± 10 %.",
-            _parse_mass, "kg", None if guess is None else UNKNOWN,
+        yield make_question(
+            ("vehicle", "mass"), _parse_mass, default=None if guess is None else UNKNOWN,
             shown="" if guess is None else "the inertia that the log shows",
         )  # fmt: skip
         mass = answers.get(("vehicle", "mass"))
         if mass is None or mass.value is not None:
-            yield Question(
-                ("vehicle", "radius"), "--wheel-radius M (with --mass)", "Radius of the wheels",
-                "Rolling radius of the driven wheels: 0.3 for a car, 0.5 for a truck; one value "
-                "counts ± 4 %, VALUE+-STD twice its standard deviation.",
-                make_stated_parser(0.05, 5.0, unit="m"), "m",
-            )  # fmt: skip
+            yield make_question(("vehicle", "radius"))
         else:
-            yield Question(
-                ("inertia", "J_vehicle"), "--vehicle-inertia LOW..HIGH",
-                "Range of the vehicle's inertia at the wheel",
-                "J3 is mass times wheel radius squared, plus the wheels.",
-                parse_range, "kg·m²", guess,
-            )  # fmt: skip
-    yield Question(
-        ("inertia", "J_out"), "--output-inertia VALUE+-STD", "Inertia of the output side, or blank",
-        "Jo′ is gearbox output and propeller shaft before the elastic shaft, without clutch drums; "
-        "blank if unknown.",
-        make_stated_parser(zero=True), "kg·m²", UNKNOWN,
-    )  # fmt: skip
+            yield make_question(("inertia", "J_vehicle"), default=guess)
+    yield make_question(("inertia", "J_out"), default=UNKNOWN)
 
 
 def _iterate_sensor_questions(sources: Sources) -> Iterator[Question]:
@@ -304,10 +247,9 @@ def _iterate_sensor_questions(sources: Sources) -> Iterator[Question]:
         roles = tuple(role for role in SENSOR_ROLES if role in log)
         roles += ("pressure",) if has_pressure else ()
     for role in roles:
-        yield Question(
-            ("sensors", role), f"--sensor {role}=CLASS[:RANGE]", f"Sensor class of {role}, or none",
-            _describe_classes(role), _make_sensor_parser(role), default=UNKNOWN, shown="none",
-            choices=("none", *list_classes(role)),
+        yield make_question(
+            ("sensors", role), partial(parse_sensor, role=role), default=UNKNOWN, shown="none",
+            choices=("none", *list_classes(role)), role=role, classes=_describe_classes(role),
         )  # fmt: skip
 
 
@@ -321,10 +263,6 @@ def _describe_classes(role: str) -> str:
         unit = get_offset_unit(role).replace("Nm", "N·m")
         text += f" Write CLASS:RANGE with the largest value measured [{unit}] if it has a range."
     return text
-
-
-def _make_sensor_parser(role: str) -> Parser:
-    return lambda text: parse_sensor(text, role)
 
 
 def _parse_mass(text: str) -> tuple[float, float]:

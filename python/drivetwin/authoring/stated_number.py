@@ -10,7 +10,7 @@ from decimal import Decimal
 from itertools import pairwise
 
 from drivetwin._util.toml import WrittenNumber, format_text
-from drivetwin.authoring.parsing import make_number_parser, split_list
+from drivetwin.authoring.parsing import parse_bounded, split_list
 from drivetwin.vehicle.distribution import describe_ratio, parse_teeth
 from drivetwin.vehicle.spec import PriorValue
 
@@ -113,9 +113,9 @@ def parse_stated(
     parts = re.split(rf"\s*(?:{PLUS_MINUS})\s*", text.strip())
     if len(parts) > 2:
         raise ValueError(f"{text.strip()!r} has more than one standard deviation")
-    make_number_parser(low, high, zero=zero, unit=unit)(parts[0])
+    parse_bounded(parts[0], low, high, zero=zero, unit=unit)
     if len(parts) == 2:
-        make_number_parser(zero=True, unit=unit)(parts[1])
+        parse_bounded(parts[1], zero=True, unit=unit)
     return StatedNumber.make(*map(_format_digits, parts))
 
 
@@ -123,9 +123,18 @@ def parse_ratio(text: str, high: float = 1000.0) -> StatedNumber:
     """Parse a ratio above zero: a number, VALUE+-STD, or tooth counts such as 49/33."""
     plain = join_signs(text).strip()
     if "/" in re.sub(PLUS_MINUS, "", plain):
-        make_number_parser(high=high)(repr(parse_teeth(plain)))
+        parse_bounded(repr(parse_teeth(plain)), high=high)
         return StatedNumber.make(plain)
     return parse_stated(plain, high=high)
+
+
+def parse_clutch_ratio(text: str) -> StatedNumber:
+    """Parse a ratio of a clutch, which may be negative but not zero."""
+    is_negative = text.strip().startswith("-")
+    value = parse_stated(text, -1e3, 1e3) if is_negative else parse_ratio(text)
+    if abs(value) < 1e-3:
+        raise ValueError(f"{value:g} is too near to zero for a ratio")
+    return value
 
 
 def parse_ratios(text: str) -> tuple[StatedNumber, ...]:
@@ -144,13 +153,6 @@ def parse_ratios(text: str) -> tuple[StatedNumber, ...]:
 def join_signs(text: str) -> str:
     """Return a text of several numbers without the blanks around `+-`, `±`, `/` and `*`."""
     return re.sub(rf"\s*({PLUS_MINUS}|[/*])\s*", r"\1", text)
-
-
-def make_stated_parser(
-    low: float = 0.0, high: float = 1e12, *, zero: bool = False, unit: str = ""
-) -> Callable[[str], StatedNumber]:
-    """Return a parser of `parse_stated` with these limits."""
-    return lambda text: parse_stated(text, low, high, zero=zero, unit=unit)
 
 
 def _format_digits(text: str) -> str:

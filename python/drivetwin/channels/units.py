@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,22 @@ _FT_LB = 1.3558179483314004
 _KGF = 9.80665
 _INCH = 0.0254
 _LBF = 0.45359237 * _KGF
+
+
+_SUFFIXES = {
+    "_bar": BAR, "_rpm": RPM, "_ms": 1e-3, "_Nm_rad": 1.0, "_Nms_rad": 1.0,
+    "_s": 1.0, "_Nm": 1.0, "_kgm2": 1.0,
+}  # fmt: skip
+"""Sizes in SI of the units that end the keys of a file; longer endings first."""
+
+
+def convert_table(table: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """Return the numbers of a table in SI, by their keys without the unit at the end."""
+    found = {}
+    for key, value in table:
+        suffix = next((one for one in _SUFFIXES if key.endswith(one)), "")
+        found[key.removesuffix(suffix)] = value * _SUFFIXES.get(suffix, 1.0)
+    return found
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from drivetwin.cli.output import (
     show_step,
 )
 from drivetwin.errors import InputError, Where
+from drivetwin.vehicle.card_fields import list_single_options
 
 if TYPE_CHECKING:
     from drivetwin.authoring.log_survey import LogSurvey
@@ -37,16 +38,28 @@ class NewCardFiles(Request):
     force: bool = flag("Replace an existing card.")
 
 
-class CardEntries(Request):
-    """Entries of a card as texts."""
+def _declare_entries() -> type[Request]:
+    """Declare an option for each question of a card that has one of its own."""
+    options = {
+        name.removeprefix("--").replace("-", "_"): option(
+            field.option_help, metavar=field.option.split(" ")[1]
+        )
+        for name, field in list_single_options().items()
+    }
+    described = {"__doc__": "Entries of a card as texts."}
+    types = {"__annotations__": dict.fromkeys(options, str | None)}
+    return type("CardEntries", (Request,), {**described, **types, **options})
 
-    name: str | None = option("Name of the vehicle; default: name of the file.", metavar="NAME")
-    gearbox: str | None = option(
-        "Built-in gearbox (listed by 'drivetwin gearbox'), or none.", metavar="NAME"
-    )
-    ratios: str | None = option("Ratios of the gears, in falling order.", metavar="LOW,...,HIGH")
-    gears: str | None = option("Names of the gears, from low to high.", metavar="NAME,...")
-    elements: str | None = option("Shift element engaged in each gear.", metavar="NAME,...")
+
+if TYPE_CHECKING:
+    CardEntries = Request
+else:
+    CardEntries = _declare_entries()
+
+
+class NewCard(CardEntries, NewCardFiles, command="card new"):
+    """Arguments of `card new`."""
+
     element: tuple[str, ...] = option(
         "Data of a shift element, or of all without NAME; repeatable. Keys: kind, P0_bar, "
         "P0_std_bar, gain_m3 or surfaces, derating, area_m2 (or piston_outer_mm, "
@@ -55,33 +68,11 @@ class CardEntries(Request):
         metavar="[NAME:]KEY=VALUE,...",
         default=(),
     )
-    input_gear: str | None = option("Ratio of the input gear; default: 1.", metavar="RATIO")
-    final_drive: str | None = option("Ratio of the final drive.", metavar="RATIO")
-    converter: str | None = option(
-        "Map of the torque converter: speed ratio, torque ratio and pump torque at 1000 rpm [N·m] "
-        "of each point.",
-        metavar="NU:MU:TORQUE,...",
-    )
-    engine_inertia: str | None = option(
-        "Range of the inertia J′ at the engine [kg·m²].", metavar="LOW..HIGH"
-    )
-    mass: str | None = option("Mass of the vehicle, or LOW..HIGH [kg].", metavar="KG")
-    wheel_radius: str | None = option("Radius of the driven wheels [m].", metavar="M")
-    vehicle_inertia: str | None = option(
-        "Inertia at the wheel, in place of the mass [kg·m²].", metavar="LOW..HIGH"
-    )
-    output_inertia: str | None = option(
-        "Inertia of the output side before the shaft [kg·m²].", metavar="VALUE+-STD"
-    )
     sensor: tuple[str, ...] = option(
         "Sensor class of a channel role, or of 'pressure'; repeatable.",
         metavar="ROLE=CLASS[:RANGE]",
         default=(),
     )
-
-
-class NewCard(CardEntries, NewCardFiles, command="card new"):
-    """Arguments of `card new`."""
 
 
 def new(request: NewCard, *, as_json: bool) -> None:

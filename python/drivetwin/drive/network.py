@@ -116,7 +116,7 @@ def build_standstill(gearbox: Gearbox, gear: str, powertrain: Powertrain) -> Sta
     speeds = dict.fromkeys(members, 0.0)
     locked = (*gearbox.get_gear(gear).elements, LOAD, BRAKE)
     pull = float(powertrain.converter.compute_turbine_torque(idle, 0.0)) * statics.ratio
-    twists = {SHAFT: pull / gearbox.require_drive().k_o}
+    twists = {SHAFT: pull / gearbox.require_drive().shaft_stiffness}
     return Start(speeds | {CRANK: idle, WHEEL: 0.0}, twists, locked)
 
 

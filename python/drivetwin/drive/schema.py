@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from drivetwin._util.toml import StrictModel
-from drivetwin.channels.units import BAR, RPM
+from drivetwin.channels.units import BAR, RPM, convert_table
 from drivetwin.drive.powertrain import Control, Engine, Powertrain
 from drivetwin.gearbox.spec import Capacity
 from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
@@ -125,15 +125,7 @@ class ControlTable(StrictModel):
 
     def to_spec(self) -> Control:
         """Return the thresholds in SI."""
-        return Control(
-            upshift=self.upshift_rpm * RPM,
-            downshift=self.downshift_rpm * RPM,
-            launch_upshift=self.launch_upshift_rpm * RPM,
-            release=self.release_rpm * RPM,
-            lock_up_ratio=self.lock_up_ratio,
-            main=self.main_bar * BAR,
-            brake=self.brake_Nm,
-        )
+        return Control(**convert_table(self))
 
 
 class PowertrainFile(StrictModel):

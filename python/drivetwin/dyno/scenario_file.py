@@ -145,11 +145,11 @@ def _build_model(table: Table, elements: Sequence[str], plant: Plant | None) -> 
         around = Surroundings(
             J1=drive.engine_inertia,
             eta=stated["eta"],
-            i_f=drive.i_f,
+            i_f=drive.final_drive,
             J_v=drive.vehicle_inertia,
-            k_o=drive.k_o,
-            c_o=drive.c_o,
-            load=RoadLoad(constant=output_load * drive.i_f),
+            k_o=drive.shaft_stiffness,
+            c_o=drive.shaft_damping,
+            load=RoadLoad(constant=output_load * drive.final_drive),
         )
         return build_form(plant, around)
     brakes, clutches = table.get("brakes", {}), table.get("clutches", {})

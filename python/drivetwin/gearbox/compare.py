@@ -80,8 +80,8 @@ def _start(reduction: Reduction, maneuver: Maneuver, coupling: float) -> tuple[f
     output = maneuver.output_speed - gained
     total = inertia + 2.0 * coupling * i + maneuver.vehicle
     acceleration = (i * maneuver.engine_torque - maneuver.load) / total
-    twist = (maneuver.load + maneuver.vehicle * acceleration) / drive.k_o
-    return output, output / drive.i_f, twist
+    twist = (maneuver.load + maneuver.vehicle * acceleration) / drive.shaft_stiffness
+    return output, output / drive.final_drive, twist
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def _simulate_whole_gearbox(reduction: Reduction, maneuver: Maneuver, time: Floa
 def _build_surroundings(reduction: Reduction, maneuver: Maneuver) -> list[Element]:
     """Engine, shaft, final drive, vehicle and load around the gearbox."""
     drive, gearbox = maneuver.drive, reduction.gearbox
-    side = drive.build_output_side(RoadLoad(constant=maneuver.load * drive.i_f))
+    side = drive.build_output_side(RoadLoad(constant=maneuver.load * drive.final_drive))
     engine = build_engine_side(drive.engine_inertia, node=gearbox.engine_member)
     return [*engine, *build_shaft(side, gearbox.output), *build_vehicle(side)]
 
@@ -148,7 +148,7 @@ def build_dual_clutch_form(
 ) -> tuple[DualClutch, State]:
     """Model and start of the reference shift in the dual-clutch form."""
     model = reduction.build_dual_clutch(maneuver.drive, keep_coupling=keep_coupling)
-    model = replace(model, load=RoadLoad(constant=maneuver.load * maneuver.drive.i_f))
+    model = replace(model, load=RoadLoad(constant=maneuver.load * maneuver.drive.final_drive))
     coupling = reduction.M12 if keep_coupling else 0.0
     output, wheel, twist = _start(reduction, maneuver, coupling)
     locked = (reduction.off_going.element,)

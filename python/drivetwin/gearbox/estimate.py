@@ -145,13 +145,13 @@ def _compute_release_response(
 
     `J` is the inertia of both masses in series [kg m^2].
     """
-    natural = math.sqrt(drive.k_o / J)
-    zeta = drive.c_o / (2.0 * math.sqrt(drive.k_o * J))
+    natural = math.sqrt(drive.shaft_stiffness / J)
+    zeta = drive.shaft_damping / (2.0 * math.sqrt(drive.shaft_stiffness * J))
     # Complex frequency: one formula for the damped oscillation and for the overdamped shaft.
     damped = natural * np.sqrt(complex(1.0 - zeta**2))
     envelope = np.exp(-zeta * natural * after)
     sine = envelope * np.real(np.sin(damped * after) / damped)
     cosine = envelope * np.real(np.cos(damped * after))
-    twist = (cosine + zeta * natural * sine) / drive.k_o
-    rate = -(natural**2) * sine / drive.k_o
-    return drive.k_o * twist + drive.c_o * rate, rate
+    twist = (cosine + zeta * natural * sine) / drive.shaft_stiffness
+    rate = -(natural**2) * sine / drive.shaft_stiffness
+    return drive.shaft_stiffness * twist + drive.shaft_damping * rate, rate

@@ -73,7 +73,7 @@ class Maneuver:
     @property
     def vehicle(self) -> float:
         """Vehicle inertia at the output, kg m^2 (J5)."""
-        return self.drive.vehicle_inertia / self.drive.i_f**2
+        return self.drive.vehicle_inertia / self.drive.final_drive**2
 
     def compute_speed_gain(self, inertia: float, grip: float) -> float:
         """Speed that the output gains before the release [rad/s].
@@ -109,8 +109,8 @@ def plan(reduction: Reduction, drive: Drive) -> Maneuver:
         )
     torque = drive.engine_torque if upshift else drive.overrun_torque
     inertia = drive.engine_inertia + reduction.M11
-    vehicle = reduction.M22 + drive.vehicle_inertia / drive.i_f**2
-    load = drive.load / drive.i_f if upshift else 0.0
+    vehicle = reduction.M22 + drive.vehicle_inertia / drive.final_drive**2
+    load = drive.load_torque / drive.final_drive if upshift else 0.0
     phase = drive.inertia_phase
     # Momentum: what the on-coming torque takes from the input reaches the output i_h times.
     alone = (step - 1.0) * drive.engine_speed

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from drivetwin._util.toml import StrictModel
-from drivetwin.channels.units import BAR, RPM
+from drivetwin.channels.units import BAR, convert_table
 from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.spec import (
     GROUND,
@@ -212,19 +212,7 @@ class DriveTable(StrictModel):
 
     def to_spec(self) -> Drive:
         """Return the drive in SI."""
-        return Drive(
-            engine_inertia=self.engine_inertia_kgm2,
-            engine_torque=self.engine_torque_Nm,
-            overrun_torque=self.overrun_torque_Nm,
-            engine_speed=self.engine_speed_rpm * RPM,
-            i_f=self.final_drive,
-            vehicle_inertia=self.vehicle_inertia_kgm2,
-            k_o=self.shaft_stiffness_Nm_rad,
-            c_o=self.shaft_damping_Nms_rad,
-            load=self.load_torque_Nm,
-            torque_phase=self.torque_phase_s,
-            inertia_phase=self.inertia_phase_s,
-        )
+        return Drive(**convert_table(self))
 
 
 class ConverterStageTable(ConverterTable):

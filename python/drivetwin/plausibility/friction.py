@@ -22,6 +22,7 @@ from drivetwin.plausibility.spans import (
     sample_span,
 )
 from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 LEAST_POINTS = 15
@@ -127,7 +128,7 @@ def _bound_torque(
         inertia = 0.0 if card.J_out is None else card.J_out.value
         rate = compute_output_rate(log, card, span)
         torque += inertia * rate if np.isfinite(rate) else 0.0
-        low, high = (abs(torque / (eta * i_out)) for eta in PLAUSIBILITY.efficiency[::-1])
+        low, high = (abs(torque / (eta * i_out)) for eta in get_card_field("eta").usual[::-1])
         return low, high
     if "engine_torque" not in log or card.converter is not None:
         return None

@@ -15,6 +15,7 @@ from drivetwin.plausibility.friction import find_single_slip, get_slipping
 from drivetwin.plausibility.settings import PLAUSIBILITY, Limits
 from drivetwin.plausibility.spans import compute_engine_rate, compute_mean, compute_output_rate
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 LEAST_WINDOWS = 6
@@ -49,7 +50,7 @@ def estimate_engine_inertia(
         torque += inertia * turning if np.isfinite(turning) else 0.0
         bounds = [
             (driving - torque / (eta * i_c * i_out * card.i_in.value)) / rate
-            for eta in PLAUSIBILITY.efficiency
+            for eta in get_card_field("eta").usual
         ]
         if np.isfinite(bounds).all() and min(bounds) > 0.0:
             found.append((min(bounds), max(bounds)))

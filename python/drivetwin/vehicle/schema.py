@@ -7,13 +7,22 @@ import math
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 
 from drivetwin._util.toml import StrictModel
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.channels.mapping_file import ByRole, ChannelTable
-from drivetwin.channels.units import BAR, RPM
+from drivetwin.channels.units import BAR, convert_table
 from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.card_fields import read_card_fields
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.distribution import (
     describe_assumed_gain,
@@ -24,6 +33,17 @@ from drivetwin.vehicle.distribution import (
 )
 from drivetwin.vehicle.effects import EffectPrior
 from drivetwin.vehicle.spec import ClutchGeometry, ElementSpec, Gear, PriorValue, SensorTolerance
+
+
+def _describe(schema: dict[str, Any], *section: str) -> None:
+    """Describe the keys of a table in its JSON Schema by the fields of a section of the card."""
+    for field in read_card_fields().values():
+        if field.key[:-1] == section and field.entry in schema["properties"]:
+            schema["properties"][field.entry]["description"] = field.reference
+
+
+def _configure(*section: str) -> ConfigDict:
+    return ConfigDict(json_schema_extra=lambda schema: _describe(schema, *section))
 
 
 class PriorTable(StrictModel):
@@ -70,15 +90,11 @@ PriorEntry = Annotated[
 ]
 
 
-class RatioTable(StrictModel):
+class RatioTable(PriorTable):
     """A ratio and its standard deviation; 0 means exact."""
 
     value: float
     std: float = Field(ge=0)
-
-    def to_prior(self) -> PriorValue:
-        """Return the ratio."""
-        return PriorValue(self.value, self.std)
 
 
 def _parse_ratio(value: object) -> object:
@@ -144,15 +160,11 @@ RangeEntry = Annotated[
 ]
 
 
-class MeasuredTable(StrictModel):
+class MeasuredTable(PriorTable):
     """A quantity known from a measurement or a data sheet, with its standard deviation."""
 
     value: float = Field(gt=0)
     std: float = Field(gt=0)
-
-    def to_prior(self) -> PriorValue:
-        """Return the value in SI."""
-        return PriorValue(self.value, self.std)
 
     def to_range(self) -> tuple[float, float]:
         """Return the design range: four standard deviations to either side, above zero."""
@@ -171,6 +183,8 @@ InertiaEntry = Annotated[
 
 class GearTable(StrictModel):
     """`[[gears]]`: one gear, its ratio without the input gear, the shift elements that make it."""
+
+    model_config = _configure("gears")
 
     name: str = Field(min_length=1)
     ratio: RatioEntry
@@ -202,19 +216,13 @@ class ActuatorTable(StrictModel):
 
     def to_model(self) -> ActuatorModel:
         """Return the actuator in SI."""
-        return ActuatorModel(
-            dead_time=self.dead_time_s,
-            rising_lag=self.rising_lag_s,
-            falling_lag=self.falling_lag_s,
-            damping=self.damping,
-            kiss_pressure=self.kiss_pressure_bar * BAR,
-            fill_time=self.fill_time_s,
-            hysteresis=self.hysteresis_bar * BAR,
-        )
+        return ActuatorModel(**convert_table(self))
 
 
 class ElementTable(StrictModel):
     """`[elements.<name>]`: a brake or clutch; its gain as one number or from its geometry."""
+
+    model_config = _configure("elements")
 
     kind: Literal["brake", "clutch"]
     gain_m3: GainEntry | None = None
@@ -280,6 +288,8 @@ class ElementTable(StrictModel):
 class InertiaTable(StrictModel):
     """`[inertia]`: plausible ranges and known inertias, all in kg m^2."""
 
+    model_config = _configure("inertia")
+
     J_prime_kgm2: RangeEntry
     J_vehicle_kgm2: InertiaEntry
     J_out_kgm2: PriorEntry | None = None
@@ -307,9 +317,19 @@ def _refuse_percent(tolerance: float) -> float:
 
 
 class SensorTable(StrictModel):
-    """`[sensors.<role>]`: standard deviations of a sensor's constant gain and offset errors."""
+    """`[sensors.<role>]`: standard deviations of a sensor's constant gain and offset errors, and of
+    the age of its values."""
+
+    model_config = _configure("sensors")
 
     gain_tolerance: Annotated[float, Field(ge=0), AfterValidator(_refuse_percent)] = 0.0
+
+    def to_tolerance(self) -> SensorTolerance:
+        """Return the tolerances in SI."""
+        found = convert_table(self)
+        return SensorTolerance(
+            **{key.removesuffix("_tolerance"): one for key, one in found.items()}
+        )
 
 
 class EngineTorqueSensor(SensorTable):
@@ -317,49 +337,25 @@ class EngineTorqueSensor(SensorTable):
 
     offset_tolerance_Nm: float = Field(default=0.0, ge=0)
 
-    def to_tolerance(self) -> SensorTolerance:
-        """Return the tolerances in SI."""
-        return SensorTolerance(self.gain_tolerance, self.offset_tolerance_Nm)
 
-
-class AgedSensor(SensorTable):
-    """A sensor of which a standard deviation of the age of its values may be stated too."""
+class TorqueSensor(EngineTorqueSensor):
+    """Tolerances of a torque sensor."""
 
     age_tolerance_ms: float = Field(default=0.0, ge=0)
 
-    def _make_tolerance(self, offset: float) -> SensorTolerance:
-        """All tolerances in SI with that of the offset."""
-        return SensorTolerance(self.gain_tolerance, offset, 1e-3 * self.age_tolerance_ms)
 
-
-class TorqueSensor(AgedSensor):
-    """Tolerances of a torque sensor."""
-
-    offset_tolerance_Nm: float = Field(default=0.0, ge=0)
-
-    def to_tolerance(self) -> SensorTolerance:
-        """Return the tolerances in SI."""
-        return self._make_tolerance(self.offset_tolerance_Nm)
-
-
-class SpeedSensor(AgedSensor):
+class SpeedSensor(SensorTable):
     """Tolerances of a speed sensor."""
 
+    age_tolerance_ms: float = Field(default=0.0, ge=0)
     offset_tolerance_rpm: float = Field(default=0.0, ge=0)
 
-    def to_tolerance(self) -> SensorTolerance:
-        """Return the tolerances in SI."""
-        return self._make_tolerance(self.offset_tolerance_rpm * RPM)
 
-
-class PressureSensor(AgedSensor):
+class PressureSensor(SensorTable):
     """Tolerances of a pressure sensor."""
 
+    age_tolerance_ms: float = Field(default=0.0, ge=0)
     offset_tolerance_bar: float = Field(default=0.0, ge=0)
-
-    def to_tolerance(self) -> SensorTolerance:
-        """Return the tolerances in SI."""
-        return self._make_tolerance(self.offset_tolerance_bar * BAR)
 
 
 class SensorsTable(StrictModel):
@@ -400,6 +396,8 @@ EffectEntry = Annotated[
 
 class CardFile(StrictModel):
     """A vehicle card."""
+
+    model_config = _configure()
 
     name: str = Field(min_length=1)
     loss_law: LossLaw = "paper"

@@ -14,24 +14,12 @@ from pydantic import BaseModel
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.question import FormEntry
 from drivetwin.errors import RefusedError
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
 
-_GROUPS = {
-    "name": "Vehicle",
-    "gearbox": "Gears",
-    "gears": "Gears",
-    "elements": "Shift elements",
-    "i_in": "Drive",
-    "final_drive": "Drive",
-    "converter": "Drive",
-    "inertia": "Inertias",
-    "vehicle": "Inertias",
-    "sensors": "Sensors",
-}
-"""Heading of the questions by the first part of their key."""
 _EXISTING = {"keep": "keep it", "replace": "replace it"}
 
 
@@ -166,7 +154,8 @@ def _describe_state(form: CardForm) -> str:
 def _build_fields(form: CardForm) -> list[Component]:
     groups: dict[str, list[Component]] = {}
     for entry in form.entries:
-        groups.setdefault(_GROUPS[entry.question.key[0]], []).append(_build_entry(entry))
+        title = get_card_field(*entry.question.key).group
+        groups.setdefault(title, []).append(_build_entry(entry))
     return [
         html.Fieldset([html.Legend(title), *fields], className="questions")
         for title, fields in groups.items()
