@@ -19,9 +19,9 @@ from drivetwin.calibration.scenarios import scale_units
 from drivetwin.calibration.spread import Spread
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.dyno.departed_vehicle import DepartedVehicle
+from drivetwin.dyno.departed_run import DepartedVehicle
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
-from drivetwin.dyno.sensor_effects import compute_torque_error
+from drivetwin.dyno.sensors import compute_torque_error
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.simulation.dual_clutch import Signal

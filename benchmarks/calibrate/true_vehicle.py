@@ -35,9 +35,8 @@ from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.channels.pressure_roles import make_command_role
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import BAR
-from drivetwin.dyno.acting_inputs import build_acting_inputs
 from drivetwin.dyno.actuators import ControlledActuator, Program
-from drivetwin.dyno.departed_vehicle import DepartedVehicle, compute_vehicle
+from drivetwin.dyno.departed_run import DepartedVehicle, build_acting_inputs, compute_vehicle
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import convert_channels
 from drivetwin.dyno.nominal import NominalRun

@@ -12,8 +12,7 @@ from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
-from drivetwin.dyno.sensor_effects import compute_torque_error
-from drivetwin.dyno.sensors import Sensor
+from drivetwin.dyno.sensors import Sensor, compute_torque_error
 from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 import drivetwin.gearbox
 from drivetwin.errors import InputError
 from drivetwin.gearbox import list_builtin_gearboxes, solve_gear
-from drivetwin.gearbox.card import build_gearbox
-from drivetwin.gearbox.check import find_gearbox_faults
+from drivetwin.gearbox.card import build_gearbox, find_gearbox_faults
 
 CARDS = Path(drivetwin.gearbox.__file__).parent / "cards"
 DOCUMENTS = [

@@ -16,8 +16,8 @@ from drivetwin.workbench.page_words import replace_options
 ROOT = Path(drivetwin.__file__).parent
 ABOVE = ("cli", "fleet", "calibration", "observer", "estimation/multi_log", "estimation/analysis")
 """Packages whose messages the workbench never shows."""
-ELSEWHERE = ("validation/multi_log.py", "workbench/server.py", "vehicle/effects.py",
-             "validation/cross_validation.py", "files/stages_file.py", "errors.py")  # fmt: skip
+ELSEWHERE = ("workbench/server.py", "vehicle/effects.py",
+             "validation/multi_log.py", "files/stages_file.py", "errors.py")  # fmt: skip
 """Files whose messages it never shows."""
 COMMAND = re.compile(r"(?<![\w-])--[a-z]|'drivetwin ")
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from drivetwin.drive.load import list_builtin_powertrains, load_powertrain, select_powertrain
 from drivetwin.drive.plan import (
     Leg,
     LockUp,
@@ -18,6 +17,7 @@ from drivetwin.drive.plan import (
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.result import DriveRun
 from drivetwin.drive.run import run
+from drivetwin.drive.schema import list_builtin_powertrains, load_powertrain, select_powertrain
 
 __all__ = [
     "DriveRun",

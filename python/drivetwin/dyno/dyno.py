@@ -17,8 +17,7 @@ from drivetwin.dyno.departed_run import is_departed, simulate_departed
 from drivetwin.dyno.effects import Effects, check_effects
 from drivetwin.dyno.nominal import NominalRun
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.sensor_effects import TorqueError, apply_delay, compute_torque_error
-from drivetwin.dyno.sensors import Sensor
+from drivetwin.dyno.sensors import Sensor, TorqueError, apply_delay, compute_torque_error
 from drivetwin.dyno.truth import Truth, compute_truth
 from drivetwin.errors import InputError, SimulationError, Where
 from drivetwin.simulation.driveline_run import DrivelineTask

@@ -12,7 +12,7 @@ from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.validation import HeldOut, Outcome
 from drivetwin.findings import render
-from drivetwin.validation.cross_validation import predict_held_shifts
+from drivetwin.validation.multi_log import predict_held_shifts
 from tests.estimation.asked import by_the_paper
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario, source, together
 

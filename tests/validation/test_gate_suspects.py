@@ -9,7 +9,7 @@ from drivetwin.errors import Where
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Code, Finding, make_row
 from drivetwin.report.model_verdict import explain_identification
-from drivetwin.validation.suspects import find_undetermined_gains
+from drivetwin.validation.gate import find_undetermined_gains
 from tests.report.sample import identification
 
 

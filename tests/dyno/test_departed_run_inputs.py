@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.dyno.acting_inputs import delay_input, lag_input
+from drivetwin.dyno.departed_run import delay_input, lag_input
 from drivetwin.simulation.dual_clutch import Signal
 
 TIME = np.linspace(0.0, 1.0, 1001)

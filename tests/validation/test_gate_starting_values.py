@@ -14,8 +14,7 @@ from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.verdict import from_prior
 from drivetwin.findings import Code
-from drivetwin.validation.gate import assess_model
-from drivetwin.validation.starting_values import withhold_starting_values
+from drivetwin.validation.gate import assess_model, withhold_starting_values
 from drivetwin.vehicle.spec import PriorValue
 from tests.report.sample import SHIFT, TIME, identification, log, validation
 

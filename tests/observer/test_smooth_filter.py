@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivetwin.observer.result import FloatArray
-from drivetwin.observer.smoother import Measurement, Process, filter_forward, smooth_states
+from drivetwin.observer.smooth import Measurement, Process, filter_forward, smooth_states
 
 
 def _process(seed: int, size: int, count: int) -> Process:
