@@ -41,7 +41,7 @@ from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import DrivetwinError
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.logged_shift import LoggedShift
+from drivetwin.validation.simulate_log import LoggedShift
 
 ITERATIONS = 5
 _SHARE, _EXCESS = 50 / 60, 0.05

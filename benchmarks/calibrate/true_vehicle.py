@@ -36,10 +36,14 @@ from drivetwin.channels.pressure_roles import make_command_role
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import ControlledActuator, Program
-from drivetwin.dyno.departed_run import DepartedVehicle, build_acting_inputs, compute_vehicle
+from drivetwin.dyno.departed_run import (
+    DepartedVehicle,
+    NominalRun,
+    build_acting_inputs,
+    compute_vehicle,
+)
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import convert_channels
-from drivetwin.dyno.nominal import NominalRun
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.logs.read import read_log

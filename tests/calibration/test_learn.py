@@ -16,9 +16,8 @@ from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import Stribeck
-from drivetwin.twin.nominal_shift import build_nominal_shift
-from drivetwin.twin.twin import PRESSURE_DELAY, Twin
-from drivetwin.validation.logged_shift import LoggedShift
+from drivetwin.twin.twin import PRESSURE_DELAY, Twin, build_nominal_shift
+from drivetwin.validation.simulate_log import LoggedShift
 from tests.calibration.bench import write_bench_log
 from tests.calibration.twins import PARTS, STD, add_part, make_twin
 

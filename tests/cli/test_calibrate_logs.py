@@ -13,7 +13,7 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_file import load_twin, save_twin
-from drivetwin.twin.nominal_shift import build_nominal_shift
+from drivetwin.twin.twin import build_nominal_shift
 from tests.calibration.bench import write_bench_log
 from tests.calibration.cases import QUICK
 from tests.calibration.twins import make_twin

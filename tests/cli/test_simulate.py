@@ -13,8 +13,7 @@ from drivetwin.cli import main
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.logs.read import read_raw
 from drivetwin.shifts.shift import Shift
-from drivetwin.validation.signal_table import format_signals
-from drivetwin.validation.simulate_log import simulate_shift
+from drivetwin.validation.simulate_log import format_signals, simulate_shift
 from tests.observer.conftest import Bench, bench
 from tests.shifts.test_split_gears import CHAIN
 

@@ -11,9 +11,9 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from drivetwin.dyno.actuators import Program
+from drivetwin.dyno.departed_run import compute_friction_work
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects
-from drivetwin.dyno.nominal import compute_friction_work
 from drivetwin.dyno.random_walk import WalkStream, draw_walk
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario

@@ -10,12 +10,13 @@ import pytest
 
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.plant import Surroundings, build_form, build_plant
+from drivetwin.dyno.plant import build_form, build_plant
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox import load_gearbox, reduce, solve_gear
 from drivetwin.simulation import dual_clutch
+from drivetwin.simulation.driveline import OutputSide
 from drivetwin.simulation.dual_clutch import FloatArray, Signal, Trajectory
 
 
@@ -51,8 +52,7 @@ def test_the_drum_of_an_open_element_that_is_no_shift_element_breaks_the_form() 
     heavy = build_plant(replace(box, inertias={**box.inertias, "R3-C2": 0.2}), scenario.plant.gears)
     assert "R3-C2" in [each.member for each in reduce(heavy.gearbox, "2", "3").violations]
     light = scenario.model
-    fields = ("J1", "eta", "i_f", "J_v", "k_o", "c_o", "load")
-    form = build_form(heavy, Surroundings(**{name: getattr(light, name) for name in fields}))
+    form = build_form(heavy, light.J1, light.eta, OutputSide.from_model(light))
     assert form.J_out > light.J_out
     assert form.J2e > light.J2e
     whole, reduced = both(replace(scenario, model=form, plant=heavy))

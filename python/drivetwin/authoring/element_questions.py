@@ -8,14 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from drivetwin.authoring.answers import (
-    Answer,
-    Answers,
-    GainForm,
-    Origin,
-    get_value,
-    list_gears,
-)
+from drivetwin.authoring.answers import Answer, Answers, GainForm, Origin, get_value, list_gears
 from drivetwin.authoring.derive import GEOMETRY
 from drivetwin.authoring.log_estimates import ASSUMED_FRICTION, LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey

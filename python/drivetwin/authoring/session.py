@@ -6,14 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from drivetwin.authoring.answers import (
-    UNKNOWN,
-    Answer,
-    Answers,
-    Key,
-    get_value,
-    list_gears,
-)
+from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, get_value, list_gears
 from drivetwin.authoring.derive import derive_answers
 from drivetwin.authoring.log_estimates import LogEstimates, estimate_entries
 from drivetwin.authoring.question import FormEntry, Question

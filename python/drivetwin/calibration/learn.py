@@ -21,7 +21,7 @@ from drivetwin.calibration.vehicle_unknowns import VehicleUnknowns, build_unknow
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.logged_shift import LoggedShift
+from drivetwin.validation.simulate_log import LoggedShift
 
 _ROUNDS = 12
 """Largest number of Gauss-Newton steps."""

@@ -22,8 +22,7 @@ from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.twin.nominal_shift import build_nominal_shift
-from drivetwin.twin.twin import PRESSURE_DELAY, Twin
+from drivetwin.twin.twin import PRESSURE_DELAY, Twin, build_nominal_shift
 
 DEFAULT_LIMITS = {
     Metric.SHIFT_TIME: Statistic.SHARE_95,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from drivetwin.calibration.learn import Correction
     from drivetwin.calibration.spread import Spread
     from drivetwin.twin.twin import Twin
-    from drivetwin.validation.logged_shift import LoggedShift
+    from drivetwin.validation.simulate_log import LoggedShift
 
 
 def correct_by_logs(
@@ -38,7 +38,7 @@ def correct_by_logs(
 
 def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[LoggedShift]:
     from drivetwin.shifts.detect import require_shifts
-    from drivetwin.validation.logged_shift import LoggedShift
+    from drivetwin.validation.simulate_log import LoggedShift
 
     log, card = read_twin_log(twin, path)
     if set(log.inputs.values()) & set(twin.inputs.values()):

@@ -62,8 +62,7 @@ def simulate(request: Simulate, *, as_json: bool) -> None:
     from drivetwin.files.twin_file import load_twin
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.command_pressures import replace_pressures
-    from drivetwin.validation.signal_table import format_signals
-    from drivetwin.validation.simulate_log import simulate_shift
+    from drivetwin.validation.simulate_log import format_signals, simulate_shift
 
     model, log = load_twin(request.twin), request.log
     if request.parameters is not None:

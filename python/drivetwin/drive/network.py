@@ -19,10 +19,12 @@ from drivetwin.simulation.driveline import (
     LOAD,
     SHAFT,
     WHEEL,
+    build_clutch,
     build_shaft,
     build_vehicle,
     require_own_nodes,
 )
+from drivetwin.simulation.dual_clutch import FrictionTable
 from drivetwin.simulation.network import Element, Output, Start, build_element
 
 ENGINE, CONVERTER = "map", "converter"
@@ -69,17 +71,8 @@ def _build_converter(powertrain: Powertrain, turbine: str) -> list[Element]:
     table, clutch = asdict(powertrain.converter), powertrain.lock_up
     return [
         build_element("torque_converter", CONVERTER, pump=CRANK, turbine=turbine, map=table),
-        build_element(
-            "clutch",
-            LOCK_UP,
-            a=CRANK,
-            b=turbine,
-            friction=asdict(clutch.friction),
-            gain=clutch.gain,
-            p0=clutch.P0,
-            peak=clutch.peak,
-            pressure=LOCK_UP,
-            drum_inertia=0.0,
+        build_clutch(
+            LOCK_UP, (CRANK, turbine), clutch.friction, clutch.gain, clutch.P0, clutch.peak
         ),
     ]
 
@@ -87,22 +80,10 @@ def _build_converter(powertrain: Powertrain, turbine: str) -> list[Element]:
 def _build_vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[Element]:
     side = drive.build_output_side(powertrain.road)
     # A disc brake by its torque: unit gain and friction make the input a capacity in N m.
-    unit = {"slip": [0.0], "mu": [1.0]}
     return [
         *build_shaft(side, output),
         *build_vehicle(side),
-        build_element(
-            "clutch",
-            BRAKE,
-            a=WHEEL,
-            b="ground",
-            friction=unit,
-            gain=1.0,
-            p0=0.0,
-            peak=1.0,
-            pressure=BRAKE,
-            drum_inertia=0.0,
-        ),
+        build_clutch(BRAKE, (WHEEL, "ground"), FrictionTable((0.0,), (1.0,))),
     ]
 
 

@@ -8,13 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.drive.network import (
-    BRAKE,
-    CONVERTER,
-    ENGINE,
-    PEDAL,
-    list_friction_elements,
-)
+from drivetwin.drive.network import BRAKE, CONVERTER, ENGINE, PEDAL, list_friction_elements
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schedule import Schedule
 from drivetwin.gearbox import Gearbox

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.dyno.actuators import ControlledActuator
-from drivetwin.dyno.departed_run import is_departed, simulate_departed
+from drivetwin.dyno.departed_run import NominalRun, is_departed, simulate_departed
 from drivetwin.dyno.effects import Effects, check_effects
-from drivetwin.dyno.nominal import NominalRun
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor, TorqueError, apply_delay, compute_torque_error
 from drivetwin.dyno.truth import Truth, compute_truth

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from drivetwin.errors import InputError, Where
-from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.effects import EffectId, parse_sizes
 
 Effects = Mapping[EffectId, float]
 """Sizes by effect, in the units of `EffectId`; an effect of size 0 changes nothing."""
@@ -36,21 +36,7 @@ def parse_effects(texts: Sequence[str]) -> dict[EffectId, float]:
 
     Raises InputError for another form, a repeated or unknown name, or an impossible size.
     """
-    sizes: dict[str, float] = {}
-    for text in texts:
-        name, separator, size = text.partition("=")
-        try:
-            value = float(size)
-        except ValueError:
-            separator = ""
-        if not separator:
-            raise InputError(
-                f"{text!r} is no effect with a size", "write NAME=SIZE, as tyre_slip=0.004", _KEY
-            )
-        if name in sizes:
-            raise InputError(f"effect {name!r} is stated twice", "state each effect once", _KEY)
-        sizes[name] = value
-    return check_effects(sizes)
+    return check_effects(parse_sizes(texts, "effect"))
 
 
 def check_effects(sizes: Mapping[str, float] | Effects) -> dict[EffectId, float]:

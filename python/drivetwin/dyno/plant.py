@@ -28,7 +28,6 @@ from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
     FloatArray,
-    RoadLoad,
     Signal,
     State,
     Trajectory,
@@ -128,21 +127,10 @@ def build_plant(gearbox: Gearbox, gears: tuple[str, ...]) -> Plant:
     return Plant(gearbox, gears, ratios, shifts[0].common)
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """Engine, shaft, vehicle and load around a gearbox; fields as in `DualClutch`."""
+def build_form(plant: Plant, J1: float, eta: float, side: OutputSide) -> DualClutch:
+    """Return the dual-clutch form of a gearbox behind an engine and before its output side.
 
-    J1: float
-    eta: float
-    i_f: float
-    J_v: float
-    k_o: float
-    c_o: float
-    load: RoadLoad
-
-
-def build_form(plant: Plant, around: Surroundings) -> DualClutch:
-    """Return the dual-clutch form of a gearbox in its surroundings.
+    `J1` [kg m^2] and `eta` are as in `DualClutch`.
 
     A member that is the drum of a shift element runs with its slip and becomes its drum inertia.
     All others count with their parts on the diagonal; where one of them turns with both shafts the
@@ -153,17 +141,13 @@ def build_form(plant: Plant, around: Surroundings) -> DualClutch:
     drums = {box.elements[name].a: name for name in plant.ratios if _is_brake(box, name)}
     others = [each for each in shift.members if each.member not in drums]
     return DualClutch(
-        J1=around.J1,
+        J1=J1,
         J2e=sum(each.inertia * each.a**2 for each in others),
-        eta=around.eta,
+        eta=eta,
         loss_law="paper",
         i_in=1.0,
         J_out=sum(each.inertia * each.b**2 for each in others),
-        i_f=around.i_f,
-        J_v=around.J_v,
-        k_o=around.k_o,
-        c_o=around.c_o,
-        load=around.load,
+        **vars(side),
         elements=tuple(
             build_shift_element(box, each, _get_drum_inertia(box, each.element))
             for each in plant.ratios.values()

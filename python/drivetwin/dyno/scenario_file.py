@@ -29,15 +29,9 @@ from drivetwin._util.toml import read_toml
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Quantity
-from drivetwin.dyno.actuators import (
-    Actuator,
-    ControlledActuator,
-    Fill,
-    Program,
-    Vibration,
-)
+from drivetwin.dyno.actuators import Actuator, ControlledActuator, Fill, Program, Vibration
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.plant import Plant, Surroundings, build_form, build_plant
+from drivetwin.dyno.plant import Plant, build_form, build_plant
 from drivetwin.dyno.scenario import HeldGear, Scenario, TorqueReduction
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
@@ -142,16 +136,8 @@ def _build_model(table: Table, elements: Sequence[str], plant: Plant | None) -> 
     output_load = stated.pop("output_load")
     if plant is not None:
         drive = plant.gearbox.require_drive()
-        around = Surroundings(
-            J1=drive.engine_inertia,
-            eta=stated["eta"],
-            i_f=drive.final_drive,
-            J_v=drive.vehicle_inertia,
-            k_o=drive.shaft_stiffness,
-            c_o=drive.shaft_damping,
-            load=RoadLoad(constant=output_load * drive.final_drive),
-        )
-        return build_form(plant, around)
+        side = drive.build_output_side(RoadLoad(constant=output_load * drive.final_drive))
+        return build_form(plant, drive.engine_inertia, stated["eta"], side)
     brakes, clutches = table.get("brakes", {}), table.get("clutches", {})
     return DualClutch(
         loss_law="paper",

@@ -12,8 +12,7 @@ from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, State
 from drivetwin.simulation.part_parameters import describe_parts
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
-from drivetwin.twin.nominal_shift import build_nominal_shift
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.twin import Twin, build_nominal_shift
 
 DEFAULT_ENGINE_SPEED = 150.0
 """Default engine speed [rad/s] at the start, for a twin without recorded speeds."""

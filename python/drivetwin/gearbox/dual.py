@@ -27,11 +27,7 @@ def build_dual_clutch(reduction: Reduction, drive: Drive, *, keep_coupling: bool
         loss_law="dissipative",
         i_in=1.0,
         J_out=reduction.M22 - drums_out,
-        i_f=drive.final_drive,
-        J_v=drive.vehicle_inertia,
-        k_o=drive.shaft_stiffness,
-        c_o=drive.shaft_damping,
-        load=RoadLoad(constant=drive.load_torque),
+        **vars(drive.build_output_side(RoadLoad(constant=drive.load_torque))),
         elements=(
             build_shift_element(reduction.gearbox, pair[0], drums[0]),
             build_shift_element(reduction.gearbox, pair[1], drums[1]),

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import asdict
 
 from drivetwin.gearbox.spec import CONVERTER, Capacity, ElementKind, Gearbox, ShiftMember
+from drivetwin.simulation.driveline import build_clutch
 from drivetwin.simulation.dual_clutch import FrictionTable
 from drivetwin.simulation.network import Element, build_element
 
@@ -27,7 +28,7 @@ def build_network_elements(
         *_build_gearing(gearbox),
         *_build_converter(gearbox),
         *(
-            _build_inertia(member, inertia)
+            build_element("inertia", f"J {member}", node=member, inertia=inertia)
             for member, inertia in gearbox.inertias.items()
             if inertia > 0.0
         ),
@@ -40,24 +41,14 @@ def as_json(gearbox: Gearbox) -> str:
     return json.dumps({"elements": build_network_elements(gearbox)})
 
 
-def _build_gearing(gearbox: Gearbox) -> list[Element]:
-    sets = [
-        {
-            "type": "planetary",
-            "name": each.name,
-            "sun": each.sun,
-            "ring": each.ring,
-            "carrier": each.carrier,
-            "z": each.z,
-            **({"planet_inertia": each.planet_inertia} if each.planet_inertia > 0.0 else {}),
-        }
-        for each in gearbox.sets
-    ]
-    pairs = [
-        {"type": "gear", "name": pair.name, "a": pair.a, "b": pair.b, "ratio": pair.ratio}
-        for pair in gearbox.pairs
-    ]
-    return [*sets, *pairs]
+def _build_gearing(gearbox: Gearbox) -> Iterator[Element]:
+    for each in gearbox.sets:
+        fields = {"sun": each.sun, "ring": each.ring, "carrier": each.carrier, "z": each.z}
+        if each.planet_inertia > 0.0:
+            fields["planet_inertia"] = each.planet_inertia
+        yield build_element("planetary", each.name, **fields)
+    for pair in gearbox.pairs:
+        yield build_element("gear", pair.name, a=pair.a, b=pair.b, ratio=pair.ratio)
 
 
 def _build_converter(gearbox: Gearbox) -> list[Element]:
@@ -77,28 +68,10 @@ def _build_shift_elements(
         elif engaged_dogs is None or element.kind is not ElementKind.DOG:
             yield _build_friction(element)
         elif element.name in engaged_dogs:
-            yield _build_rigid_coupling(element)
-
-
-def _build_inertia(member: str, inertia: float) -> Element:
-    return {"type": "inertia", "name": f"J {member}", "node": member, "inertia": inertia}
-
-
-def _build_rigid_coupling(element: ShiftMember) -> Element:
-    return {"type": "gear", "name": element.name, "a": element.a, "b": element.b, "ratio": 1.0}
+            yield build_element("gear", element.name, a=element.a, b=element.b, ratio=1.0)
 
 
 def _build_friction(element: ShiftMember) -> Element:
     capacity = element.capacity or _NO_CAPACITY
-    return {
-        "type": "clutch",
-        "name": element.name,
-        "a": element.a,
-        "b": element.b,
-        "friction": asdict(capacity.friction),
-        "gain": capacity.gain,
-        "p0": capacity.P0,
-        "peak": capacity.peak,
-        "pressure": element.name,
-        "drum_inertia": 0.0,
-    }
+    nodes, law = (element.a, element.b), capacity.friction
+    return build_clutch(element.name, nodes, law, capacity.gain, capacity.P0, capacity.peak)

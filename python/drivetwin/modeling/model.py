@@ -33,11 +33,7 @@ from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
 from drivetwin.simulation.input_value import make_input
 from drivetwin.simulation.network import Output, Sine, Start, simulate
-from drivetwin.simulation.network_sensitivity import (
-    NetworkSensitivities,
-    Unknowns,
-    differentiate,
-)
+from drivetwin.simulation.network_sensitivity import NetworkSensitivities, Unknowns, differentiate
 from drivetwin.simulation.serialize import as_array, require_number
 
 _STEP, _ROW, _TOP, _BOX = 150.0, 46.0, 46.0, (116.0, 32.0)

@@ -3,21 +3,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import InputError, MissingParameterError, Where
 from drivetwin.estimation.data.prepare import collect_pressures
 from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.observer.linear_model import BoolArray, Course
 from drivetwin.observer.result import FloatArray
+from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement
+from drivetwin.twin.distribution import ModelDistribution, describe_model
+from drivetwin.twin.twin import Twin
 
 GRID = 1e-3
 """Step of the observer's grid where speeds are sampled more slowly; least step of a speed [s]."""
@@ -190,3 +194,30 @@ def _estimate_carried_torque(
         return np.asarray(sense * one.friction.evaluate(slip) * one.gain * np.maximum(above, 0.0))
     level = float(np.max(np.abs(seen.engine_torque.values))) * model.i_in * abs(one.i_c)
     return np.full(middle.size, float(sense) * level)
+
+
+def select_uncertain(
+    twin: Twin,
+    shift: Shift,
+    stems: tuple[str, ...],
+    more: Mapping[str, float] | None = None,
+    *,
+    laws: bool = False,
+) -> ModelDistribution:
+    """Describe the parameters `stems` of the twin and the ratios of the shift.
+
+    `J_prime` stands for that of its `select_inertia_gear`. `more` are further standard deviations
+    by id, of errors that are not the twin's. With `laws` the friction laws are part of it.
+    Raises MissingParameterError where the twin has no value for one of them.
+    """
+    if twin.over_eta:
+        raise MissingParameterError(
+            "the twin has torques over η only, because its log had no output torque",
+            "identify from a log that has one, or state eta on the vehicle card",
+            Where(file=twin.name),
+        )
+    inertia = f"J_prime_{twin.select_inertia_gear(shift)}"
+    ids = [inertia if stem == "J_prime" else stem for stem in stems]
+    ratios = (make_ratio_id(shift.start_gear), make_ratio_id(shift.end_gear), FINAL_DRIVE)
+    ids += [name for name in ratios if name in twin.covariance_ids]
+    return describe_model(twin, shift, ids, more=more, laws=laws)

@@ -20,8 +20,8 @@ from drivetwin.estimation.data.prepare import collect_pressures
 from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.findings import render
+from drivetwin.observer.inputs import select_uncertain
 from drivetwin.observer.kind import Observer
-from drivetwin.observer.propagate import select_uncertain
 from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.observer.smooth import smooth
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window

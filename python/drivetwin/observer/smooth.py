@@ -27,6 +27,7 @@ from drivetwin.observer.inputs import (
     collect_recorded,
     compute_measured_slip,
     is_driving,
+    select_uncertain,
 )
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.linear_model import (
@@ -40,7 +41,6 @@ from drivetwin.observer.linear_model import (
     build_linear_model,
     compute_impulse_response,
 )
-from drivetwin.observer.propagate import select_uncertain
 from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch

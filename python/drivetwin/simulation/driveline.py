@@ -13,7 +13,14 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, RoadLoad, ShiftElement
+from drivetwin.simulation.dual_clutch import (
+    ENGINE_TORQUE,
+    DualClutch,
+    FrictionTable,
+    RoadLoad,
+    ShiftElement,
+    Stribeck,
+)
 from drivetwin.simulation.element_schema import list_ports
 from drivetwin.simulation.network import Element, Output, build_element
 from drivetwin.simulation.vehicle_parts import NO_PARTS, InputShaft, OpenConverter, VehicleParts
@@ -78,6 +85,24 @@ def find_body(driveline: Driveline) -> VehicleBody:
     return VehicleBody(inertia, "vehicle.inertia", ("torque", "tyre.b"), 1.0)
 
 
+def build_clutch(
+    name: str,
+    nodes: tuple[str, str],
+    friction: Stribeck | FrictionTable,
+    gain: float = 1.0,
+    P0: float = 0.0,
+    peak: float = 1.0,
+    drum_inertia: float = 0.0,
+) -> Element:
+    """Build a clutch between two nodes with a pressure input [Pa] of its own name.
+
+    Its numbers are as in `ShiftElement`; unit friction and gain make the input a capacity [N m].
+    """
+    (a, b), law = nodes, dict(vars(friction))
+    fields = {"friction": law, "gain": gain, "p0": P0, "peak": peak, "pressure": name}
+    return build_element("clutch", name, a=a, b=b, **fields, drum_inertia=drum_inertia)
+
+
 def build_driveline(model: DualClutch, parts: VehicleParts = NO_PARTS) -> list[Element]:
     """Build the elements of a dual clutch with parts.
 
@@ -139,17 +164,14 @@ def _build_path(element: ShiftElement, model: DualClutch, parts: VehicleParts) -
         fields = {"loss": {"law": model.loss_law, "eta": parts.efficiency[name]}}
     return [
         build_element("gear", f"i_c {name}", a=INPUT, b=driving, ratio=element.i_c, **fields),
-        build_element(
-            "clutch",
+        build_clutch(
             name,
-            a=driving,
-            b=driven,
-            friction=dict(vars(element.friction)),
-            gain=element.gain,
-            p0=element.P0,
-            peak=element.peak,
-            pressure=name,
-            drum_inertia=element.drum_inertia,
+            (driving, driven),
+            element.friction,
+            element.gain,
+            element.P0,
+            element.peak,
+            element.drum_inertia,
         ),
         build_element("gear", f"i_out {name}", a=driven, b=OUTPUT, ratio=element.i_out),
     ]

@@ -18,13 +18,7 @@ from drivetwin.simulation.driveline import (
     build_driveline,
 )
 from drivetwin.simulation.driveline_start import build_start
-from drivetwin.simulation.dual_clutch import (
-    ENGINE_TORQUE,
-    DualClutch,
-    Signal,
-    State,
-    Trajectory,
-)
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, Signal, State, Trajectory
 from drivetwin.simulation.network import NetworkRun, Output, Start, simulate
 from drivetwin.simulation.network_sensitivity import NetworkTask
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts

@@ -8,15 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from drivetwin.simulation.driveline import (
-    CRANK,
-    ENGINE,
-    INPUT_SHAFT,
-    OUTPUT,
-    SHAFT,
-    VEHICLE,
-    WHEEL,
-)
+from drivetwin.simulation.driveline import CRANK, ENGINE, INPUT_SHAFT, OUTPUT, SHAFT, VEHICLE, WHEEL
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State
 from drivetwin.simulation.network import Start
 from drivetwin.simulation.variable import sign

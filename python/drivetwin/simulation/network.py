@@ -25,11 +25,7 @@ from drivetwin.simulation.dual_clutch import (
     run_time,
     to_core_samples,
 )
-from drivetwin.simulation.element_schema import (
-    find_element_faults,
-    list_inputs,
-    refuse_faults,
-)
+from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
 from drivetwin.simulation.network_output import Request, combine_columns, resolve_output
 from drivetwin.simulation.serialize import as_json, as_names, require_number
 

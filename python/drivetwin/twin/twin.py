@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -32,19 +33,10 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Stribeck,
 )
-from drivetwin.simulation.part_parameters import (
-    PART_IDS,
-    build_parts,
-    select_parts,
-)
+from drivetwin.simulation.part_parameters import PART_IDS, build_parts, select_parts
 from drivetwin.simulation.vehicle_parts import VehicleParts
-from drivetwin.vehicle.spec import (
-    ElementKind,
-    ElementSpec,
-    Gear,
-    PriorValue,
-    move_clutch_ratios,
-)
+from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue, move_clutch_ratios
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 COMMON = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
@@ -395,3 +387,29 @@ def build_friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
     if slip[0] > 0.0:
         slip, mu = [0.0, *slip], [mu[0], *mu]
     return FrictionTable(tuple(slip), tuple(mu))
+
+
+def build_nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
+    """The shift between two gears without times, as far as a model needs it."""
+    start, end = gears or _find_first_shift(twin)
+    elements = twin.get_gear(start).element, twin.get_gear(end).element
+    if elements[0] == elements[1]:
+        raise InputError(
+            f"gears {start!r} and {end!r} of {twin.name!r} are held by the same element",
+            "choose two neighbouring gears",
+        )
+    never = (0.0, 0.0)
+    kind = ShiftKind.POWER_ON_UP
+    return Shift(start, end, *elements, kind, never, never, never, never, 0.0)
+
+
+def _find_first_shift(twin: Twin) -> tuple[str, str]:
+    """First pair of neighbouring gears with a friction curve."""
+    for old, new in pairwise(twin.gears):
+        held = (twin.gears[old].element, twin.gears[new].element)
+        if held[0] != held[1] and any(name in twin.friction for name in held):
+            return old, new
+    raise InputError(
+        f"the twin {twin.name!r} has no neighbouring gears with an identified friction curve",
+        "name the shift with --shift, such as --shift 2-3",
+    )

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
@@ -22,6 +23,7 @@ from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.split_gears import compute_exclusive_masks
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin
@@ -101,22 +103,19 @@ def _simulate_window(
     parts = twin.build_parts(model)
     task = DrivelineTask(model, parts, engine_torque, pressures, start, time)
     trajectory = task.simulate()
-    traces = _build_traces(model, log, trajectory)
-    phases = clip_phases(shift, window)
     validation = Validation(
         shift=shift,
         model=model,
-        phases=phases,
+        phases=clip_phases(shift, window),
         engine_torque=engine_torque,
         pressures=pressures,
         trajectory=trajectory,
-        traces=traces,
-        fit={name: _compute_phase_fits(trace, phases) for name, trace in traces.items()},
+        traces={},
+        fit={},
         status=trajectory.status,
         findings=(),
-        extra_traces=_build_extra_traces(model, log, trajectory),
     )
-    return replace(validation, findings=_check_run(twin, validation))
+    return replace_run(validation, twin, log, trajectory)
 
 
 def replace_run(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> Validation:
@@ -341,3 +340,62 @@ def _check_divergence(one: Validation) -> list[Finding]:
     label = f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s"
     ends = name_ends(reached, limits, "rad/s")
     return [*findings, report(Code.SIMULATION_DIVERGES, label, **ends)]
+
+
+def format_signals(runs: Sequence[Validation], log: ShiftLog) -> str:
+    """CSV with a unit row: time, and each signal as measured and as simulated, SI.
+
+    The rows are the times of the simulation. Measured values are interpolated between samples and
+    empty where the log has none; a signal without a channel has no measured column. The shifts
+    follow each other, and a gear that is held between two shifts is divided in its middle: time
+    increases throughout.
+    """
+    measured = dict.fromkeys(name for run in runs for name in run.all_traces)
+    names = list(dict.fromkeys((*SIGNALS, *measured)))
+    columns = [
+        (name, part)
+        for name in names
+        for part in ("measured", "simulated")
+        if part == "simulated" or name in measured
+    ]
+    lines = [
+        ",".join(["time", *(f"{name}_{part}" for name, part in columns)]),
+        ",".join(["s", *(get_quantity(name).unit for name, _ in columns)]),
+    ]
+    own = compute_exclusive_masks(
+        [run.shift for run in runs], [run.trajectory.time for run in runs]
+    )
+    for run, kept in zip(runs, own, strict=True):
+        time, simulated = run.trajectory.time, compute_run_signals(run.model, run.trajectory)
+        values = (
+            simulated[name] if part == "simulated" else log[name].interpolate(time)
+            for name, part in columns
+        )
+        rows = np.column_stack((time, *values))[kept].tolist()
+        lines += [",".join(map(_format_value, row)) for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def _format_value(value: float) -> str:
+    """Format a value; empty for none."""
+    return f"{value:.12g}" if value == value else ""
+
+
+@dataclass(frozen=True, eq=False)
+class LoggedShift:
+    """A shift and its log."""
+
+    log: ShiftLog
+    shift: Shift
+
+    def simulate(self, twin: Twin) -> Validation:
+        """Simulate the shift by a twin; raises as `simulate_shift`."""
+        return simulate_shift(twin, self.log, self.shift)
+
+    def rerun(self, before: Validation, twin: Twin) -> Validation:
+        """Simulate the shift by another twin, over the window of `before`."""
+        return rerun_shift(before, twin, self.log, twin.build_dual_clutch(self.shift))
+
+    def get_period(self, role: str) -> float:
+        """Usual time between two samples of a channel [s]."""
+        return float(np.median(np.diff(self.log[role].time)))

@@ -63,25 +63,36 @@ class EffectPrior:
     value: float = 0.0
 
 
-def parse_priors(texts: Iterable[str]) -> dict[EffectId, EffectPrior]:
-    """Parse `NAME=STD`, one for each effect; raises InputError that lists the names."""
-    found: dict[EffectId, EffectPrior] = {}
+def parse_sizes(texts: Iterable[str], option: str) -> dict[EffectId, float]:
+    """Parse texts `NAME=SIZE`, such as `tyre_slip=0.004`, one for each effect.
+
+    Raises InputError at `option` for another form, and for a repeated or unknown name.
+    """
+    where = Where(key=option)
+    found: dict[EffectId, float] = {}
     for text in texts:
         name, _, size = text.partition("=")
-        if name not in list(EffectId):
-            raise InputError(
-                f"no effect {name!r}", f"give any of {', '.join(EffectId)}", Where(key="--effect")
-            )
         try:
-            std = float(size)
+            value = float(size)
         except ValueError:
-            std = math.nan
-        if not 0.0 <= std < math.inf:
-            raise InputError(
-                f"{text!r} is no effect with a standard deviation",
-                "give a finite number from 0 on, as tyre_slip=0.002; the effects are "
-                f"{', '.join(EffectId)}",
-                Where(key="--effect"),
-            )
-        found[EffectId(name)] = EffectPrior(std)
+            what = f"{text!r} is no effect with a size"
+            raise InputError(what, "write NAME=SIZE, as tyre_slip=0.004", where) from None
+        if name not in list(EffectId):
+            raise InputError(f"no effect {name!r}", f"give any of {', '.join(EffectId)}", where)
+        if name in found:
+            raise InputError(f"effect {name!r} is stated twice", "state each effect once", where)
+        found[EffectId(name)] = value
     return found
+
+
+def parse_priors(texts: Iterable[str]) -> dict[EffectId, EffectPrior]:
+    """Parse `NAME=STD`, one for each effect; raises InputError that lists the names."""
+    stds = parse_sizes(texts, "--effect")
+    bad = [f"{name}={std:g}" for name, std in stds.items() if not 0.0 <= std < math.inf]
+    if bad:
+        raise InputError(
+            f"{', '.join(bad)} is no effect with a standard deviation",
+            "give a finite number from 0 on, as tyre_slip=0.002",
+            Where(key="--effect"),
+        )
+    return {name: EffectPrior(std) for name, std in stds.items()}

@@ -89,7 +89,7 @@ def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
 
 def _format_signals(work: SessionState) -> str:
     """Format the shift that is shown, simulated with the sliders as they are."""
-    from drivetwin.validation.signal_table import format_signals
+    from drivetwin.validation.simulate_log import format_signals
 
     twin, log = work.require_twin(), work.require_log()
     run = what_if.simulate_identified(twin, log, work.require_shift())
