@@ -18,7 +18,8 @@ import numpy as np
 
 from drivetwin.export.c.write import write_c
 from drivetwin.export.compiler import find_native_compiler
-from drivetwin.simulation.dual_clutch import Accuracy, Signal, simulate
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from tests.export.cases import CASES, Case
 
 ROOT = Path(__file__).resolve().parents[1]

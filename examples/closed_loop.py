@@ -18,14 +18,8 @@ import numpy as np
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.export.c.loaded import CModel, CObserver, Estimates
 from drivetwin.export.subject import Subject, compute_steady_start
-from drivetwin.simulation.dual_clutch import (
-    DualClutch,
-    FloatArray,
-    Signal,
-    State,
-    Stribeck,
-    simulate,
-)
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, State, Stribeck
 
 TASK = 0.010
 """Period of the controller [s]."""

@@ -7,11 +7,8 @@ import numpy as np
 
 from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality, time_runs
-from drivetwin.simulation.dual_clutch import (
-    ENGINE_TORQUE,
-    Trajectory,
-    simulate,
-)
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Trajectory
 from drivetwin.simulation.dual_clutch_sensitivity import Sensitivities, simulate_sensitivities
 from tests.support.upshift.equations import Equations
 from tests.support.upshift.scenario import build_model, build_scenario, build_signals, build_state

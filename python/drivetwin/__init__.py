@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     from drivetwin.pipeline import identify
     from drivetwin.report.html import save_report
     from drivetwin.shifts.detect import detect_shifts
-    from drivetwin.simulation.dual_clutch import DualClutch, simulate
+    from drivetwin.simulation.driveline_run import simulate
+    from drivetwin.simulation.dual_clutch import DualClutch
     from drivetwin.twin.build import build_twin
     from drivetwin.twin.twin import Twin
     from drivetwin.validation.simulate_log import attach_validation, simulate_shift
@@ -67,7 +68,7 @@ _HOME = {
     "save_report": ("report.html", "save_report"),
     "save_result": ("files.result_file", "save_result"),
     "save_twin": ("files.twin_file", "save_twin"),
-    "simulate": ("simulation.dual_clutch", "simulate"),
+    "simulate": ("simulation.driveline_run", "simulate"),
     "simulate_shift": ("validation.simulate_log", "simulate_shift"),
     "attach_validation": ("validation.simulate_log", "attach_validation"),
 }

@@ -12,7 +12,8 @@ from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torqu
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline import ENGINE, SHAFT
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal, simulate
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
 from drivetwin.simulation.network import Output
 from drivetwin.simulation.network import simulate as simulate_network
 from tests.calibration.cases import SYSTEM, make_downshift, make_upshift

@@ -22,7 +22,8 @@ from drivetwin.calibration.scenarios import (
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline import Driveline
-from drivetwin.simulation.dual_clutch import FrictionTable, Signal, simulate
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import FrictionTable, Signal
 from drivetwin.twin.distribution import scale_friction
 from tests.calibration.cases import (
     SYSTEM,

@@ -15,7 +15,7 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import ReductionError
 from drivetwin.gearbox import load_gearbox, reduce, solve_gear
-from drivetwin.simulation import dual_clutch
+from drivetwin.simulation import driveline_run
 from drivetwin.simulation.driveline import OutputSide
 from drivetwin.simulation.dual_clutch import FloatArray, Signal, Trajectory
 
@@ -93,5 +93,5 @@ def test_a_form_is_a_driveline_that_runs() -> None:
     held = {name: Signal(time, np.full(21, 1e6)) for name in ("C4", "C3")}
     held["C3"] = Signal(time, np.zeros(21))
     torque = Signal(time, np.full(21, 1545.0))
-    result = dual_clutch.simulate(scenario.model, torque, held, scenario.start(), time)
+    result = driveline_run.simulate(scenario.model, torque, held, scenario.start(), time)
     assert result.status == "completed"

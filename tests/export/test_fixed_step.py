@@ -9,7 +9,8 @@ import pytest
 from drivetwin.errors import InputError
 from drivetwin.export.fixed_step import Stepping, run_fixed_step, sample_signals
 from drivetwin.export.targets import InputKind
-from drivetwin.simulation.dual_clutch import Signal, simulate
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import Signal
 from tests.export.cases import CASES
 
 

@@ -20,7 +20,8 @@ from drivetwin.observer.linear_model import (
     Course,
     build_linear_model,
 )
-from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory, simulate
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 
 GRID = 2e-4
 

@@ -20,6 +20,7 @@ from drivetwin.simulation.batch import (
     simulate_batch,
     simulate_batch_sensitivities,
 )
+from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     DualClutch,
@@ -31,7 +32,6 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
     Stribeck,
-    simulate,
 )
 from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
+from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
     ORDERS,
     Accuracy,
@@ -23,7 +24,6 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Stribeck,
     compute_series_inertia,
-    simulate,
 )
 from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 from tests.export.cases import SHARED, given, paper_model
@@ -198,7 +198,7 @@ def test_the_orders_allowed_are_those_of_the_core(order: int) -> None:
     ("change", "message"),
     [
         ({"k_o": -1.0}, "stiffness = -1 is impossible"),
-        ({"J_v": float("nan")}, "not a finite number: J_v"),
+        ({"J_v": float("nan")}, "J_v: inertia = nan is no finite number"),
         ({"eta": 0.0}, "eta = 0 is impossible"),
         ({"J_out": 0.0}, "nothing determines the acceleration of"),
     ],
@@ -225,7 +225,7 @@ def test_an_input_sample_within_round_off_of_the_end_costs_no_output() -> None:
 
 def test_a_missing_pressure_is_named() -> None:
     torque, pressures, start = held_second_gear()
-    with pytest.raises(InputError, match='input "B3" has no signal'):
+    with pytest.raises(InputError, match="B3: its input 'B3' is not given"):
         simulate(paper_model(), torque, {"B2": pressures["B2"]}, start, np.array([0.0, 1.0]))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
+from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     DualClutch,
@@ -20,7 +21,6 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Stribeck,
     compute_series_inertia,
-    simulate,
 )
 from drivetwin.simulation.linearize import Slip, linearise
 from drivetwin.simulation.network import Element

@@ -15,7 +15,8 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import Signal, simulate
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output, build_element
 from drivetwin.simulation.network import simulate as simulate_network
 from drivetwin.simulation.shift_control import (

@@ -13,13 +13,13 @@ import pytest
 from drivetwin.errors import InputError
 from drivetwin.modeling.model import Model
 from drivetwin.simulation.batch import Scenario, simulate_batch
+from drivetwin.simulation.driveline_run import simulate as simulate_dual_clutch
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     RoadLoad,
     Signal,
     State,
 )
-from drivetwin.simulation.dual_clutch import simulate as simulate_dual_clutch
 from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 from drivetwin.simulation.linearize import linearise
 from drivetwin.simulation.network import Sine, Start, simulate

@@ -13,6 +13,7 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
 from drivetwin.export.targets import InputKind
+from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     DualClutch,
@@ -20,7 +21,6 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
     Trajectory,
-    simulate,
 )
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import replace_run

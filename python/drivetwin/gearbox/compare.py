@@ -22,6 +22,7 @@ from drivetwin.simulation.driveline import (
     build_vehicle,
     require_own_nodes,
 )
+from drivetwin.simulation.driveline_run import simulate as simulate_dual_clutch
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
@@ -30,7 +31,6 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
 )
-from drivetwin.simulation.dual_clutch import simulate as simulate_dual_clutch
 from drivetwin.simulation.network import Element, Start
 from drivetwin.simulation.network import simulate as simulate_network
 

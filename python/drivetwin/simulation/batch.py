@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from drivetwin._native import batch_sensitivities as native_batch_sensitivities
 from drivetwin._native import simulate_batch as native_simulate_batch
 from drivetwin.errors import InputError
+from drivetwin.simulation.driveline_start import build_start
 from drivetwin.simulation.dual_clutch import (
     MOTION,
     CoreSamples,
@@ -28,12 +29,12 @@ from drivetwin.simulation.dual_clutch import (
     collect_inputs,
     require_delays,
     run_time,
-    to_core_start,
     to_delayed_core_samples,
 )
 from drivetwin.simulation.dual_clutch_paths import Seed, list_seeds, place_sets
 from drivetwin.simulation.network_output import NativeOutput
 from drivetwin.simulation.serialize import as_array, as_json, as_names
+from drivetwin.simulation.vehicle_parts import NO_PARTS
 
 
 class Keep(StrEnum):
@@ -108,7 +109,7 @@ def simulate_batch(
     Raises InputError for unknown names, differing lengths or an inconsistent description.
     """
     native = [parse_output(name) for name in as_names(outputs)]
-    plain = _to_core_scenarios(scenarios)
+    plain = _to_core_scenarios(model, scenarios)
     asked = BatchRequest.build(plain, time, parameters or {}, native, keep)
     return asked.simulate(as_json(model), place_sets(model, asked.sets), threads)
 
@@ -133,7 +134,7 @@ def simulate_batch_sensitivities(
     by = as_names(by)
     require_unknowns((one.inputs for one in scenarios), by)
     native = [parse_output(name) for name in as_names(outputs)]
-    plain = _to_core_scenarios(scenarios)
+    plain = _to_core_scenarios(model, scenarios)
     asked = BatchRequest.build(plain, time, parameters or {}, native, keep)
     sets, (_, seeds) = place_sets(model, asked.sets), list_seeds(model, by, asked.sets)
     return asked.differentiate(as_json(model), sets, by, seeds)
@@ -269,7 +270,9 @@ def parse_output(name: str) -> NativeOutput:
     return MOTION[name]
 
 
-def _to_core_scenarios(scenarios: Sequence[Scenario]) -> list[CoreScenario]:
+def _to_core_scenarios(model: DualClutch, scenarios: Sequence[Scenario]) -> list[CoreScenario]:
+    starts = (build_start(model, NO_PARTS, one.start, one.engine_torque, 0.0) for one in scenarios)
     return [
-        ((to_delayed_core_samples(one.inputs), []), to_core_start(one.start)) for one in scenarios
+        ((to_delayed_core_samples(one.inputs), []), start.to_core())
+        for one, start in zip(scenarios, starts, strict=True)
     ]

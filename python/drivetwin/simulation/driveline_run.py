@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.simulation import dual_clutch
+from drivetwin._util.check_arguments import check_arguments
 from drivetwin.simulation.driveline import (
     CRANK,
     ENGINE,
@@ -18,8 +18,17 @@ from drivetwin.simulation.driveline import (
     build_driveline,
 )
 from drivetwin.simulation.driveline_start import build_start
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, Signal, State, Trajectory
-from drivetwin.simulation.network import NetworkRun, Output, Start, simulate
+from drivetwin.simulation.dual_clutch import (
+    ENGINE_TORQUE,
+    Accuracy,
+    DualClutch,
+    Signal,
+    State,
+    Trajectory,
+    collect_inputs,
+)
+from drivetwin.simulation.network import NetworkRun, Output, Start
+from drivetwin.simulation.network import simulate as simulate_network
 from drivetwin.simulation.network_sensitivity import NetworkTask
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 
@@ -64,10 +73,7 @@ class DrivelineTask:
 
         Raises InputError where the description is inconsistent.
         """
-        if self.parts is NO_PARTS:
-            inputs = (self.engine_torque, self.pressures, self.start, self.time)
-            return dual_clutch.simulate(self.model, *inputs)
-        run = simulate(
+        run = simulate_network(
             build_driveline(self.model, self.parts),
             self.inputs,
             self._build_start(),
@@ -106,6 +112,31 @@ class DrivelineTask:
     def _build_start(self) -> Start:
         time = float(self.time[0])
         return build_start(self.model, self.parts, self.start, self.engine_torque, time)
+
+
+@check_arguments
+def simulate(
+    model: DualClutch,
+    engine_torque: Signal,
+    pressures: Mapping[str, Signal],
+    start: State,
+    time: FloatArray,
+    *,
+    audit: bool = False,
+    accuracy: Accuracy | None = None,
+) -> Trajectory:
+    """Run the model from `time[0]` and return its trajectory on `time` (n,) [s], increasing.
+
+    `pressures` maps element names to gauge pressures [Pa]; the signals must span `time`. Steps
+    always end on input samples and events.
+    Raises InputError where the description is inconsistent; a run that fails returns its status.
+    """
+    inputs = collect_inputs(engine_torque, pressures)
+    begin = build_start(model, NO_PARTS, start, engine_torque, 0.0)
+    names = [one.name for one in model.elements]
+    outputs, options = list_motion_outputs(names), {"audit": audit, "accuracy": accuracy}
+    run = simulate_network(build_driveline(model), inputs, begin, time, outputs, **options)
+    return build_trajectory(run, names)
 
 
 def list_motion_outputs(elements: list[str], output: str = OUTPUT) -> list[Output]:

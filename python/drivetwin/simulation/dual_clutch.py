@@ -7,20 +7,16 @@ The physics is computed by the Rust core; these classes only hold data.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._native import simulate_network as native_simulate
-from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import InputError
 from drivetwin.simulation.serialize import (
     as_array,
-    as_json,
-    as_names,
     require_number,
     require_samples,
 )
@@ -192,13 +188,20 @@ def compute_series_inertia(one: float, other: float) -> float:
 
 @dataclass(frozen=True)
 class State:
-    """Start of a simulation: speeds [rad/s] and shaft twist [rad]; elements that start locked."""
+    """Start of a simulation: speeds [rad/s] and shaft twist [rad]; elements that start locked.
+
+    Raises InputError for what are no numbers.
+    """
 
     engine_speed: float
     output_speed: float
     wheel_speed: float
     twist: float
     locked: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("engine_speed", "output_speed", "wheel_speed", "twist"):
+            require_number(name, getattr(self, name), finite=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,39 +324,6 @@ class Trajectory:
     crank_speed: FloatArray | None = None
 
 
-@check_arguments
-def simulate(
-    model: DualClutch,
-    engine_torque: Signal,
-    pressures: Mapping[str, Signal],
-    start: State,
-    time: FloatArray,
-    *,
-    audit: bool = False,
-    accuracy: Accuracy | None = None,
-) -> Trajectory:
-    """Run the model from `time[0]` and return its trajectory on `time` (n,) [s], increasing.
-
-    `pressures` maps element names to gauge pressures [Pa]; the signals must span `time`. Steps
-    always end on input samples and events.
-    Raises InputError where the description is inconsistent; a run that fails returns its status.
-    """
-    accuracy = accuracy or Accuracy()
-    options = (accuracy.tolerance, accuracy.max_step, accuracy.order, accuracy.sprint, audit)
-    try:
-        columns, events, status, energy = native_simulate(
-            as_json(model),
-            list_outputs(model),
-            ((to_core_samples(collect_inputs(engine_torque, pressures)), []), to_core_start(start)),
-            run_time(time),
-            options,
-        )
-    except ValueError as error:
-        raise InputError(str(error), "correct the model, its inputs or the time grid") from error
-    audited = EnergyAudit(*energy) if energy is not None else None
-    return collect_trajectory(model, time, columns, (events, status, audited))
-
-
 def collect_inputs(engine_torque: Signal, pressures: Mapping[str, Signal]) -> dict[str, Signal]:
     """Collect the inputs of a dual clutch by their names in the core.
 
@@ -394,46 +364,6 @@ def require_delays(inputs: Mapping[str, Signal], by: Sequence[str]) -> None:
                 "its delay",
                 "give the jump a width, such as that of a sample",
             )
-
-
-def to_core_start(start: State) -> CoreStart:
-    """A start as the core takes it. Raises InputError for what are no numbers or names."""
-    names = ("engine_speed", "output_speed", "wheel_speed", "twist")
-    *speeds, twist = (require_number(n, getattr(start, n), finite=False) for n in names)
-    by_node = list(zip(("engine", "output", "wheel"), speeds, strict=True))
-    return by_node, [(_SHAFT, twist)], as_names(start.locked)
-
-
-def list_outputs(model: DualClutch) -> list[tuple[str, tuple[str, ...]]]:
-    """List the outputs of a trajectory as the core takes them."""
-    names = [element.name for element in model.elements]
-    friction = [(kind, (name,)) for name in names for kind in ("friction_torque", "slip")]
-    return [*MOTION.values(), *friction]
-
-
-def collect_trajectory(
-    model: DualClutch,
-    time: FloatArray,
-    columns: Iterable[FloatArray],
-    outcome: tuple[list[tuple[float, str, str, float]], str, EnergyAudit | None],
-) -> Trajectory:
-    """Collect the columns (n,) of `MOTION` and the outcome of a run of the core."""
-    events, status, audit = outcome
-    engine, output, wheel, twist, shaft, *friction = columns
-    names = [element.name for element in model.elements]
-    return Trajectory(
-        time,
-        engine,
-        output,
-        wheel,
-        twist,
-        shaft,
-        clutch_torque=dict(zip(names, friction[::2], strict=True)),
-        slip=dict(zip(names, friction[1::2], strict=True)),
-        events=tuple(Event(*event) for event in events),
-        status=status,
-        audit=audit,
-    )
 
 
 def run_time(time: FloatArray) -> FloatArray:

@@ -3,28 +3,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from drivetwin._native import sensitivities as native_sensitivities
+import numpy as np
+
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin.errors import InputError
+from drivetwin.simulation.driveline import build_driveline
+from drivetwin.simulation.driveline_run import build_trajectory, list_motion_outputs
+from drivetwin.simulation.driveline_start import build_start
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     Signal,
     State,
     Trajectory,
     collect_inputs,
-    collect_trajectory,
-    list_outputs,
     require_delays,
-    run_time,
-    to_core_start,
-    to_delayed_core_samples,
 )
 from drivetwin.simulation.dual_clutch_paths import list_seeds
-from drivetwin.simulation.serialize import as_json, as_names
+from drivetwin.simulation.network_sensitivity import Description, NetworkTask
+from drivetwin.simulation.serialize import as_names
+from drivetwin.simulation.vehicle_parts import NO_PARTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,41 +63,20 @@ def simulate_sensitivities(
     """
     inputs, parameters = collect_inputs(engine_torque, pressures), as_names(parameters)
     require_delays(inputs, parameters)
-    try:
-        columns, events, status, derivatives, event_derivatives = native_sensitivities(
-            as_json(model),
-            list_outputs(model),
-            ((to_delayed_core_samples(inputs), []), to_core_start(start)),
-            run_time(time),
-            list_seeds(model, parameters, {}),
-        )
-    except ValueError as error:
-        raise InputError(str(error), "correct the model, its inputs or the names") from error
-    run = collect_trajectory(model, time, columns, (events, status, None))
-    by_name = dict(zip(parameters, event_derivatives, strict=True))
-    return Sensitivities(run, _Derivatives(model, run, derivatives, tuple(parameters)), by_name)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Derivatives(Mapping[str, Trajectory]):
-    """Trajectories of derivatives by parameter, made of the core's arrays when asked for."""
-
-    model: DualClutch
-    run: Trajectory
-    passes: Sequence[Sequence[FloatArray]]
-    """Of every pass of the core its columns (n, parameters of the pass)."""
-    parameters: tuple[str, ...]
-
-    def __getitem__(self, name: str) -> Trajectory:
-        if name not in self.parameters:
-            raise KeyError(name)
-        # All passes but the last are for as many parameters.
-        number, place = divmod(self.parameters.index(name), self.passes[0][0].shape[1])
-        columns = [column[:, place] for column in self.passes[number]]
-        return collect_trajectory(self.model, self.run.time, columns, ([], self.run.status, None))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys(self.parameters))
-
-    def __len__(self) -> int:
-        return len(set(self.parameters))
+    begin = build_start(model, NO_PARTS, start, engine_torque, 0.0)
+    seeded = Description.build(build_driveline(model), inputs, begin)
+    slopes: dict[str, FloatArray] = {}
+    for unknown, path, weight in list_seeds(model, parameters, {})[1]:
+        slopes.setdefault(path, np.zeros(len(parameters)))[unknown] += weight[0]
+    for path, one in slopes.items():
+        # Of a dual clutch's laws rolling resistance alone has a corner at zero.
+        seeded = seeded.place_variable(path, one, smooth=path == "load.rolling")
+    names = [one.name for one in model.elements]
+    given = (seeded.elements, seeded.inputs, seeded.start, time, list_motion_outputs(names))
+    found = NetworkTask(*given).differentiate(len(parameters))
+    derivatives, event_times = {}, {}
+    for k, name in enumerate(parameters):
+        columns = {output: column[:, k] for output, column in found.derivatives.items()}
+        run = replace(found.run, columns=columns, events=())
+        derivatives[name], event_times[name] = build_trajectory(run, names), found.event_times[:, k]
+    return Sensitivities(build_trajectory(found.run, names), derivatives, event_times)

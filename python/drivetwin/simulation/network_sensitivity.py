@@ -199,7 +199,7 @@ def differentiate(
     """
     elements, outputs = list(elements), list(outputs)
     resolve_outputs(elements, inputs, outputs)
-    seeded = _Description(json.loads(as_json(elements)), dict(inputs), start)
+    seeded = Description.build(elements, inputs, start)
     for path, derivative in collect_weights(unknowns).items():
         seeded = seeded.place_variable(path, derivative)
     given = (seeded.elements, seeded.inputs, seeded.start, time, outputs)
@@ -209,7 +209,7 @@ def differentiate(
 
 def get_number(elements: Sequence[Element], path: str) -> float:
     """Return the number of an element at a path; raises InputError where there is none."""
-    described = _Description(json.loads(as_json(list(elements))), {}, Start({}))
+    described = Description.build(elements, {}, Start({}))
     place, key = described.find_number(path)
     return float(place[key])
 
@@ -269,19 +269,26 @@ def _find_number(
     start_or_delay = path.startswith(("start.", "delay."))
     found: tuple[object, float] = ("", 0.0)
     for one in scenarios if start_or_delay else scenarios[:1]:
-        described = [] if start_or_delay else json.loads(as_json(list(elements)))
-        place, key = _Description(described, dict(one.inputs), one.start).find_number(path)
+        described = [] if start_or_delay else elements
+        place, key = Description.build(described, one.inputs, one.start).find_number(path)
         found = key, float(place[key])
     return found
 
 
 @dataclass(frozen=True, eq=False)
-class _Description:
+class Description:
     """Elements as plain data, inputs and start, in which variables take the places of numbers."""
 
     elements: list[dict[str, Any]]
     inputs: dict[str, Signal | Sine]
     start: Start
+
+    @classmethod
+    def build(
+        cls, elements: Sequence[Element], inputs: Mapping[str, Signal | Sine], start: Start
+    ) -> Description:
+        """Build the description of a network."""
+        return cls(json.loads(as_json(list(elements))), dict(inputs), start)
 
     @property
     def samples(self) -> dict[str, Signal]:
@@ -309,10 +316,11 @@ class _Description:
             raise InputError(f"unknown {path!r} is no number", _HOW)
         return place, key
 
-    def place_variable(self, path: str, slopes: FloatArray) -> _Description:
+    def place_variable(self, path: str, slopes: FloatArray, *, smooth: bool = True) -> Description:
         """Return the description with a variable of `slopes` (p,) at a path.
 
-        Raises InputError for a path that leads to no number, or to one where its law has a corner.
+        Raises InputError for a path that leads to no number, and with `smooth` to one where its law
+        has a corner.
         """
         place, key = self.find_number(path)
         variable = Variable(float(place[key]), slopes)
@@ -324,7 +332,8 @@ class _Description:
         if head == "delay":
             delayed = {name: replace(self.samples[name], delay=variable)}
             return replace(self, inputs={**self.inputs, **delayed})
-        _require_smooth(path, key, place[key])
+        if smooth:
+            _require_smooth(path, key, place[key])
         place[key] = variable
         return self
 

@@ -13,6 +13,7 @@ from drivetwin.errors import InputError
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.modelica.model import format_modelica, write_modelica
 from drivetwin.export.subject import Subject
+from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
@@ -22,7 +23,6 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
     Stribeck,
-    simulate,
 )
 from tests.export.modelica.compiled import run
 from tests.export.parameters.sample import twin

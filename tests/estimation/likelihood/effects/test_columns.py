@@ -22,7 +22,8 @@ from drivetwin.estimation.likelihood.effects.operating_point import (
 )
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.cause import Group
-from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, Signal, simulate
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, Signal
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from tests.estimation.likelihood.fixtures import fitted
 from tests.support.shared_results import shared
