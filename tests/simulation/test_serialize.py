@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import FrictionTable, State, to_core_start
+from drivetwin.simulation.dual_clutch import FrictionTable
+from drivetwin.simulation.network import Start
 from drivetwin.simulation.serialize import as_array, as_json, as_names
 
 
@@ -45,6 +46,5 @@ def test_what_is_no_column_of_numbers_is_refused(values: Any) -> None:
 
 def test_names_are_a_list_and_a_text_is_none() -> None:
     assert as_names(("B2", "B3")) == ["B2", "B3"]
-    start = State(100.0, 50.0, 10.0, 0.0, locked="B2")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="'B2' where a list"):
-        to_core_start(start)
+        Start({"engine": 100.0}, locked="B2")  # type: ignore[arg-type]

@@ -21,14 +21,15 @@ from drivetwin.simulation.batch import (
     simulate_batch,
     simulate_batch_sensitivities,
 )
+from drivetwin.simulation.driveline_start import build_start
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     Signal,
-    to_core_start,
 )
 from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 from drivetwin.simulation.network import Sine, Start, simulate
 from drivetwin.simulation.serialize import as_json
+from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.simulation.test_batch import MODEL, TIME, scenario, sets
 
 LATEST = 0.2
@@ -138,4 +139,4 @@ def to_plain(one: Scenario) -> Any:
     """A scenario as the core takes it."""
     inputs = {"engine torque": one.engine_torque, **one.pressures}
     samples = [(name, s.time, s.values, s.delay) for name, s in inputs.items()]
-    return (samples, []), to_core_start(one.start)
+    return (samples, []), build_start(MODEL, NO_PARTS, one.start, one.engine_torque, 0.0).to_core()

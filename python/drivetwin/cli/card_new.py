@@ -52,7 +52,9 @@ def _declare_entries() -> type[Request]:
 
 
 if TYPE_CHECKING:
-    CardEntries = Request
+
+    class CardEntries(Request):
+        """Entries of a card as texts."""
 else:
     CardEntries = _declare_entries()
 

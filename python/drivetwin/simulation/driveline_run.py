@@ -134,8 +134,8 @@ def simulate(
     inputs = collect_inputs(engine_torque, pressures)
     begin = build_start(model, NO_PARTS, start, engine_torque, 0.0)
     names = [one.name for one in model.elements]
-    outputs, options = list_motion_outputs(names), {"audit": audit, "accuracy": accuracy}
-    run = simulate_network(build_driveline(model), inputs, begin, time, outputs, **options)
+    given = (build_driveline(model), inputs, begin, time, list_motion_outputs(names))
+    run = simulate_network(*given, audit=audit, accuracy=accuracy)
     return build_trajectory(run, names)
 
 
